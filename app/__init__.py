@@ -1,0 +1,1 @@
+"""What people see of Spinscope: the command line, the viewer and the reports."""

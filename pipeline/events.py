@@ -1,0 +1,98 @@
+"""Events as the sensor sends them: four read-only columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import RecordingError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EventBatch:
+    """Events in order of time.
+
+    t_us : (n,) int64, microseconds in the file's own time, never falling
+    x_px, y_px : (n,) uint16, pixel column (to the right) and row (down)
+    on : (n,) bool, True = ON (brighter), False = OFF (darker)
+
+    All columns are read-only. The constructor trusts its arguments; data from outside the program comes in
+    through `checked`.
+    """
+
+    t_us: NDArray[np.int64]
+    x_px: NDArray[np.uint16]
+    y_px: NDArray[np.uint16]
+    on: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        for column in (self.t_us, self.x_px, self.y_px, self.on):
+            column.flags.writeable = False
+
+    @classmethod
+    def empty(cls) -> EventBatch:
+        """A batch without events."""
+        return cls(np.empty(0, np.int64), np.empty(0, np.uint16), np.empty(0, np.uint16), np.empty(0, np.bool_))
+
+    @classmethod
+    def checked(
+        cls,
+        t_us: ArrayLike,
+        x_px: ArrayLike,
+        y_px: ArrayLike,
+        on: ArrayLike,
+        *,
+        width_px: int,
+        height_px: int,
+    ) -> EventBatch:
+        """Copy columns from outside after checking lengths, order of time and the sensor's bounds.
+
+        Raises RecordingError when the columns differ in length, time goes backwards or a pixel lies outside.
+        """
+        t = np.array(t_us, np.int64)
+        x, y = np.asarray(x_px), np.asarray(y_px)
+        polarity = np.array(on, np.bool_)
+        if not (t.ndim == 1 and t.shape == x.shape == y.shape == polarity.shape):
+            raise RecordingError(
+                f"event columns differ in length: t {t.shape}, x {x.shape}, y {y.shape}, on {polarity.shape}"
+            )
+        if t.size and np.any(t[1:] < t[:-1]):
+            at = int(np.argmax(t[1:] < t[:-1])) + 1
+            raise RecordingError(f"time goes backwards at event {at}: {t[at - 1]} us, then {t[at]} us")
+        for name, column, size in (("x", x, width_px), ("y", y, height_px)):
+            if column.size and (int(column.min()) < 0 or int(column.max()) >= size):
+                raise RecordingError(
+                    f"{name} runs from {column.min()} to {column.max()} px, "
+                    f"outside the sensor's {width_px} x {height_px} pixels: state the right --sensor WxH"
+                )
+        return cls(t, x.astype(np.uint16), y.astype(np.uint16), polarity)
+
+    @classmethod
+    def concatenate(cls, batches: Iterable[EventBatch]) -> EventBatch:
+        """Join batches that follow each other in time."""
+        parts = list(batches)
+        if not parts:
+            return cls.empty()
+        if len(parts) == 1:
+            return parts[0]
+        return cls(
+            np.concatenate([b.t_us for b in parts]),
+            np.concatenate([b.x_px for b in parts]),
+            np.concatenate([b.y_px for b in parts]),
+            np.concatenate([b.on for b in parts]),
+        )
+
+    def __len__(self) -> int:
+        return self.t_us.size
+
+    def __getitem__(self, rows: slice | NDArray[np.bool_] | NDArray[np.intp]) -> EventBatch:
+        """The events of a slice (views), of a mask or of indices (copies)."""
+        return EventBatch(self.t_us[rows], self.x_px[rows], self.y_px[rows], self.on[rows])
+
+    def between(self, start_us: int, end_us: int) -> EventBatch:
+        """The events of [start_us, end_us), as views."""
+        first, last = np.searchsorted(self.t_us, [start_us, end_us])
+        return self[int(first) : int(last)]

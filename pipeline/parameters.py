@@ -1,0 +1,224 @@
+"""Parameters declared once: the declaration feeds validation, sliders, `--set`, presets and the docs.
+
+A stage's parameters are one frozen, keyword-only dataclass whose fields are made by `tunable` (a number),
+`switch` (yes or no) or `choice` (one of several words).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from .errors import ParameterError
+
+Group = TypeVar("Group", bound="ParameterGroup")
+
+
+@dataclass(frozen=True, slots=True)
+class Tunable:
+    """What is known of one parameter besides its value."""
+
+    default: Any
+    help: str
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    step: float | None = None
+    choices: tuple[str, ...] = ()
+
+    @property
+    def kind(self) -> str:
+        """number, whole number, switch, choice, or numbers (a fixed-length list of numbers).
+
+        A number whose default is None may be left out ("none"): the program then finds it itself.
+        """
+        if self.choices:
+            return "choice"
+        if isinstance(self.default, bool):
+            return "switch"
+        if isinstance(self.default, tuple):
+            return "numbers"
+        return "whole number" if isinstance(self.default, int) else "number"
+
+    def checked(self, name: str, value: Any) -> Any:
+        """The value in the declared type; raises ParameterError that says what is allowed."""
+        if isinstance(value, str) and self.kind != "choice":
+            value = _parsed(value)
+        kind = self.kind
+        if self.default is None and value is None:
+            return None
+        if kind == "choice":
+            if value not in self.choices:
+                raise ParameterError(f"{name} = {value!r} is none of {', '.join(self.choices)}")
+            return value
+        if kind == "switch":
+            if not isinstance(value, bool):
+                raise ParameterError(f"{name} = {value!r} is not a switch: use true or false")
+            return value
+        if kind == "numbers":
+            if not isinstance(value, (list, tuple)) or len(value) != len(self.default):
+                raise ParameterError(f"{name} = {value!r} is not a list of {len(self.default)} numbers")
+            return tuple(self._number(name, item) for item in value)
+        number = self._number(name, value)
+        if kind == "whole number":
+            if number != int(number):
+                raise ParameterError(f"{name} = {value!r} is not a whole number")
+            return int(number)
+        return number
+
+    def _number(self, name: str, value: Any) -> float:
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            raise ParameterError(f"{name} = {value!r} is not a number: {self.allowed}")
+        low = -math.inf if self.low is None else self.low
+        high = math.inf if self.high is None else self.high
+        if not low <= value <= high:
+            raise ParameterError(f"{name} = {value:g} is out of range: {self.allowed}")
+        return float(value)
+
+    @property
+    def allowed(self) -> str:
+        """What may be given, in words."""
+        if self.kind == "choice":
+            return f"one of {', '.join(self.choices)}"
+        if self.kind == "switch":
+            return "true or false"
+        unit = f" {self.unit}" if self.unit else ""
+        if self.low is None and self.high is None:
+            return f"any number{unit}"
+        if self.high is None:
+            return f"{self.low:g}{unit} or more"
+        if self.low is None:
+            return f"{self.high:g}{unit} or less"
+        return f"{self.low:g} to {self.high:g}{unit}"
+
+
+def tunable(
+    default: float | tuple[float, ...] | None,
+    low: float | None,
+    high: float | None,
+    step: float | None,
+    unit: str,
+    help: str,
+) -> Any:
+    """Declare a number (int default = whole number, tuple default = that many numbers) with range and unit."""
+    return _field(Tunable(default, help, unit, low, high, step))
+
+
+def switch(default: bool, help: str) -> Any:
+    """Declare a parameter that is on or off."""
+    return _field(Tunable(default, help))
+
+
+def choice(default: str, choices: Sequence[str], help: str) -> Any:
+    """Declare a parameter that is one of several words."""
+    return _field(Tunable(default, help, choices=tuple(choices)))
+
+
+def _field(declared: Tunable) -> Any:
+    return dataclasses.field(default=declared.default, metadata={"tunable": declared})
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterGroup:
+    """Base of one stage's parameters; checks every field when made. Compared and hashed by value."""
+
+    def __post_init__(self) -> None:
+        for name, declared in self.tunables().items():
+            value = declared.checked(f"{self.group_name()}.{name}", getattr(self, name))
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def group_name(cls) -> str:
+        """The stage's name in `stage.field`, from the class name: FilterParameters -> filter."""
+        return cls.__name__.removesuffix("Parameters").lower()
+
+    @classmethod
+    def tunables(cls) -> dict[str, Tunable]:
+        """Every field's declaration, in order."""
+        return {field.name: field.metadata["tunable"] for field in dataclasses.fields(cls)}
+
+    def with_values(self: Group, values: Mapping[str, Any]) -> Group:
+        """A copy with some fields changed; raises ParameterError for an unknown field."""
+        known = self.tunables()
+        for name in values:
+            if name not in known:
+                raise ParameterError(f"{self.group_name()}.{name} is unknown{_did_you_mean(name, known)}")
+        return dataclasses.replace(self, **values)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Field names and values, ready for JSON or TOML (tuples as lists)."""
+        return {
+            name: list(value) if isinstance(value := getattr(self, name), tuple) else value
+            for name in self.tunables()
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterSet:
+    """Base of a whole program's parameters: one ParameterGroup a field."""
+
+    def group(self, name: str) -> ParameterGroup:
+        """One group by name; raises ParameterError when there is none."""
+        names = [field.name for field in dataclasses.fields(self)]
+        if name not in names:
+            raise ParameterError(f"there is no stage {name!r}{_did_you_mean(name, names)}")
+        group: ParameterGroup = getattr(self, name)
+        return group
+
+    def with_values(self: SetType, values: Mapping[str, Any]) -> SetType:
+        """A copy with {stage: {field: value}} changed; raises ParameterError for anything unknown."""
+        changed = {}
+        for name, fields in values.items():
+            group = self.group(name)
+            if not isinstance(fields, Mapping):
+                raise ParameterError(f"{name} = {fields!r} is not a table of fields: write {name}.field = value")
+            changed[name] = group.with_values(fields)
+        return dataclasses.replace(self, **changed)
+
+    def with_assignments(self: SetType, assignments: Sequence[str]) -> SetType:
+        """A copy with `stage.field=value` texts applied in order, as `--set` takes them."""
+        result = self
+        for text in assignments:
+            target, equals, value = text.partition("=")
+            stage, dot, name = target.strip().partition(".")
+            if not (equals and dot and stage and name):
+                raise ParameterError(f"{text!r} is not of the form stage.field=value, like logo.pad_px=3")
+            result = result.with_values({stage: {name: value.strip()}})
+        return result
+
+    def as_dict(self) -> dict[str, dict[str, Any]]:
+        """{stage: {field: value}}."""
+        return {field.name: getattr(self, field.name).as_dict() for field in dataclasses.fields(self)}
+
+
+SetType = TypeVar("SetType", bound=ParameterSet)
+
+
+def _parsed(text: str) -> Any:
+    lowered = text.lower()
+    if lowered in ("true", "on", "yes"):
+        return True
+    if lowered in ("false", "off", "no"):
+        return False
+    if lowered == "none":
+        return None
+    if "," in text:
+        return [_parsed(item.strip()) for item in text.strip("[]()").split(",")]
+    try:
+        return int(text)
+    except ValueError:
+        try:
+            return float(text)
+        except ValueError:
+            return text
+
+
+def _did_you_mean(name: str, known: Sequence[str] | Mapping[str, Any]) -> str:
+    close = difflib.get_close_matches(name, list(known), n=1)
+    if close:
+        return f": did you mean {close[0]}?"
+    return f"; there are {', '.join(known)}"

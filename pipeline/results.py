@@ -1,0 +1,127 @@
+"""What stages and recordings hand on to each other and to people: frozen, and never sharing memory with state."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .events import EventBatch
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Packet:
+    """The events of one tick: [start_us, end_us), with start_us = index x tick length in file time."""
+
+    index: int
+    start_us: int
+    end_us: int
+    events: EventBatch
+
+
+@dataclass(frozen=True, slots=True)
+class Circle:
+    """A circle in the image: centre and radius in pixels, `score` = how well it is supported (0..1)."""
+
+    x_px: float
+    y_px: float
+    radius_px: float
+    score: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SpinEstimate:
+    """What one method says of the spin, or why it says nothing.
+
+    vector_rps : (3,) float64, angular velocity in the camera frame (right-hand rule), rps; None when refused
+    covariance_rps2 : (3, 3) float64, 1-sigma covariance of the vector, rps^2; None when refused
+    reason : why it is refused, in words for people; None when it is ok
+    events : number of events (or constraints) behind the answer
+    """
+
+    method: str
+    vector_rps: Vector | None
+    covariance_rps2: NDArray[np.float64] | None
+    reason: str | None
+    events: int = 0
+
+    @classmethod
+    def refused(cls, method: str, reason: str, events: int = 0) -> SpinEstimate:
+        return cls(method, None, None, reason, events)
+
+    @property
+    def status(self) -> Literal["ok", "refused"]:
+        return "refused" if self.vector_rps is None else "ok"
+
+    @property
+    def magnitude_rps(self) -> float | None:
+        return None if self.vector_rps is None else float(np.linalg.norm(self.vector_rps))
+
+    @property
+    def axis(self) -> Vector | None:
+        """(3,) unit vector, the signed axis; None when refused or the magnitude is zero."""
+        magnitude = self.magnitude_rps
+        if self.vector_rps is None or not magnitude:
+            return None
+        return self.vector_rps / magnitude
+
+    @property
+    def magnitude_std_rps(self) -> float | None:
+        """1 sigma of the magnitude: the covariance seen along the axis."""
+        axis = self.axis
+        if axis is None or self.covariance_rps2 is None:
+            return None
+        return float(np.sqrt(max(axis @ self.covariance_rps2 @ axis, 0.0)))
+
+    @property
+    def axis_std_deg(self) -> float | None:
+        """sqrt(trace of the 2 x 2 covariance of the direction in its tangent plane), degrees, at most 180."""
+        axis, magnitude = self.axis, self.magnitude_rps
+        if axis is None or magnitude is None or self.covariance_rps2 is None:
+            return None
+        across = np.trace(self.covariance_rps2) - axis @ self.covariance_rps2 @ axis
+        return min(float(np.degrees(np.sqrt(max(across, 0.0)) / magnitude)), 180.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Truth:
+    """What a simulator knows of the ball named first in its scene.
+
+    t_us : (n,) int64, rising
+    x_px, y_px, radius_px : (n,) float64, centre of the silhouette and geometric mean of its semi-axes
+    position_m, velocity_m_s, spin_rps : (n, 3) float64, camera frame
+    label : one uint8 an event: 0 noise, 1 ball edge and shading, 2 logo, 3 other object, 4 hot pixel
+    """
+
+    t_us: NDArray[np.int64]
+    x_px: Vector
+    y_px: Vector
+    radius_px: Vector
+    position_m: Vector
+    velocity_m_s: Vector
+    spin_rps: Vector
+    label: NDArray[np.uint8]
+
+
+def nbytes(result: Any) -> int:
+    """Bytes of all arrays held by a (nested) result; views count as what they show."""
+    if isinstance(result, np.ndarray):
+        return result.nbytes
+    if isinstance(result, (tuple, list)):
+        return sum(nbytes(item) for item in result)
+    if isinstance(result, dict):
+        return sum(nbytes(item) for item in result.values())
+    if dataclasses.is_dataclass(result) and not isinstance(result, type):
+        return sum(nbytes(getattr(result, field.name)) for field in dataclasses.fields(result))
+    return 0
+
+
+def frozen(array: NDArray[Any]) -> NDArray[Any]:
+    """The same array, made read-only."""
+    array.flags.writeable = False
+    return array
