@@ -1,5 +1,253 @@
-"""The command line."""
+"""The command line: `spinscope COMMAND`; without a command it shows the default sample."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO, Any
+
+import click
+
+from pipeline.errors import SpinscopeError
+
+from .session import DEFAULT_SAMPLE, Choices, Session
+from .terminal import ProgressBar, announce_compilation, note, print_reports
+
+METHODS = ("triplet", "normal_flow", "all")
+LAYOUTS = ("all", "tracker", "logo", "spin", "coach")
+RECORDING = click.Path(path_type=Path)
+
+
+class SensorSize(click.ParamType):
+    """WIDTHxHEIGHT in pixels."""
+
+    name = "WxH"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        width, _, height = str(value).lower().partition("x")
+        if not (
+            width.isdecimal()
+            and height.isdecimal()
+            and 1 <= int(width) <= 65536
+            and 1 <= int(height) <= 65536
+        ):
+            self.fail(
+                f"{value!r} is not a sensor size: write WIDTHxHEIGHT in pixels, like 1280x720", param, ctx
+            )
+        return int(width), int(height)
+
+
+class FixedBall(click.ParamType):
+    """`auto`, or three numbers (the command line's are joined by commas before click sees them)."""
+
+    name = "X_PX Y_PX RADIUS_PX | auto"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float, float] | str:
+        if value == "auto":
+            return "auto"
+        try:
+            x, y, radius = (float(number) for number in str(value).split(","))
+        except ValueError:
+            self.fail(f"{value!r} is neither `auto` nor three numbers X_PX Y_PX RADIUS_PX", param, ctx)
+        return x, y, radius
+
+
+def _choices(command: Callable[..., None]) -> Callable[..., None]:
+    """The options that analyze and view share; the command gets them as one `choices`."""
+    options = (
+        click.option("--preset", metavar="NAME|FILE.toml", help="Settings to start from: default, paper, or a TOML file."),
+        click.option("--set", "assignments", multiple=True, metavar="STAGE.FIELD=VALUE", help="Change one setting; repeatable, like --set logo.pad_px=3."),
+        click.option("--window", type=int, nargs=2, metavar="START_US END_US", help="Use only the events of [START, END), file time in us."),
+        click.option("--fixed-ball", type=FixedBall(), help="The ball stays in place (ball spinner): its circle, or auto to find it."),
+        click.option("--sensor", type=SensorSize(), help="Size of the sensor in pixels, where the file does not say it."),
+    )  # fmt: skip
+
+    def with_choices(
+        preset: str | None,
+        assignments: tuple[str, ...],
+        window: tuple[int, int] | None,
+        fixed_ball: tuple[float, float, float] | str | None,
+        sensor: tuple[int, int] | None,
+        **rest: Any,
+    ) -> None:
+        if window and window[0] >= window[1]:
+            raise click.UsageError(
+                f"--window {window[0]} {window[1]} is empty: START_US must be below END_US"
+            )
+        command(choices=Choices(preset, assignments, window, fixed_ball, sensor), **rest)
+
+    with_choices.__name__, with_choices.__doc__ = command.__name__, command.__doc__
+    decorated: Callable[..., None] = with_choices
+    for option in reversed(options):
+        decorated = option(decorated)
+    return decorated
+
+
+@click.group(
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
+@click.version_option(package_name="spinscope", prog_name="spinscope")
+@click.pass_context
+def cli(context: click.Context) -> None:
+    """See every stage of an event-camera spin estimator for table tennis, side by side on one timeline.
+
+    Without a command: view the sample recording that comes with Spinscope.
+    """
+    if context.invoked_subcommand is None:
+        note(f"viewing the sample {DEFAULT_SAMPLE.name}; `spinscope --help` lists what else there is")
+        _view(DEFAULT_SAMPLE, None, False, "all", Choices())
+
+
+@cli.command()
+@click.argument("recording", type=RECORDING)
+@click.option(
+    "--sensor", type=SensorSize(), help="Size of the sensor in pixels, where the file does not say it."
+)
+@click.option(
+    "--json", "output", type=click.File("w"), help="Write JSON to this file, - for standard output."
+)
+def info(recording: Path, sensor: tuple[int, int] | None, output: IO[str] | None) -> None:
+    """Say what a recording holds: format, sensor, events, duration, rates, hot pixels, triggers, damage."""
+    from .info import information, print_information
+
+    with ProgressBar() as bar:
+        found = information(recording, sensor, bar)
+    if output:
+        output.write(json.dumps(found, allow_nan=False) + "\n")
+    else:
+        print_information(found)
+
+
+@cli.command()
+@click.argument("recordings", type=RECORDING, nargs=-1, required=True)
+@click.option(
+    "--json",
+    "output",
+    type=click.Path(),
+    help="Write JSON, one object a recording and line, - for standard output.",
+)
+@click.option(
+    "--method",
+    type=click.Choice(METHODS),
+    default="all",
+    show_default=True,
+    help="Which estimates of the spin to report.",
+)
+@_choices
+def analyze(recordings: tuple[Path, ...], output: str | None, method: str, choices: Choices) -> None:
+    """Find the shots of recordings and estimate their spin."""
+    from .analyze import analyze as analyzed
+
+    reports: list[dict[str, Any]] = []
+    for recording in recordings:
+        try:
+            with ProgressBar() as bar:
+                reports.append(analyzed(recording, choices, method, bar))
+        except SpinscopeError as error:
+            if len(recordings) == 1:
+                raise
+            note(f"error: {error}")
+            reports.append({"schema": 1, "recording": {"path": str(recording)}, "error": str(error)})
+    if output is None:
+        print_reports(reports)
+    else:
+        lines = "".join(json.dumps(report, allow_nan=False) + "\n" for report in reports)
+        with click.open_file(output, "w", encoding="utf-8", atomic=output != "-") as file:
+            file.write(lines)
+    if any("error" in report for report in reports):
+        sys.exit(2)
+
+
+@cli.command()
+@click.argument("recording", type=RECORDING)
+@click.option(
+    "--save",
+    type=click.Path(path_type=Path),
+    metavar="FILE.rrd",
+    help="Write an .rrd file instead of opening the viewer.",
+)
+@click.option("--native", is_flag=True, help="Open Rerun's own window instead of the browser.")
+@click.option(
+    "--layout", type=click.Choice(LAYOUTS), default="all", show_default=True, help="Which tab is in front."
+)
+@_choices
+def view(recording: Path, save: Path | None, native: bool, layout: str, choices: Choices) -> None:
+    """Show every stage of a recording in the viewer."""
+    _view(recording, save, native, layout, choices)
+
+
+@cli.command()
+@click.argument("source", type=RECORDING)
+@click.argument("target", type=RECORDING)
+@click.option(
+    "--sensor", type=SensorSize(), help="Size of the sensor in pixels, where the file does not say it."
+)
+def convert(source: Path, target: Path, sensor: tuple[int, int] | None) -> None:
+    """Write a recording in another format, chosen by the suffix of TARGET (.h5, .npz, .raw)."""
+    from pipeline.recordings import convert as converted
+
+    with ProgressBar() as bar:
+        converted(source, target, sensor=sensor, on_progress=lambda share: bar(share, "converting"))
+
+
+def _view(recording: Path, save: Path | None, native: bool, layout: str, choices: Choices) -> None:
+    with ProgressBar() as bar:
+        session = Session.open(recording, choices, bar)
+        session = session.clip_for_viewing(bar)
+        ticks, log = session.all_ticks(bar)
+        for warning in session.warnings:
+            note(f"warning: {warning}")
+        from . import viewer  # Rerun takes a while to load: not before it is needed
+
+        if save:
+            viewer.save(session, ticks, log.shots, save, layout=layout, no_shot_reason=log.no_shot_reason)
+    if save:
+        note(
+            f"saved {save} ({save.stat().st_size / 1e6:.1f} MB): open it with `spinscope view --native` or `rerun {save}`"
+        )
+    else:
+        viewer.show(
+            session, ticks, log.shots, layout=layout, native=native, no_shot_reason=log.no_shot_reason
+        )
+
+
+def _join_fixed_ball(arguments: list[str]) -> list[str]:
+    """Make one value of `--fixed-ball X Y RADIUS`; click takes a fixed number of values and `auto` is one."""
+    if "--fixed-ball" not in arguments:
+        return arguments
+    at = arguments.index("--fixed-ball") + 1
+    if arguments[at : at + 1] == ["auto"] or "," in "".join(arguments[at : at + 1]):
+        return arguments
+    return [*arguments[:at], ",".join(arguments[at : at + 3]), *arguments[at + 3 :]]
 
 
 def main() -> None:
-    """Entry point."""
+    """Entry point: our errors and click's become one line on standard error and exit status 2."""
+    announce_compilation()
+    try:
+        cli.main(_join_fixed_ball(sys.argv[1:]), prog_name="spinscope", standalone_mode=False)
+    except SpinscopeError as error:
+        message = str(error)
+    except click.exceptions.Exit as error:
+        sys.exit(error.exit_code)
+    except click.Abort:
+        sys.exit(130)
+    except click.ClickException as error:
+        message = " ".join(error.format_message().split())
+        context = getattr(error, "ctx", None)
+        if context is not None:
+            message += f" (`{context.command_path} --help` explains)"
+    except BrokenPipeError:
+        sys.stderr.close()
+        sys.exit(0)
+    else:
+        return
+    note(f"spinscope: {message}")
+    sys.exit(2)

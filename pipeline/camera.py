@@ -33,7 +33,12 @@ class CameraParameters(ParameterGroup):
         (0.0, 0.0, 0.0, 0.0, 0.0), -100.0, 100.0, 0.01, "", "OpenCV's lens distortion k1, k2, p1, p2, k3"
     )
     up: tuple[float, ...] = tunable(
-        (0.0, 0.0, -1.0), -1.0, 1.0, 0.1, "", "up in the camera frame; (0, 0, -1) for a camera that looks down"
+        (0.0, 0.0, -1.0),
+        -1.0,
+        1.0,
+        0.1,
+        "",
+        "up in the camera frame; (0, 0, -1) for a camera that looks down",
     )
 
 
@@ -61,7 +66,9 @@ class Camera:
         """The camera of these parameters on a sensor of this size; raises ParameterError for up = 0."""
         length = float(np.linalg.norm(parameters.up))
         if length < 1e-6:
-            raise ParameterError("camera.up = 0,0,0 is no direction: (0, 0, -1) is up for a camera that looks down")
+            raise ParameterError(
+                "camera.up = 0,0,0 is no direction: (0, 0, -1) is up for a camera that looks down"
+            )
         x, y = parameters.principal_x_px, parameters.principal_y_px
         return cls(
             width_px,
@@ -83,7 +90,7 @@ class Camera:
             points = cv2.undistortPoints(
                 np.stack([x, y], axis=1).reshape(-1, 1, 2), np.eye(3), np.array(self.distortion)
             ).reshape(-1, 2)
-            x, y = points[:, 0], points[:, 1]
+            x, y = points[:, 0].astype(np.float64), points[:, 1].astype(np.float64)
         return np.stack([x, y, np.ones_like(x)], axis=1)
 
     def project(self, points_m: ArrayLike) -> Floats:
@@ -98,9 +105,13 @@ class Camera:
                 x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
                 y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
             )
-        return np.stack([x * self.focal_px + self.principal_x_px, y * self.focal_px + self.principal_y_px], axis=1)
+        return np.stack(
+            [x * self.focal_px + self.principal_x_px, y * self.focal_px + self.principal_y_px], axis=1
+        )
 
-    def ball_centre_m(self, x_px: ArrayLike, y_px: ArrayLike, radius_px: ArrayLike, ball_radius_m: float) -> Floats:
+    def ball_centre_m(
+        self, x_px: ArrayLike, y_px: ArrayLike, radius_px: ArrayLike, ball_radius_m: float
+    ) -> Floats:
         """(n, 3) float64 centres of balls whose silhouettes have these centres and radii; inverse of `silhouette`.
 
         The outline of a sphere is the cone of half-angle alpha = asin(R / distance) around the direction theta off

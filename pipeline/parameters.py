@@ -175,7 +175,9 @@ class ParameterSet:
         for name, fields in values.items():
             group = self.group(name)
             if not isinstance(fields, Mapping):
-                raise ParameterError(f"{name} = {fields!r} is not a table of fields: write {name}.field = value")
+                raise ParameterError(
+                    f"{name} = {fields!r} is not a table of fields: write {name}.field = value"
+                )
             changed[name] = group.with_values(fields)
         return dataclasses.replace(self, **changed)
 

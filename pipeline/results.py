@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -76,7 +77,7 @@ class SpinEstimate:
         axis = self.axis
         if axis is None or self.covariance_rps2 is None:
             return None
-        return float(np.sqrt(max(axis @ self.covariance_rps2 @ axis, 0.0)))
+        return math.sqrt(max(float(axis @ self.covariance_rps2 @ axis), 0.0))
 
     @property
     def axis_std_deg(self) -> float | None:
@@ -84,8 +85,8 @@ class SpinEstimate:
         axis, magnitude = self.axis, self.magnitude_rps
         if axis is None or magnitude is None or self.covariance_rps2 is None:
             return None
-        across = np.trace(self.covariance_rps2) - axis @ self.covariance_rps2 @ axis
-        return min(float(np.degrees(np.sqrt(max(across, 0.0)) / magnitude)), 180.0)
+        across = float(np.trace(self.covariance_rps2) - axis @ self.covariance_rps2 @ axis)
+        return min(math.degrees(math.sqrt(max(across, 0.0)) / magnitude), 180.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,7 +16,9 @@ INPUTS = ("packet", "track", "logo", "rate")
 class FlowParameters(ParameterGroup):
     """How long a slice is, and what the matching accepts."""
 
-    t_acc_from: str = choice("rate", ("expected", "rate", "fixed"), "where t_acc = 1/(10 spin) takes the spin from")
+    t_acc_from: str = choice(
+        "rate", ("expected", "rate", "fixed"), "where t_acc = 1/(10 spin) takes the spin from"
+    )
     t_acc_us: int = tunable(2000, 100, 100_000, 100, "us", "length of a slice when t_acc_from = fixed")
     expected_spin_rps: float = tunable(50.0, 1.0, 500.0, 1.0, "rps", "median of the spins expected")
 

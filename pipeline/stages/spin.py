@@ -15,8 +15,12 @@ METHODS = ("triplet", "normal_flow")
 class SpinParameters(ParameterGroup):
     """What is asked for and what is trusted."""
 
-    max_spin_rps: float = tunable(150.0, 1.0, 1000.0, 5.0, "rps", "highest spin looked for; bounds the flow's speed")
-    triplet_solve: str = choice("paper", ("paper", "least_squares"), "triplet: the paper's mean, or full rank")
+    max_spin_rps: float = tunable(
+        150.0, 1.0, 1000.0, 5.0, "rps", "highest spin looked for; bounds the flow's speed"
+    )
+    triplet_solve: str = choice(
+        "paper", ("paper", "least_squares"), "triplet: the paper's mean, or full rank"
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

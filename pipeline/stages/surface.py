@@ -16,10 +16,18 @@ INPUTS = ("packet", "filter")
 class SurfaceParameters(ParameterGroup):
     """Which surface, and how it is cleaned."""
 
-    kind: str = choice("eros", ("eros", "accumulated", "linear"), "EROS, accumulated frame or linear time surface")
-    k_px: int = tunable(10, 1, 51, 1, "px", "EROS: width of the block that an event fades (forced odd, 10 -> 11)")
-    span_us: int = tunable(2000, 100, 100_000, 100, "us", "accumulated, linear: how far back in time it shows")
-    cleaning: str = choice("isolated", ("off", "isolated", "printed"), "removal of isolated pixels before the search")
+    kind: str = choice(
+        "eros", ("eros", "accumulated", "linear"), "EROS, accumulated frame or linear time surface"
+    )
+    k_px: int = tunable(
+        10, 1, 51, 1, "px", "EROS: width of the block that an event fades (forced odd, 10 -> 11)"
+    )
+    span_us: int = tunable(
+        2000, 100, 100_000, 100, "us", "accumulated, linear: how far back in time it shows"
+    )
+    cleaning: str = choice(
+        "isolated", ("off", "isolated", "printed"), "removal of isolated pixels before the search"
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

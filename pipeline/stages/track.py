@@ -19,7 +19,9 @@ Status = Literal["searching", "starting", "tracking", "coasting", "lost"]
 class TrackParameters(ParameterGroup):
     """The tick, the search for the circle, and the Kalman filter."""
 
-    ball: str = choice("flying", ("flying", "fixed"), "flying ball, or a ball spinner's ball that stays in place")
+    ball: str = choice(
+        "flying", ("flying", "fixed"), "flying ball, or a ball spinner's ball that stays in place"
+    )
     tick_us: int = tunable(5000, 200, 100_000, 100, "us", "time between two steps of the pipeline (200 Hz)")
     radius_min_px: float = tunable(5.0, 2.0, 500.0, 0.5, "px", "smallest radius looked for")
     radius_max_px: float = tunable(40.0, 3.0, 500.0, 0.5, "px", "largest radius looked for")

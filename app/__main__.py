@@ -1,0 +1,5 @@
+"""`python -m app` is `spinscope`."""
+
+from .cli import main
+
+main()

@@ -1,0 +1,191 @@
+"""The five biases of Prophesee's IMX636 (EVK4), what they mean in physical units, and `.bias` files.
+
+The biases are offsets from the factory setting (0). The maker publishes their direction and their range, not what
+they are in per cent, hertz or microseconds. `CURVES` is therefore a model: monotone, in one place, marked as not
+calibrated, to be replaced by one's own measurements (`physical(biases, curves=...)`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from .errors import ParameterError, RecordingError
+from .parameters import ParameterGroup, tunable
+
+
+@dataclass(frozen=True, kw_only=True)
+class BiasParameters(ParameterGroup):
+    """Bias offsets in `.bias` units; ranges are the maker's for the IMX636, defaults the paper's (supplement)."""
+
+    diff_on: int = tunable(40, -85, 140, 1, "", "contrast threshold of ON events; higher = fewer events")
+    diff_off: int = tunable(40, -35, 190, 1, "", "contrast threshold of OFF events; higher = fewer events")
+    fo: int = tunable(55, -35, 55, 1, "", "cut-off of the pixel's low-pass; higher = faster pixels")
+    hpf: int = tunable(0, 0, 120, 1, "", "cut-off of the pixel's high-pass; higher = slow motion vanishes")
+    refr: int = tunable(80, -20, 235, 1, "", "refractory period; higher = shorter dead time, more events")
+
+
+PAPER = BiasParameters()
+FACTORY = BiasParameters(diff_on=0, diff_off=0, fo=0, hpf=0, refr=0)
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A physical quantity against one bias: straight lines between points, in the logarithm of the quantity.
+
+    points : (bias value, quantity > 0), bias rising over the whole range, quantity monotone; one may be 0 at an end
+    source : where the points come from
+    calibrated : True when they were measured
+    """
+
+    bias: str
+    unit: str
+    points: tuple[tuple[float, float], ...]
+    source: str
+    calibrated: bool = False
+
+    def at(self, value: float) -> float:
+        """The quantity at a bias value; outside the points the nearest end."""
+        bias = np.array([point[0] for point in self.points])
+        quantity = np.array([point[1] for point in self.points])
+        if not np.all(quantity > 0):  # a quantity that can be switched off goes linearly
+            return float(np.interp(value, bias, quantity))
+        return float(np.exp(np.interp(value, bias, np.log(quantity))))
+
+
+_MODEL = "model, not calibrated: "
+
+CURVES: Mapping[str, Curve] = MappingProxyType(
+    {
+        "threshold_on": Curve(
+            "diff_on",
+            "log intensity",
+            ((-85, 0.10), (0, 0.19), (40, 0.27), (60, 0.33), (140, 0.62)),
+            _MODEL + "25 % nominal contrast (log 0.22) near the factory setting, the supplement's ball keeps its "
+            "outline and loses most of the logo at 140",
+        ),
+        "threshold_off": Curve(
+            "diff_off",
+            "log intensity",
+            ((-35, 0.14), (0, 0.19), (40, 0.27), (60, 0.34), (140, 0.85), (190, 1.35)),
+            _MODEL + "as threshold_on up to 60; steeper above, where the supplement sees ON and OFF part",
+        ),
+        "cutoff_hz": Curve(
+            "fo",
+            "Hz",
+            ((-35, 400.0), (-20, 1200.0), (0, 4000.0), (25, 6000.0), (55, 8000.0)),
+            _MODEL + "the supplement: only values below 0 change the event rate; at 55 a white pixel answers in some "
+            "20 us, at -35 late events of the edge lie all over the ball",
+        ),
+        "highpass_hz": Curve(
+            "hpf",
+            "Hz",
+            ((0, 0.0), (20, 5.0), (60, 40.0), (120, 300.0)),
+            _MODEL + "0 filters nothing that matters (supplement), above it slow motion fades first",
+        ),
+        "refractory_us": Curve(
+            "refr",
+            "us",
+            ((-20, 900.0), (0, 450.0), (80, 150.0), (120, 90.0), (235, 20.0)),
+            _MODEL + "the supplement: at 80 a pixel is free again when a 6,000 px/s edge has left it (170 us)",
+        ),
+        "noise_on_factor": Curve(
+            "diff_on",
+            "1",
+            ((-85, 300.0), (0, 6.0), (40, 1.0), (140, 0.15)),
+            _MODEL + "the supplement: noise falls steeply to an acceptable level at 40, little above",
+        ),
+        "noise_off_factor": Curve(
+            "diff_off",
+            "1",
+            ((-35, 40.0), (0, 6.0), (40, 1.0), (190, 0.1)),
+            _MODEL + "as noise_on_factor",
+        ),
+        "noise_bandwidth_factor": Curve(
+            "fo",
+            "1",
+            ((-35, 0.3), (0, 0.9), (55, 1.0)),
+            _MODEL + "a lower cut-off lets less noise through; flat above 0 (supplement)",
+        ),
+        "noise_highpass_factor": Curve(
+            "hpf", "1", ((0, 1.0), (60, 0.4), (120, 0.1)), _MODEL + "a high-pass takes slow noise and leak away"
+        ),
+        "noise_refractory_factor": Curve(
+            "refr",
+            "1",
+            ((-20, 0.6), (0, 0.75), (80, 1.0), (120, 1.6), (235, 6.0)),
+            _MODEL + "the supplement: noise keeps rising above 80, ON more than OFF",
+        ),
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class PixelPhysics:
+    """What the biases make of a pixel, in physical units; `noise_on` and `noise_off` are factors, 1 = paper's biases."""
+
+    threshold_on: float
+    threshold_off: float
+    cutoff_hz: float
+    highpass_hz: float
+    refractory_us: float
+    noise_on: float
+    noise_off: float
+
+
+def physical(biases: BiasParameters, curves: Mapping[str, Curve] = CURVES) -> PixelPhysics:
+    """The pixel that these biases make; `curves` may hold one's own measurements."""
+    value = {name: curve.at(getattr(biases, curve.bias)) for name, curve in curves.items()}
+    common = value["noise_bandwidth_factor"] * value["noise_highpass_factor"]
+    refractory = value["noise_refractory_factor"]
+    return PixelPhysics(
+        value["threshold_on"],
+        value["threshold_off"],
+        value["cutoff_hz"],
+        value["highpass_hz"],
+        value["refractory_us"],
+        value["noise_on_factor"] * common * refractory,
+        value["noise_off_factor"] * common * np.sqrt(refractory),
+    )
+
+
+def read_biases(path: Path | str) -> BiasParameters:
+    """Read a `.bias` file: one `value % bias_name` a line, empty lines allowed; a missing bias counts as 0.
+
+    Raises RecordingError when the file cannot be read or a line is of another form, ParameterError when a bias is
+    unknown or out of range.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise RecordingError(f"the bias file cannot be read ({error.__class__.__name__}): {path}") from error
+    values: dict[str, int] = dict.fromkeys(BiasParameters.tunables(), 0)
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not line.strip():
+            continue
+        left, percent, name = line.partition("%")
+        try:
+            value = int(left)
+        except ValueError:
+            value = None  # type: ignore[assignment]
+        if not percent or value is None:
+            raise RecordingError(f"line {number} is {line.strip()!r}, not `value % bias_name`: {path}")
+        field = name.strip().removeprefix("bias_")
+        if field not in values:
+            known = ", ".join(f"bias_{known}" for known in values)
+            raise ParameterError(f"{name.strip()} is unknown, there are {known}: {path}")
+        values[field] = value
+    return BiasParameters(**values)
+
+
+def write_biases(biases: BiasParameters, path: Path | str) -> None:
+    """Write a `.bias` file; raises RecordingError when that is impossible."""
+    lines = [f"{value} % bias_{name}\n" for name, value in biases.as_dict().items()]
+    try:
+        Path(path).write_text("".join(lines), encoding="utf-8")
+    except OSError as error:
+        raise RecordingError(f"the bias file cannot be written ({error.strerror}): {path}") from error

@@ -1,0 +1,68 @@
+"""How large the sensor is: what the command line says beats what the file says, which beats a guess."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from ..errors import RecordingError
+
+# Resolutions of event cameras, smallest first: ATIS, DAVIS346, GenX320, Gen3/DVXplorer, Gen4/IMX636, CeleX-V,
+# Samsung Gen4.
+KNOWN_SENSORS = ((304, 240), (346, 260), (320, 320), (640, 480), (1280, 720), (1280, 800), (1280, 960))
+# Old Prophesee RAW files state no size but the number of their camera system.
+SENSOR_OF_SYSTEM_ID = {21: (640, 480), 48: (1280, 720), 49: (1280, 720)}
+MAX_SIZE_PX = 65535
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """Size of the sensor and who says so: "command line", "file", "system_ID 49" or "guess"."""
+
+    width_px: int
+    height_px: int
+    source: str
+
+    def holds(self, columns_px: int, rows_px: int) -> bool:
+        """Whether pixels of that many columns and rows all lie on this sensor."""
+        return columns_px <= self.width_px and rows_px <= self.height_px
+
+
+def stated_sensor(width: object, height: object, source: str) -> Sensor:
+    """The sensor from two values found in a file or given by the user; raises RecordingError for nonsense."""
+    try:
+        size = int(width), int(height)  # type: ignore[call-overload]
+    except (TypeError, ValueError, OverflowError):
+        size = (0, 0)
+    if not (0 < size[0] <= MAX_SIZE_PX and 0 < size[1] <= MAX_SIZE_PX):
+        raise RecordingError(
+            f"sensor size {width} x {height} from the {source} is not 1 to {MAX_SIZE_PX} pixels each way: "
+            "state it with --sensor WxH, like --sensor 1280x720"
+        )
+    return Sensor(*size, source)
+
+
+def sensor_of_text(text: str, source: str) -> Sensor:
+    """The sensor from text like "1280x720"; raises RecordingError for anything else."""
+    match = re.fullmatch(r"\s*(\d{1,9})\s*[xX,]\s*(\d{1,9})\s*", text)
+    if match is None:
+        raise RecordingError(f"sensor size {text[:40]!r} from the {source} is not of the form 1280x720")
+    return stated_sensor(match[1], match[2], source)
+
+
+def smallest_known(columns_px: int, rows_px: int) -> tuple[int, int] | None:
+    """The smallest known sensor with at least these columns and rows, None if there is none."""
+    fitting = [s for s in KNOWN_SENSORS if columns_px <= s[0] and rows_px <= s[1]]
+    return min(fitting, key=lambda s: s[0] * s[1]) if fitting else None
+
+
+def guessed_sensor(columns_px: int, rows_px: int) -> Sensor:
+    """The smallest known sensor that holds pixels of so many columns and rows; raises RecordingError without one."""
+    size = smallest_known(columns_px, rows_px)
+    if size is None:
+        largest = KNOWN_SENSORS[-1]
+        raise RecordingError(
+            f"the events reach over {columns_px} x {rows_px} pixels, more than the largest known sensor "
+            f"({largest[0]} x {largest[1]}): state it with --sensor WxH"
+        )
+    return Sensor(*size, "guess")

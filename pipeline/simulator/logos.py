@@ -1,0 +1,187 @@
+"""Logos: ink painted on the ball, drawn in millimetres on its surface.
+
+A logo is drawn in a plane that touches the ball at the logo's centre: the point at (a, b) mm lies at the surface
+distance hypot(a, b) from the centre (azimuthal equidistant, so strokes keep their width). In the ball's own frame
+the centre is +z, a runs along +x and b along +y. For the kernels it is resampled onto the Lambert azimuthal
+equal-area map (u, w) = (x, y) sqrt(2 / (1 + z)), which needs no arc cosine.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ParameterError
+
+Floats = NDArray[np.float64]
+Drawing = Callable[[Floats, Floats], Floats]  # (a, b) in mm -> distance to the ink in mm, negative inside
+
+TEXEL_MM = 0.06  # a tenth of the thinnest stroke (0.6 mm)
+RADIUS_MM = 20.0  # logos are drawn for the 40 mm ball
+
+
+@dataclass(frozen=True)
+class Logo:
+    """What is printed on a ball.
+
+    name : one of `NAMES`, or "png" with the file's bytes in base64 and its width on the ball
+    """
+
+    name: str = "andro"
+    png_base64: str = ""
+    width_mm: float = 26.0
+
+    def __post_init__(self) -> None:
+        if self.name not in (*NAMES, "png"):
+            raise ParameterError(f"logo {self.name!r} is unknown: there are {', '.join(NAMES)}, or a PNG file")
+        if not 1.0 <= self.width_mm <= 60.0:
+            raise ParameterError(f"logo width {self.width_mm:g} mm is out of range: 1 to 60 mm")
+
+    @classmethod
+    def of(cls, name_or_png: str) -> Logo:
+        """A logo by name or from a PNG file (dark = ink, transparent = none); raises ParameterError."""
+        if not name_or_png.lower().endswith(".png"):
+            return cls(name_or_png)
+        try:
+            content = Path(name_or_png).read_bytes()
+        except OSError as error:
+            raise ParameterError(f"the logo cannot be read ({error.strerror}): {name_or_png}") from error
+        logo = cls("png", base64.b64encode(content).decode("ascii"))
+        _png_ink(logo.png_base64)
+        return logo
+
+
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """Ink on the Lambert map.
+
+    ink : (n, n) float32, 0 = ball, 1 = ink; row = w, column = u
+    half_extent : the map's half side in (u, w)
+    cap_rad : no ink farther than this from the logo's centre
+    """
+
+    ink: NDArray[np.float32]
+    half_extent: float
+    cap_rad: float
+
+
+@lru_cache(maxsize=8)
+def texture(logo: Logo, blur_mm: float = 0.0) -> Texture:
+    """The logo's texture, softened by a Gaussian of this sigma (the part of the optical blur that is isotropic)."""
+    drawing, reach_mm = _drawing(logo)
+    cap_rad = min((reach_mm + 3 * blur_mm + 2 * TEXEL_MM) / RADIUS_MM, np.pi * 0.99)
+    half_extent = 2 * np.sin(cap_rad / 2)
+    size = int(np.ceil(2 * half_extent * RADIUS_MM / TEXEL_MM)) + 1
+    axis = np.linspace(-half_extent, half_extent, size)
+    u, w = np.meshgrid(axis, axis)
+    rho = np.hypot(u, w)
+    angle = 2 * np.arcsin(np.minimum(rho / 2, 1.0))
+    stretch = np.divide(angle * RADIUS_MM, rho, out=np.full_like(rho, RADIUS_MM), where=rho > 0)
+    ink = np.clip(0.5 - drawing(u * stretch, w * stretch) / TEXEL_MM, 0.0, 1.0)
+    if blur_mm > 0:
+        from scipy.ndimage import gaussian_filter  # a quarter of a second to load, needed here only
+
+        ink = gaussian_filter(ink, blur_mm / TEXEL_MM, mode="constant")
+    ink[angle > cap_rad] = 0.0
+    return Texture(np.ascontiguousarray(ink, np.float32), float(half_extent), float(cap_rad))
+
+
+def _stroke(a: Floats, b: Floats, start: tuple[float, float], end: tuple[float, float]) -> Floats:
+    """Distance to a straight stroke's middle line."""
+    along_a, along_b = end[0] - start[0], end[1] - start[1]
+    share = ((a - start[0]) * along_a + (b - start[1]) * along_b) / (along_a**2 + along_b**2)
+    share = np.clip(share, 0.0, 1.0)
+    return np.hypot(a - start[0] - share * along_a, b - start[1] - share * along_b)
+
+
+def _ring(a: Floats, b: Floats, centre: tuple[float, float], half: tuple[float, float]) -> Floats:
+    """Distance to an ellipse's line, to first order."""
+    x, y = (a - centre[0]) / half[0], (b - centre[1]) / half[1]
+    radius = np.maximum(np.hypot(x, y), 1e-9)
+    slope = np.hypot(x / half[0], y / half[1]) / radius
+    return np.abs(radius - 1) / np.maximum(slope, 1e-9)
+
+
+def _wordmark(a: Floats, b: Floats) -> Floats:
+    """A word of five bold letters (A N D R O), 26 mm long and 7 mm high, strokes of 1.4 mm."""
+    top, base, half = -2.8, 2.8, 0.7  # b runs down on the page, so that the word reads from the outside
+    lines: list[Floats] = []
+    for start, end in (
+        ((-12.3, base), (-10.2, top)),  # A
+        ((-10.2, top), (-8.1, base)),
+        ((-11.4, 1.0), (-9.0, 1.0)),
+        ((-6.6, base), (-6.6, top)),  # N
+        ((-6.6, top), (-2.8, base)),
+        ((-2.8, base), (-2.8, top)),
+        ((-1.0, base), (-1.0, top)),  # D
+        ((3.6, base), (3.6, top)),  # R
+        ((5.0, 0.4), (6.8, base)),
+    ):
+        lines.append(_stroke(a, b, start, end))
+    bow = _ring(a, b, (-1.0, 0.0), (3.3, 2.8))
+    lines.append(np.where(a >= -1.0, bow, np.inf))
+    bow = _ring(a, b, (3.6, -1.2), (2.9, 1.6))
+    lines.append(np.where(a >= 3.6, bow, np.inf))
+    lines.append(_ring(a, b, (10.2, 0.0), (2.2, 2.8)))  # O
+    nearest = lines[0]
+    for line in lines[1:]:
+        nearest = np.minimum(nearest, line)
+    return nearest - half
+
+
+def _line(width_mm: float) -> Drawing:
+    return lambda a, b: _stroke(a, b, (-13.0, 0.0), (13.0, 0.0)) - width_mm / 2
+
+
+def _double_circle(a: Floats, b: Floats) -> Floats:
+    """Two thin circles, lines of 0.6 mm (the paper's logo 2: too thin to see in flight)."""
+    radius = np.hypot(a, b)
+    return np.minimum(np.abs(radius - 8.0), np.abs(radius - 6.0)) - 0.3
+
+
+_DRAWINGS: dict[str, tuple[Drawing, float]] = {
+    "andro": (_wordmark, 14.0),
+    "double_circle": (_double_circle, 8.3),
+    "line_0.8mm": (_line(0.8), 13.4),
+    "line_1.4mm": (_line(1.4), 13.7),
+    "none": (lambda a, b: np.full_like(a, np.inf), 1.0),
+}
+NAMES = tuple(_DRAWINGS)
+
+
+def _drawing(logo: Logo) -> tuple[Drawing, float]:
+    if logo.name != "png":
+        return _DRAWINGS[logo.name]
+    ink = _png_ink(logo.png_base64)
+    height, width = ink.shape
+    pitch = logo.width_mm / width
+
+    def sampled(a: Floats, b: Floats) -> Floats:
+        column, row = a / pitch + (width - 1) / 2, b / pitch + (height - 1) / 2
+        inside = (column >= 0) & (column <= width - 1) & (row >= 0) & (row <= height - 1)
+        nearest = ink[np.clip(np.rint(row), 0, height - 1).astype(int), np.clip(np.rint(column), 0, width - 1).astype(int)]
+        return (0.5 - np.where(inside, nearest, 0.0)) * TEXEL_MM
+
+    return sampled, 0.5 * pitch * float(np.hypot(width, height))
+
+
+def _png_ink(png_base64: str) -> Floats:
+    """(h, w) float64, 0 = blank, 1 = ink; raises ParameterError when it is no PNG."""
+    import cv2  # only for pictures of one's own; 60 ms to load
+
+    content = np.frombuffer(base64.b64decode(png_base64), np.uint8)
+    image = cv2.imdecode(content, cv2.IMREAD_UNCHANGED) if content.size else None
+    if image is None:
+        raise ParameterError("the logo is no PNG picture that can be read")
+    picture = image.astype(np.float64) / float(np.iinfo(image.dtype).max)
+    if picture.ndim == 2:
+        return 1.0 - picture
+    dark = 1.0 - picture[..., :3].mean(axis=2)
+    ink: Floats = dark * picture[..., 3] if picture.shape[2] == 4 else dark
+    return ink

@@ -1,0 +1,139 @@
+"""`analyze` against the contract's schema and the simulator's truth, through the real command line."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import h5py
+import jsonschema
+import numpy as np
+import pytest
+
+SCHEMA = json.loads((Path(__file__).parent / "analyze.schema.json").read_text(encoding="utf-8"))
+FLIGHTS = ("flight_slow_top", "flight_back", "flight_fast_top", "flight_side", "flight_mixed", "flight_two_balls")
+
+
+def spinscope(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "app", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+
+
+@pytest.fixture(scope="module")
+def reports(samples: Path) -> dict[str, dict[str, Any]]:
+    done = spinscope("analyze", *(samples / f"{name}.h5" for name in FLIGHTS), "--json", "-")
+    assert done.returncode == 0, done.stderr
+    return dict(zip(FLIGHTS, map(json.loads, done.stdout.splitlines()), strict=True))
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_reports_keep_the_schema(reports: dict[str, dict[str, Any]], name: str) -> None:
+    jsonschema.validate(reports[name], SCHEMA)
+    for shot in reports[name]["shots"]:
+        lengths = {key: len(column) for key, column in shot["track"].items()}
+        assert len(set(lengths.values())) == 1, lengths
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_track_and_speed_are_the_truths(reports: dict[str, dict[str, Any]], samples: Path, name: str) -> None:
+    """The accuracy that the README promises: centre 0.3 px, radius 0.5 px, while the whole ball is in view."""
+    with h5py.File(samples / f"{name}.h5") as file:
+        t, x, y, r = (file[f"truth/{key}"][:] for key in ("t_us", "x_px", "y_px", "radius_px"))
+        velocity = file["truth/velocity_m_s"][:]
+    assert len(reports[name]["shots"]) == 1
+    shot = reports[name]["shots"][0]
+    track = {key: np.array(column) for key, column in shot["track"].items()}
+    true_x, true_y, true_r = (np.interp(track["t_us"], t, column) for column in (x, y, r))
+    whole = (true_x > true_r) & (true_x < 1279 - true_r) & (true_y > true_r) & (true_y < 719 - true_r)
+    error = np.hypot(track["x_px"] - true_x, track["y_px"] - true_y)[whole]
+    assert error.mean() <= 0.3
+    assert np.abs(track["radius_px"] - true_r)[whole].mean() <= 0.5
+    assert shot["speed_m_s"] == pytest.approx(np.linalg.norm(velocity, axis=1).mean(), rel=0.05)
+
+
+def test_a_trusted_answer_is_right_and_a_hidden_logo_is_refused(
+    reports: dict[str, dict[str, Any]], samples: Path
+) -> None:
+    for name, report in reports.items():
+        shot = report["shots"][0]
+        if name == "flight_side":
+            assert shot["best"] is None, "no logo event in the whole recording"
+        if shot["best"]:
+            with h5py.File(samples / f"{name}.h5") as file:
+                truth = file["truth/spin_rps"][0]
+            answer = np.array(shot["spin"][shot["best"]]["vector_rps"])
+            cosine = answer @ truth / np.linalg.norm(answer) / np.linalg.norm(truth)
+            assert np.degrees(np.arccos(cosine)) < 20
+            assert np.linalg.norm(answer) == pytest.approx(np.linalg.norm(truth), abs=10)
+
+
+def test_a_window_uses_its_events_only(samples: Path) -> None:
+    done = spinscope("analyze", samples / "spinner_ball2_side.h5", "--fixed-ball", 528.43, 426.87, 16.49,
+                     "--window", 20_000, 30_000, "--json", "-")  # fmt: skip
+    report = json.loads(done.stdout)
+    assert report["recording"]["duration_us"] == 10_000
+    shot = report["shots"][0]
+    assert (shot["start_us"], shot["end_us"]) == (20_000, 30_000)
+    assert shot["speed_m_s"] == 0
+
+
+def test_one_method_only(samples: Path) -> None:
+    done = spinscope("analyze", samples / "spinner_ball2_side.h5", "--fixed-ball", "auto", "--method", "triplet",
+                     "--json", "-")  # fmt: skip
+    report = json.loads(done.stdout)
+    assert list(report["shots"][0]["spin"]) == ["triplet"]
+    assert any("fixed ball found" in warning for warning in report["warnings"])
+
+
+def test_of_several_recordings_a_bad_one_is_named_and_the_rest_goes_on(samples: Path, tmp_path: Path) -> None:
+    bad = tmp_path / "bad.h5"
+    bad.write_bytes(b"")
+    done = spinscope("analyze", bad, samples / "flight_side.h5", "--json", "-")
+    lines = [json.loads(line) for line in done.stdout.splitlines()]
+    assert done.returncode == 2
+    assert set(lines[0]) == {"schema", "recording", "error"}
+    assert lines[1]["shots"]
+
+
+def test_no_ball_is_an_answer_not_an_error(samples: Path) -> None:
+    done = spinscope("analyze", samples / "spinner_ball5_back_no_logo.h5", "--json", "-")
+    report = json.loads(done.stdout)
+    assert done.returncode == 0
+    assert report["shots"] == []
+    assert report["no_shot_reason"]
+    jsonschema.validate(report, SCHEMA)
+
+
+def test_the_table_for_people_names_units_and_methods(samples: Path) -> None:
+    done = spinscope("analyze", samples / "flight_slow_top.h5")
+    assert done.returncode == 0
+    for word in ("rps", "m/s", "triplet", "normal_flow", "deg"):
+        assert word in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["missing.h5"], "missing.h5"),
+        (["{samples}"], "directory"),
+        (["{samples}/flight_back.h5", "--set", "logo.pad_px=-1"], "0 to 100 px"),
+        (["{samples}/flight_back.h5", "--set", "logo.padding=1"], "did you mean pad_px"),
+        (["{samples}/flight_back.h5", "--preset", "best"], "default, paper"),
+        (["{samples}/flight_back.h5", "--window", 5, 5], "START_US must be below END_US"),
+        (["{samples}/flight_back.h5", "--fixed-ball", "here"], "auto"),
+        (["{samples}/flight_back.h5", "--sensor", "big"], "WIDTHxHEIGHT"),
+        (["{samples}/flight_back.h5", "--sensor", "640x480"], "640"),
+        (["{samples}/flight_back.h5", "--method", "magic"], "triplet"),
+        ([], "--help"),
+        (["{samples}/README.md"], "README.md"),
+    ],
+)
+def test_wrong_input_is_one_clear_line_and_status_2(samples: Path, arguments: list[object], says: str) -> None:
+    done = spinscope("analyze", *(str(argument).replace("{samples}", str(samples)) for argument in arguments))
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert says in done.stderr
+    assert done.stdout == ""
