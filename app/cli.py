@@ -120,7 +120,7 @@ def info(recording: Path, sensor: tuple[int, int] | None, output: IO[str] | None
     with ProgressBar() as bar:
         found = information(recording, sensor, bar)
     if output:
-        output.write(json.dumps(found, allow_nan=False) + "\n")
+        output.write(json.dumps(found.as_dict(), allow_nan=False) + "\n")
     else:
         print_information(found)
 

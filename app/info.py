@@ -3,24 +3,45 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
+from pipeline.recordings import RecordingInfo, open_recording, summary
+
 from .session import Progress
 
 
-def information(path: Path, sensor_px: tuple[int, int] | None, on_progress: Progress) -> dict[str, Any]:
+def information(path: Path, sensor_px: tuple[int, int] | None, on_progress: Progress) -> RecordingInfo:
     """One pass over the recording; raises RecordingError."""
-    from pipeline.recordings import open_recording, summary
-
-    recording = open_recording(path, sensor=sensor_px)
-    found = summary(recording, on_progress=lambda share: on_progress(share, "reading"))
-    raise NotImplementedError(found)
+    recording = open_recording(path, sensor=sensor_px, on_progress=lambda share: on_progress(share, "reading"))
+    return summary(recording, on_progress=lambda share: on_progress(share, "reading"))
 
 
-def print_information(found: dict[str, Any]) -> None:
-    """A table of what `information` found."""
-    table = Table(show_header=False, box=None)
-    Console().print(table)
+def print_information(info: RecordingInfo) -> None:
+    """A table of what was found, with units."""
+    damage = ", ".join(f"{count:,} {name.replace('_', ' ')}" for name, count in info.damage.items() if count)
+    rows = {
+        "format": info.format,
+        "sensor": f"{info.width_px} x {info.height_px} px (from: {info.sensor_from})",
+        "events": f"{info.events:,}",
+        "time": "no events" if info.first_us is None else f"{info.first_us:,} to {info.last_us:,} us",
+        "duration": f"{info.duration_us / 1e6:.6f} s",
+        "ON share": "" if info.on_share is None else f"{100 * info.on_share:.1f} %",
+        "event rate": "" if info.mean_rate_hz is None else f"{info.mean_rate_hz / 1e6:.3f} Mev/s on average",
+        "peak rate": "" if info.peak_rate_hz is None else f"{info.peak_rate_hz / 1e6:.3f} Mev/s in the fullest millisecond",
+        "hot pixels": f"{info.hot_pixels:,} with {100 * info.hot_share:.1f} % of the events",
+        "triggers": f"{info.triggers:,}",
+        "t_offset": "" if info.t_offset_us is None else f"{info.t_offset_us:,} us (not added)",
+        "damage": damage or "none",
+        **{f"attribute {name}": str(value) for name, value in info.attributes.items()},
+    }  # fmt: skip
+    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    for name, value in rows.items():
+        if value:
+            table.add_row(name, value)
+    console = Console()
+    console.print(str(info.path), highlight=False, soft_wrap=True)
+    console.print(table)
+    for warning in info.warnings:
+        console.print(f"warning: {warning}", style="yellow", highlight=False, soft_wrap=True)

@@ -1,4 +1,4 @@
-"""Columns of numbers found in HDF5 and NPZ files: their names, and from whatever types they have to events."""
+"""Columns of numbers in HDF5 and NPZ files: their names, and from whatever types they have to events."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ NAMES = {
 }
 EXPANSION_LIMIT = 500  # events pack 3 to 50 times; only constant columns come near deflate's 1032
 EXPANSION_FREE_BYTES = 1 << 28
+LAST_US = 1 << 62  # leaves room to add and subtract
 
 
 def named_columns(present: Iterable[str]) -> dict[str, str] | None:
@@ -43,8 +44,8 @@ def refuse_bomb(packed_bytes: int, unpacked_bytes: int, path: Path) -> None:
 class ColumnTypes:
     """Turns blocks of the four columns of one file into `Columns`.
 
-    Whole-number times are microseconds. Floating times are seconds if any of the first block has a fraction, and
-    microseconds otherwise; `warning` says which was assumed.
+    Whole-number times are microseconds. Floating times are seconds if any of the first ones has a fraction,
+    and microseconds otherwise; `warning` says which was assumed.
     """
 
     def __init__(self, path: Path, t_type: np.dtype[Any], first_times: NDArray[Any]) -> None:
@@ -58,13 +59,13 @@ class ColumnTypes:
             self.warning = f"times are floating-point numbers without a unit: taken as {unit}"
 
     def columns(
-        self, t: NDArray[Any], x: NDArray[Any], y: NDArray[Any], p: NDArray[Any], first_row: int
+        self, first_row: int, t: NDArray[Any], x: NDArray[Any], y: NDArray[Any], p: NDArray[Any]
     ) -> Columns:
         """One block; raises RecordingError naming the first event that cannot be one."""
         if not (t.size == x.size == y.size == p.size):
             raise RecordingError(
-                f"columns end early (t {t.size}, x {x.size}, y {y.size}, p {p.size} values from event {first_row}): "
-                f"export the recording again: {self.path}"
+                f"columns end early (t {t.size}, x {x.size}, y {y.size}, p {p.size} values from event "
+                f"{first_row}): export the recording again: {self.path}"
             )
         return Columns(
             self._times(t, first_row),
@@ -76,16 +77,20 @@ class ColumnTypes:
     def _times(self, t: NDArray[Any], first_row: int) -> NDArray[np.int64]:
         if t.dtype.kind == "f":
             t = t.astype(np.float64) * (1e6 if self._seconds else 1.0)
-            self._refuse(~(np.abs(t) < 2.0**62), "t", t, first_row, "is no time")  # NaN too
+            self._refuse(~(np.abs(t) < LAST_US), "t", t, first_row, "is no time")  # NaN too
             return np.rint(t).astype(np.int64)
-        if t.dtype.kind == "u" and t.dtype.itemsize == 8:
-            self._refuse(t >= 2**62, "t", t, first_row, "is no time in microseconds")
+        if t.dtype.itemsize == 8 and t.size and (int(t.min()) <= -LAST_US or int(t.max()) >= LAST_US):
+            self._refuse((t <= -LAST_US) | (t >= LAST_US), "t", t, first_row, "is no time in microseconds")
         return t.astype(np.int64, copy=False)
 
     def _pixels(self, name: str, column: NDArray[Any], first_row: int) -> NDArray[Any]:
         if column.dtype.kind == "f":
             self._refuse(
-                ~(np.abs(column) < 2**31) | (column != np.floor(column)), name, column, first_row, "is no whole pixel"
+                ~(np.abs(column) < 2**31) | (column != np.floor(column)),
+                name,
+                column,
+                first_row,
+                "is no whole pixel",
             )
             column = column.astype(np.int64)
         if column.dtype.kind == "i" and column.size and column.min() < 0:
@@ -95,14 +100,16 @@ class ColumnTypes:
     def _polarity(self, p: NDArray[Any], first_row: int) -> NDArray[np.bool_]:
         if p.dtype.kind == "b":
             return p.astype(np.bool_, copy=False)
-        on = p == 1
+        on: NDArray[np.bool_] = p == 1
         self._refuse(~(on | (p == 0) | (p == -1)), "p", p, first_row, "is none of 1 (ON), 0 and -1 (OFF)")
         return on
 
     def _refuse(self, wrong: NDArray[np.bool_], name: str, column: NDArray[Any], row: int, why: str) -> None:
         if wrong.any():
             at = int(np.argmax(wrong))
-            raise RecordingError(f"{name} = {column[at]} at event {row + at} {why}: repair the column: {self.path}")
+            raise RecordingError(
+                f"{name} = {column[at]} at event {row + at} {why}: repair the column: {self.path}"
+            )
 
 
 def refuse_types(path: Path, types: dict[str, np.dtype[Any]]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
 from ..errors import RecordingError
@@ -42,12 +41,19 @@ def stated_sensor(width: object, height: object, source: str) -> Sensor:
     return Sensor(*size, source)
 
 
-def sensor_of_text(text: str, source: str) -> Sensor:
-    """The sensor from text like "1280x720"; raises RecordingError for anything else."""
-    match = re.fullmatch(r"\s*(\d{1,9})\s*[xX,]\s*(\d{1,9})\s*", text)
-    if match is None:
-        raise RecordingError(f"sensor size {text[:40]!r} from the {source} is not of the form 1280x720")
-    return stated_sensor(match[1], match[2], source)
+def stated_or_none(width: object, height: object, warnings: list[str]) -> Sensor | None:
+    """What a file states, or None and a warning where it states nonsense."""
+    try:
+        return stated_sensor(width, height, "file")
+    except RecordingError:
+        warnings.append(f"the file's sensor size {width!s:.20} x {height!s:.20} px makes no sense: ignored")
+        return None
+
+
+def geometry_or_none(text: str, warnings: list[str]) -> Sensor | None:
+    """The same for a text like "1280x720"."""
+    width, _, height = text.partition("x")
+    return stated_or_none(width, height, warnings)
 
 
 def smallest_known(columns_px: int, rows_px: int) -> tuple[int, int] | None:
@@ -57,7 +63,7 @@ def smallest_known(columns_px: int, rows_px: int) -> tuple[int, int] | None:
 
 
 def guessed_sensor(columns_px: int, rows_px: int) -> Sensor:
-    """The smallest known sensor that holds pixels of so many columns and rows; raises RecordingError without one."""
+    """The smallest known sensor of at least so many columns and rows; raises RecordingError without one."""
     size = smallest_known(columns_px, rows_px)
     if size is None:
         largest = KNOWN_SENSORS[-1]

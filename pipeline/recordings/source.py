@@ -24,7 +24,16 @@ MAX_DISORDER_US = 10_000  # events up to this far behind an earlier one are put 
 
 # Whatever the libraries below throw at damaged files; none of it may reach the user as a traceback.
 FILE_ERRORS = (
-    *(OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError, NotImplementedError),
+    *(
+        OSError,
+        RuntimeError,
+        KeyError,
+        ValueError,
+        TypeError,
+        MemoryError,
+        OverflowError,
+        NotImplementedError,
+    ),
     *(AttributeError, IndexError, EOFError, SystemError, zlib.error, zipfile.BadZipFile),
 )
 
@@ -35,7 +44,7 @@ class Damage:
 
     bad_words : RAW words of no known type (skipped)
     backward_steps : events earlier than the event before them in the file
-    late_events : of these, events of RAW files more than 10 ms behind (dropped; other formats refuse the file)
+    late_events : of these, events of RAW files more than 10 ms behind (dropped; other files are refused)
     time_jumps : RAW time words that the next one contradicts (ignored)
     untimed_events : RAW events before the first time or row, or under an unconfirmed time (dropped)
     outside_events : events outside the sensor (dropped)
@@ -91,7 +100,7 @@ class Triggers:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Columns:
-    """Events as a reader found them: (n,) each, t_us int64 in file order, x and y of any integer type, on bool."""
+    """Events as a reader found them: (n,) each; t_us int64 in file order, x and y any integers, on bool."""
 
     t_us: NDArray[np.int64]
     x: NDArray[Any]
@@ -137,7 +146,7 @@ class Pass:
 class Source(Protocol):
     """A reader of one format.
 
-    order_is_law : whether events far behind their time make the file unreadable (columns) or are dropped (RAW)
+    order_is_law : whether events far behind others make the file unreadable (columns) or are dropped (RAW)
     events : number of events when the file tells without a pass
     """
 
@@ -151,7 +160,7 @@ class Source(Protocol):
     events: int | None
 
     def columns(self, reading: Pass) -> Iterator[Columns]:
-        """The events in file order, at most reading.max_events at once; counts damage and triggers on the way."""
+        """The events in file order in parts that are never empty; counts damage and triggers on the way."""
 
     def extent_px(self, on_progress: Progress | None) -> tuple[int, int]:
         """One more than the largest x and y of all events, (0, 0) without events."""

@@ -2,7 +2,7 @@
 
 A logo is drawn in a plane that touches the ball at the logo's centre: the point at (a, b) mm lies at the surface
 distance hypot(a, b) from the centre (azimuthal equidistant, so strokes keep their width). In the ball's own frame
-the centre is +z, a runs along +x and b along +y. For the kernels it is resampled onto the Lambert azimuthal
+the centre is +z, a runs along +x and b along +y (seen from outside: a to the right, b upwards). For the kernels it is resampled onto the Lambert azimuthal
 equal-area map (u, w) = (x, y) sqrt(2 / (1 + z)), which needs no arc cosine.
 """
 
@@ -35,7 +35,7 @@ class Logo:
 
     name: str = "andro"
     png_base64: str = ""
-    width_mm: float = 26.0
+    width_mm: float = 24.0
 
     def __post_init__(self) -> None:
         if self.name not in (*NAMES, "png"):
@@ -64,11 +64,14 @@ class Texture:
     ink : (n, n) float32, 0 = ball, 1 = ink; row = w, column = u
     half_extent : the map's half side in (u, w)
     cap_rad : no ink farther than this from the logo's centre
+    ink_u, ink_w : no ink beyond these in |u| and |w|
     """
 
     ink: NDArray[np.float32]
     half_extent: float
     cap_rad: float
+    ink_u: float
+    ink_w: float
 
 
 @lru_cache(maxsize=8)
@@ -89,7 +92,14 @@ def texture(logo: Logo, blur_mm: float = 0.0) -> Texture:
 
         ink = gaussian_filter(ink, blur_mm / TEXEL_MM, mode="constant")
     ink[angle > cap_rad] = 0.0
-    return Texture(np.ascontiguousarray(ink, np.float32), float(half_extent), float(cap_rad))
+    inked = ink > 1e-4
+    return Texture(
+        np.ascontiguousarray(ink, np.float32),
+        float(half_extent),
+        float(cap_rad),
+        float(np.max(np.abs(u), where=inked, initial=0.0)),
+        float(np.max(np.abs(w), where=inked, initial=0.0)),
+    )
 
 
 def _stroke(a: Floats, b: Floats, start: tuple[float, float], end: tuple[float, float]) -> Floats:
@@ -109,26 +119,24 @@ def _ring(a: Floats, b: Floats, centre: tuple[float, float], half: tuple[float, 
 
 
 def _wordmark(a: Floats, b: Floats) -> Floats:
-    """A word of five bold letters (A N D R O), 26 mm long and 7 mm high, strokes of 1.4 mm."""
-    top, base, half = -2.8, 2.8, 0.7  # b runs down on the page, so that the word reads from the outside
+    """A word of five bold letters (A N D R O), 24 mm long and 6.2 mm high, strokes of 1.4 mm."""
+    top, base, half = 2.4, -2.4, 0.7
     lines: list[Floats] = []
     for start, end in (
-        ((-12.3, base), (-10.2, top)),  # A
-        ((-10.2, top), (-8.1, base)),
-        ((-11.4, 1.0), (-9.0, 1.0)),
-        ((-6.6, base), (-6.6, top)),  # N
-        ((-6.6, top), (-2.8, base)),
-        ((-2.8, base), (-2.8, top)),
-        ((-1.0, base), (-1.0, top)),  # D
-        ((3.6, base), (3.6, top)),  # R
-        ((5.0, 0.4), (6.8, base)),
+        ((-11.3, base), (-9.5, top)),  # A
+        ((-9.5, top), (-7.7, base)),
+        ((-10.5, -1.0), (-8.5, -1.0)),
+        ((-5.6, base), (-5.6, top)),  # N
+        ((-5.6, top), (-2.6, base)),
+        ((-2.6, base), (-2.6, top)),
+        ((-0.4, base), (-0.4, top)),  # D
+        ((4.4, base), (4.4, top)),  # R
+        ((5.5, -0.2), (6.7, base)),
     ):
         lines.append(_stroke(a, b, start, end))
-    bow = _ring(a, b, (-1.0, 0.0), (3.3, 2.8))
-    lines.append(np.where(a >= -1.0, bow, np.inf))
-    bow = _ring(a, b, (3.6, -1.2), (2.9, 1.6))
-    lines.append(np.where(a >= 3.6, bow, np.inf))
-    lines.append(_ring(a, b, (10.2, 0.0), (2.2, 2.8)))  # O
+    lines.append(np.where(a >= -0.4, _ring(a, b, (-0.4, 0.0), (2.7, 2.4)), np.inf))
+    lines.append(np.where(a >= 4.4, _ring(a, b, (4.4, 1.1), (2.1, 1.3)), np.inf))
+    lines.append(_ring(a, b, (9.9, 0.0), (1.7, 2.4)))  # O
     nearest = lines[0]
     for line in lines[1:]:
         nearest = np.minimum(nearest, line)
@@ -146,7 +154,7 @@ def _double_circle(a: Floats, b: Floats) -> Floats:
 
 
 _DRAWINGS: dict[str, tuple[Drawing, float]] = {
-    "andro": (_wordmark, 14.0),
+    "andro": (_wordmark, 12.6),
     "double_circle": (_double_circle, 8.3),
     "line_0.8mm": (_line(0.8), 13.4),
     "line_1.4mm": (_line(1.4), 13.7),
@@ -163,9 +171,11 @@ def _drawing(logo: Logo) -> tuple[Drawing, float]:
     pitch = logo.width_mm / width
 
     def sampled(a: Floats, b: Floats) -> Floats:
-        column, row = a / pitch + (width - 1) / 2, b / pitch + (height - 1) / 2
+        column, row = a / pitch + (width - 1) / 2, (height - 1) / 2 - b / pitch
         inside = (column >= 0) & (column <= width - 1) & (row >= 0) & (row <= height - 1)
-        nearest = ink[np.clip(np.rint(row), 0, height - 1).astype(int), np.clip(np.rint(column), 0, width - 1).astype(int)]
+        row = np.clip(np.rint(row), 0, height - 1).astype(np.intp)
+        column = np.clip(np.rint(column), 0, width - 1).astype(np.intp)
+        nearest = ink[row, column]
         return (0.5 - np.where(inside, nearest, 0.0)) * TEXEL_MM
 
     return sampled, 0.5 * pitch * float(np.hypot(width, height))

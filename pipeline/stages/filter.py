@@ -4,10 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Setting
 from ..events import EventBatch
+from ..kernels import filter as kernels
 from ..parameters import ParameterGroup, choice, tunable
+from ..results import Packet
 
 INPUTS = ("packet",)
+# Each at the place that its kernel's number (OFF, STC, TRAIL, STC_CUT_TRAIL) says.
 MODES = ("off", "stc", "trail", "stc_cut_trail")
 
 
@@ -27,3 +34,38 @@ class FilterResult:
 
     surface_events: EventBatch
     logo_events: EventBatch
+
+
+@dataclass(slots=True, eq=False)
+class FilterState:
+    """The last event of every pixel: `last` (height x width,) int64 as the kernel packs it."""
+
+    last: NDArray[np.int64]
+    width_px: int
+
+
+def start(parameters: FilterParameters, setting: Setting) -> FilterState:
+    """No pixel has seen an event."""
+    camera = setting.camera
+    return FilterState(np.full(camera.width_px * camera.height_px, kernels.NEVER), camera.width_px)
+
+
+def step(parameters: FilterParameters, state: FilterState, packet: Packet) -> FilterResult:
+    """The packet through both filters; see the kernel for what STC and TRAIL pass.
+
+    Filters with the same setting give one and the same batch; a filter that is off gives the packet's own.
+    """
+    events = packet.events
+    surface = (MODES.index(parameters.mode), parameters.threshold_us)
+    logo = (MODES.index(parameters.logo_mode), parameters.logo_threshold_us)
+    if surface[0] == logo[0] == kernels.OFF:
+        return FilterResult(events, events)
+    passed = kernels.passing(
+        state.last, state.width_px, events.t_us, events.x_px, events.y_px, events.on, *surface, *logo
+    )
+    surface_events = events if surface[0] == kernels.OFF else events[kernels.rows_with(passed, 0)]
+    if logo == surface:
+        return FilterResult(surface_events, surface_events)
+    return FilterResult(
+        surface_events, events if logo[0] == kernels.OFF else events[kernels.rows_with(passed, 1)]
+    )

@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..parameters import ParameterGroup, tunable
+from ..camera import Setting
+from ..kernels.rate import autocorrelation, falling_crossings, low_passed, moving_average, shortest_period
+from ..parameters import ParameterGroup, choice, tunable
+from ..results import Packet, frozen
+from .logo import LogoResult
+from .track import TrackResult
 
 INPUTS = ("packet", "track", "logo")
+ALSO = (("spin", "max_spin_rps"),)
+
+# Fewer logo events than this in the window have no rhythm that could be told from chance.
+FEWEST_EVENTS = 100
+# A period must repeat the curve to this correlation, and be within this share of the best of its multiples.
+REPEATS, SHARE_OF_BEST = 0.5, 0.8
+# Intervals between crossings that spread more than this (1 sigma / mean) belong to no steady spin.
+IRREGULAR = 0.15
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,7 +32,10 @@ class RateParameters(ParameterGroup):
 
     bin_us: int = tunable(500, 50, 20_000, 50, "us", "width of the histogram's bins")
     ema_us: int = tunable(2000, 100, 100_000, 100, "us", "time constant of the exponential moving average")
-    low_pass_hz: float = tunable(200.0, 5.0, 2000.0, 5.0, "Hz", "cut-off of the low-pass filter")
+    low_pass_from: str = choice(
+        "rhythm", ("rhythm", "fixed"), "cut-off: twice the rotation found by autocorrelation, or low_pass_hz"
+    )
+    low_pass_hz: float = tunable(200.0, 5.0, 2000.0, 5.0, "Hz", "cut-off of the low-pass filter; its upper limit")
     window_us: int = tunable(500_000, 10_000, 5_000_000, 10_000, "us", "how far back in time it looks")
 
 
@@ -26,8 +43,9 @@ class RateParameters(ParameterGroup):
 class RateResult:
     """The event rate of the present shot so far (the last window of it).
 
-    t_us : (n,) int64, the bins' starts
+    t_us : (n,) int64, the bins' starts; only bins that lie wholly in the shot and have ended
     rate_hz, ema_hz, smooth_hz : (n,) float64, histogram, its moving average, and that less its mean and low-passed
+    low_pass_hz : the cut-off used for smooth_hz
     crossings_us : (m,) float64, times at which smooth_hz falls through zero
     spin_rps : magnitude from the crossings; None with its reason when there is no rhythm
     spin_std_rps : its 1 sigma; None with spin_rps
@@ -38,7 +56,122 @@ class RateResult:
     rate_hz: NDArray[np.float64]
     ema_hz: NDArray[np.float64]
     smooth_hz: NDArray[np.float64]
+    low_pass_hz: float
     crossings_us: NDArray[np.float64]
     spin_rps: float | None
     spin_std_rps: float | None
     reason: str | None
+
+
+@dataclass(slots=True)
+class State:
+    """Counts of the present shot, bin by bin."""
+
+    max_spin_rps: float
+    shot: int | None = None
+    first_bin: int = 0
+    counts: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+
+
+def start(parameters: RateParameters, setting: Setting) -> State:
+    return State(setting.max_spin_rps)
+
+
+def step(
+    parameters: RateParameters, state: State, packet: Packet, track: TrackResult, logo: LogoResult
+) -> RateResult:
+    """The event rate up to the end of the tick and, once it has a rhythm, the spin magnitude behind it.
+
+    The magnitude is the rate of the logo's reappearance, seen from the camera: while the ball flies past, the line
+    of sight turns too, which adds or takes up to speed / (2 pi distance), about 0.7 rps at 9 m/s and 2 m.
+    """
+    if not track.has_ball:
+        state.shot, state.counts = None, np.empty(0, np.int64)
+        return _silent(parameters, np.empty(0, np.int64), np.empty(0), "no ball")
+    if track.shot != state.shot:
+        state.shot, state.first_bin = track.shot, -(-packet.start_us // parameters.bin_us)
+        state.counts = np.empty(0, np.int64)
+    _count(parameters, state, packet, logo)
+    ended = packet.end_us // parameters.bin_us - state.first_bin
+    counts = state.counts[: max(ended, 0)]
+    t_us = (state.first_bin + np.arange(counts.size)) * parameters.bin_us
+    rate_hz = counts / (parameters.bin_us * 1e-6)
+    if counts.sum() < FEWEST_EVENTS:
+        return _silent(parameters, t_us, rate_hz, f"{counts.sum()} logo events, {FEWEST_EVENTS} are needed")
+    return _listen(parameters, state.max_spin_rps, t_us, rate_hz)
+
+
+def _count(parameters: RateParameters, state: State, packet: Packet, logo: LogoResult) -> None:
+    """Add the tick's events to the bins; forget the bins before the window."""
+    bins = logo.events.t_us // parameters.bin_us - state.first_bin
+    length = max(-(-packet.end_us // parameters.bin_us) - state.first_bin, 0)
+    counts = np.bincount(bins[bins >= 0], minlength=length)
+    counts[: state.counts.size] += state.counts
+    forget = max(length - parameters.window_us // parameters.bin_us, 0)
+    state.first_bin += forget
+    state.counts = counts[forget:]
+
+
+def _silent(
+    parameters: RateParameters, t_us: NDArray[np.int64], rate_hz: NDArray[np.float64], reason: str
+) -> RateResult:
+    """A result without rhythm, with the curves as far as they go."""
+    ema_hz = moving_average(rate_hz, _ema_weight(parameters))
+    nothing = frozen(np.zeros(rate_hz.size))
+    return RateResult(
+        frozen(t_us), frozen(rate_hz), frozen(ema_hz), nothing, parameters.low_pass_hz, frozen(np.empty(0)), None,
+        None, reason,
+    )  # fmt: skip
+
+
+def _ema_weight(parameters: RateParameters) -> float:
+    """Share of a new bin in the average: the bin's part of an exponential decay with time constant ema_us."""
+    return 1.0 - math.exp(-parameters.bin_us / parameters.ema_us)
+
+
+def _listen(
+    parameters: RateParameters, max_spin_rps: float, t_us: NDArray[np.int64], rate_hz: NDArray[np.float64]
+) -> RateResult:
+    """Moving average, mean removed, low-pass, falling zero crossings, mean interval.
+
+    The average is causal as in the paper; its lag is the same for every rotation and drops out of the intervals. The
+    low-pass runs both ways over the window, so it moves no crossing. A logo has several strokes and hence several
+    peaks a rotation: twice the rate of rotation as cut-off keeps the first two harmonics and merges the strokes.
+    """
+    bin_s = parameters.bin_us * 1e-6
+    ema_hz = moving_average(rate_hz, _ema_weight(parameters))
+    varying = ema_hz - ema_hz.mean()
+    correlation = autocorrelation(varying, varying.size * 3 // 4)
+    period = shortest_period(correlation, int(0.8 / (max_spin_rps * bin_s)), SHARE_OF_BEST)
+    repeats = period > 0 and correlation[period] >= REPEATS
+    cutoff_hz = min(parameters.low_pass_hz, 0.45 / bin_s)  # below half the bins' rate, else there is nothing to pass
+    if parameters.low_pass_from == "rhythm" and repeats:
+        cutoff_hz = min(cutoff_hz, 2.0 / (period * bin_s))
+    smooth_hz = low_passed(varying, cutoff_hz * bin_s)
+    crossings_us = t_us[0] + (falling_crossings(smooth_hz) + 0.5) * parameters.bin_us
+    spin_rps, spin_std_rps, reason = _spin(crossings_us, repeats, parameters, max_spin_rps)
+    return RateResult(
+        frozen(t_us), frozen(rate_hz), frozen(ema_hz), frozen(smooth_hz), cutoff_hz, frozen(crossings_us), spin_rps,
+        spin_std_rps, reason,
+    )  # fmt: skip
+
+
+def _spin(
+    crossings_us: NDArray[np.float64], repeats: bool, parameters: RateParameters, max_spin_rps: float
+) -> tuple[float | None, float | None, str | None]:
+    """(magnitude, its 1 sigma, reason): 1 / the mean interval, unless the crossings make no rhythm."""
+    if crossings_us.size < 2:
+        return None, None, f"{crossings_us.size} falling crossings, two are needed"
+    intervals_s = np.diff(crossings_us) * 1e-6
+    mean_s, spread_s = float(intervals_s.mean()), float(intervals_s.std())
+    if spread_s > IRREGULAR * mean_s:
+        return None, None, f"intervals of {mean_s * 1e3:.1f} ms spread by {spread_s * 1e3:.1f} ms"
+    if not repeats:
+        return None, None, "the event rate does not repeat itself"
+    if 1.0 / mean_s > 1.25 * max_spin_rps:
+        return None, None, f"{1.0 / mean_s:.0f} rps is above spin.max_spin_rps"
+    # One interval has no spread of its own: then a crossing counts as sure to a bin and the spread allowed.
+    spread_s = max(spread_s, parameters.bin_us * 1e-6 / math.sqrt(6.0))
+    if intervals_s.size == 1:
+        spread_s = max(spread_s, 0.5 * IRREGULAR * mean_s)
+    return 1.0 / mean_s, spread_s / mean_s**2 / math.sqrt(intervals_s.size), None

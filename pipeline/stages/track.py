@@ -1,15 +1,31 @@
-"""Track: Hough circle and Kalman filter together (section 3.1)."""
+"""Track: Hough circle and Kalman filter together (section 3.1).
+
+The Hough transform finds the ball in the surface: anywhere while there is no track, near the prediction and within
+the radii that the filter allows while there is one. Unlike the paper, which feeds the Hough circle to the filter,
+the filter gets the circle refined on the ball's outline in the events (track_outline): an EROS surface shows the
+outline one to two pixels late on fast balls, the events to a tenth of a pixel.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..camera import Setting
+from ..errors import ParameterError
+from ..events import EventBatch
+from ..kernels import contour as kernels
 from ..parameters import ParameterGroup, choice, tunable
-from ..results import Circle
+from ..results import Circle, Packet, frozen
+from .filter import FilterResult
+from .surface import SurfaceResult
+from .track_hough import candidates, hough_near
+from .track_kalman import OBSERVED, BallFilter
+from .track_outline import VOTE_US, Limits, Sighting, measure, sight
 
 INPUTS = ("packet", "filter", "surface")
 Status = Literal["searching", "starting", "tracking", "coasting", "lost"]
@@ -19,13 +35,18 @@ Status = Literal["searching", "starting", "tracking", "coasting", "lost"]
 class TrackParameters(ParameterGroup):
     """The tick, the search for the circle, and the Kalman filter."""
 
-    ball: str = choice(
-        "flying", ("flying", "fixed"), "flying ball, or a ball spinner's ball that stays in place"
-    )
+    ball: str = choice("flying", ("flying", "fixed"), "flying ball, or a ball spinner's ball that stays in place")
     tick_us: int = tunable(5000, 200, 100_000, 100, "us", "time between two steps of the pipeline (200 Hz)")
     radius_min_px: float = tunable(5.0, 2.0, 500.0, 0.5, "px", "smallest radius looked for")
     radius_max_px: float = tunable(40.0, 3.0, 500.0, 0.5, "px", "largest radius looked for")
-    latency_us: float = tunable(100.0, 0.0, 10_000.0, 10.0, "us", "how late the pixels report an edge")
+    speed_min_m_s: float = tunable(1.0, 0.0, 100.0, 0.1, "m/s", "slowest ball that counts as a shot")
+    speed_max_m_s: float = tunable(25.0, 1.0, 200.0, 1.0, "m/s", "fastest ball looked for")
+    latency_us: float = tunable(65.0, 0.0, 10_000.0, 5.0, "us", "how late the pixels report an edge")
+    outline_px: float = tunable(0.5, 0.0, 5.0, 0.05, "px", "how far outside the ball the pixels see its edge")
+    contour_us: int = tunable(3000, 500, 50_000, 100, "us", "how far back in time the outline's events are taken")
+    acceleration_m_s2: float = tunable(15.0, 0.1, 1000.0, 1.0, "m/s^2", "Kalman: 1 sigma of the acceleration")
+    approach_m_s: float = tunable(3.0, 0.1, 100.0, 0.5, "m/s", "Kalman: 1 sigma of the speed towards the camera")
+    coast_us: int = tunable(20_000, 0, 1_000_000, 1000, "us", "how long an unseen ball is kept")
     fixed_x_px: float | None = tunable(None, 0.0, 10_000.0, 0.1, "px", "fixed ball: column of the centre")
     fixed_y_px: float | None = tunable(None, 0.0, 10_000.0, 0.1, "px", "fixed ball: row of the centre")
     fixed_radius_px: float | None = tunable(None, 1.0, 1000.0, 0.1, "px", "fixed ball: radius")
@@ -58,6 +79,7 @@ class TrackResult:
     covariance: NDArray[np.float64]
     hough: Circle | None
     measured: Circle | None
+    candidate: Circle | None = None
 
     @property
     def has_ball(self) -> bool:
@@ -68,3 +90,290 @@ class TrackResult:
         """Centre (x, y) in px at the scene times behind these event time stamps (section 3.2, eq. ball_pos)."""
         dt_s = (event_t_us - self.latency_us - self.t_us) * 1e-6
         return self.mean[0] + self.mean[2] * dt_s, self.mean[1] + self.mean[3] * dt_s
+
+
+# Squared Mahalanobis distance (three degrees of freedom) beyond which an outline is not the ball's: five sigma.
+MOST_SURPRISE = 25.0
+# Scatter of an outline's centre and radius from tick to tick beyond the statistical one, on the samples.
+OUTLINE_STD_PX = 0.05
+# What no filtering takes away: the calibration of latency and outline, between shots of the samples.
+LATENCY_STD_US = 10.0
+CALIBRATION_STD_PX = 0.05
+# A second ball takes the track over only when this much faster (a slower one rolls back), or while the first is
+# out of sight and not much slower (a ball that was hit).
+RIVAL_SPEED, RIVAL_SPEED_UNSEEN = 1.5, 0.7
+# A slower ball is not looked at again for so long; by then it may have left its straight path by half a radius.
+RIVAL_US = 25_000
+# Circles of the full-frame vote looked at in one tick, without a track and beside one.
+MOST_CANDIDATES, MOST_RIVALS = 4, 2
+FREE = np.full(5, 1e9)
+
+
+@dataclass(slots=True)
+class TrackState:
+    """What the tracker carries from tick to tick."""
+
+    setting: Setting
+    contour: EventBatch = field(default_factory=EventBatch.empty)
+    ball: BallFilter | None = None
+    pending: Sighting | None = None
+    rivals: list[tuple[int, Sighting]] = field(default_factory=list)
+    seen_us: int = 0
+    shots: int = 0
+
+
+def start(parameters: TrackParameters, setting: Setting) -> TrackState:
+    """Fresh state; raises ParameterError for a fixed ball without a place or radii the wrong way round."""
+    if parameters.ball == "fixed":
+        _fixed_ring(parameters)
+    if parameters.radius_min_px >= parameters.radius_max_px:
+        raise ParameterError(
+            f"track.radius_min_px = {parameters.radius_min_px:g} must be below "
+            f"track.radius_max_px = {parameters.radius_max_px:g}"
+        )
+    return TrackState(setting)
+
+
+def step(
+    parameters: TrackParameters,
+    state: TrackState,
+    packet: Packet,
+    filtered: FilterResult,
+    surface: SurfaceResult,
+) -> TrackResult:
+    """One tick: the ball at its end."""
+    if parameters.ball == "fixed":
+        variance = np.array([1.0, 1.0, 0.0, 0.0, 1.0]) * parameters.fixed_std_px**2
+        return _result(parameters, packet, "tracking", 0, _fixed_ring(parameters), np.diag(variance))
+    span_us = max(parameters.contour_us, VOTE_US)
+    state.contour = EventBatch.concatenate([state.contour, filtered.logo_events]).between(
+        packet.end_us - span_us, packet.end_us
+    )
+    if state.ball is None:
+        return _search(parameters, state, packet, surface)
+    return _follow(parameters, state, state.ball, packet, surface)
+
+
+def _search(parameters: TrackParameters, state: TrackState, packet: Packet, surface: SurfaceResult) -> TrackResult:
+    """A tick without a track: start one from a sighting that is trusted, or that is promising twice in a row."""
+    hough, found = _look(parameters, state, packet, surface, state.contour, MOST_CANDIDATES)
+    pending, state.pending = state.pending, None
+    if not found:
+        reason = "no ball: no circle in the surface" if hough is None else "no ball: no circle moves like a ball"
+        return _no_ball(parameters, packet, "searching", reason, hough)
+    best, hough = found[0]
+    again = pending is not None and _agree(pending, best, packet.end_us - packet.start_us)
+    if best.trusted or again:
+        return _begin(parameters, state, packet, best, hough, state.shots)
+    state.pending = best
+    return _no_ball(
+        parameters,
+        packet,
+        "starting",
+        "no ball yet: a circle moves like a ball, but it must be seen once more",
+        hough,
+        best.circle(parameters.outline_px),
+    )
+
+
+def _follow(
+    parameters: TrackParameters, state: TrackState, ball: BallFilter, packet: Packet, surface: SurfaceResult
+) -> TrackResult:
+    """A tick with a track: predict, measure near the prediction, update; let a better ball take over."""
+    ball.predict((packet.end_us - packet.start_us) * 1e-6)
+    camera = state.setting.camera
+    expected = ball.mean
+    if _beyond(expected, camera.width_px, camera.height_px):
+        return _end(parameters, state, packet, "the ball left the view")
+    expected[4] += parameters.outline_px
+    spread = np.sqrt(np.diag(ball.covariance))
+    span = max(2.0, 3.0 * spread[4])
+    hough = hough_near(surface, expected[0], expected[1], expected[4] - span, expected[4] + span)
+    # The velocity may leave the prediction by half a ball diameter in 0.1 s and the radius by half a pixel: loose
+    # for a ball wholly in view, and it keeps the fit sane on short arcs.
+    loose = np.array([1e9, 1e9, 10 * expected[4] + spread[2], 10 * expected[4] + spread[3], 0.5])
+    gate = 2.0 + 3.0 * max(spread[0], spread[1])
+    sighting = measure(state.contour, packet.end_us, camera, expected, gate, loose)
+    measured = None
+    if sighting is not None and sighting.ahead >= 0.3:
+        if ball.update(*_observation(parameters, packet, sighting), MOST_SURPRISE):
+            measured = sighting.circle(parameters.outline_px)
+            state.seen_us = packet.end_us
+    if measured is None:
+        bounced = measure(state.contour, packet.end_us, camera, expected, 0.5 * expected[4], FREE)
+        if bounced is not None and bounced.trusted and abs(bounced.ring[4] / expected[4] - 1) < 0.1:
+            return _begin(parameters, state, packet, bounced, hough, state.shots - 1)
+    now = ball.mean
+    least = (RIVAL_SPEED if measured else RIVAL_SPEED_UNSEEN) * math.hypot(now[2], now[3])
+    state.rivals = [(since, one) for since, one in state.rivals if packet.end_us - since < RIVAL_US]
+    known = [_moved(one.ring, packet.end_us - since) for since, one in state.rivals]
+    events = _clear_of(state.contour, packet.end_us, [now, *known] if measured else known)
+    _, found = _look(parameters, state, packet, surface, events, MOST_RIVALS)
+    if found and found[0][0].trusted and found[0][0].speed_px_s > least:
+        return _begin(parameters, state, packet, *found[0], state.shots)
+    state.rivals += [(packet.end_us, one) for one, _ in found]
+    if measured is None and packet.end_us - state.seen_us > parameters.coast_us:
+        return _end(parameters, state, packet, f"the ball was not seen for {parameters.coast_us / 1000:g} ms")
+    status: Status = "tracking" if measured else "coasting"
+    return _result(parameters, packet, status, state.shots - 1, now, _honest(ball), hough, measured)
+
+
+def _look(
+    parameters: TrackParameters,
+    state: TrackState,
+    packet: Packet,
+    surface: SurfaceResult,
+    events: EventBatch,
+    most: int,
+) -> tuple[Circle | None, list[tuple[Sighting, Circle]]]:
+    """The best Hough circle anywhere, and those that move like a ball: trusted ones first, then by speed."""
+    per_m = 1.0 / state.setting.ball_radius_m
+    limits = Limits(
+        parameters.radius_min_px,
+        parameters.radius_max_px,
+        parameters.speed_min_m_s * per_m,
+        parameters.speed_max_m_s * per_m,
+    )
+    first: Circle | None = None
+    found: list[tuple[Sighting, Circle]] = []
+    for circle in candidates(surface, events, limits.radius_min_px, limits.radius_max_px, most):
+        first = first or circle
+        sighting = sight(events, packet.end_us, state.setting.camera, circle, limits)
+        if sighting is not None and (sighting.trusted or sighting.promising):
+            found.append((sighting, circle))
+    return first, sorted(found, key=lambda one: (one[0].trusted, one[0].speed_px_s), reverse=True)
+
+
+def _begin(
+    parameters: TrackParameters,
+    state: TrackState,
+    packet: Packet,
+    sighting: Sighting,
+    hough: Circle | None,
+    shot: int,
+) -> TrackResult:
+    """Start the filter at a sighting."""
+    per_m = sighting.ring[4] / state.setting.ball_radius_m
+    mean = sighting.ring.copy()
+    mean[4] -= parameters.outline_px
+    covariance = sighting.covariance.copy()
+    covariance[OBSERVED, OBSERVED] += OUTLINE_STD_PX**2
+    # The paper: high enough to converge fast. The fit bends by what the ball accelerates within its window.
+    covariance[[2, 3], [2, 3]] += (0.2 * per_m) ** 2
+    growth = parameters.approach_m_s * per_m * mean[4] / state.setting.camera.focal_px
+    state.ball = BallFilter(mean, covariance, parameters.acceleration_m_s2 * per_m, growth)
+    state.pending, state.rivals = None, []
+    state.seen_us = packet.end_us
+    state.shots = shot + 1
+    measured = sighting.circle(parameters.outline_px)
+    return _result(parameters, packet, "tracking", shot, mean, _honest(state.ball), hough, measured)
+
+
+def _end(parameters: TrackParameters, state: TrackState, packet: Packet, reason: str) -> TrackResult:
+    state.ball = None
+    return _no_ball(parameters, packet, "lost", reason)
+
+
+def _observation(
+    parameters: TrackParameters, packet: Packet, sighting: Sighting
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(3,) [x, y, radius] and its covariance (3, 3), for one step of the filter.
+
+    Outlines taken further back than one tick share events with the tick before and so count for less.
+    """
+    observed = sighting.ring[OBSERVED]
+    observed[2] -= parameters.outline_px
+    shared = max(1.0, parameters.contour_us / (packet.end_us - packet.start_us))
+    noise = sighting.covariance[OBSERVED[:, None], OBSERVED]
+    noise[[0, 1, 2], [0, 1, 2]] += OUTLINE_STD_PX**2
+    return observed, noise * shared
+
+
+def _honest(ball: BallFilter) -> NDArray[np.float64]:
+    """The filter's covariance plus the errors that every tick has in common."""
+    covariance = ball.covariance
+    late = ball.mean[2:4] * LATENCY_STD_US * 1e-6
+    covariance[:2, :2] += np.outer(late, late)
+    covariance[OBSERVED, OBSERVED] += CALIBRATION_STD_PX**2
+    return covariance
+
+
+def _moved(ring: NDArray[np.float64], by_us: int) -> NDArray[np.float64]:
+    """The ring (5,) that much later."""
+    later = ring.copy()
+    later[:2] += ring[2:4] * by_us * 1e-6
+    return later
+
+
+def _clear_of(events: EventBatch, end_us: int, rings: list[NDArray[np.float64]]) -> EventBatch:
+    """The events outside these moving rings (as of end_us), with a margin for trails and errors."""
+    for ring in rings:
+        margin = 0.3 * ring[4] + 2.0
+        events = events[kernels.clear_of(ring, events.t_us, events.x_px, events.y_px, end_us, margin)]
+    return events
+
+
+def _agree(before: Sighting, now: Sighting, tick_us: int) -> bool:
+    """Whether a sighting is the one of the tick before, moved on."""
+    off = (now.ring - _moved(before.ring, tick_us))[:2]
+    turned = now.ring[2:4] - before.ring[2:4]
+    return bool(
+        np.hypot(*off) <= 2.0 + 0.1 * before.speed_px_s * tick_us * 1e-6
+        and abs(now.ring[4] - before.ring[4]) <= 1.0 + 0.1 * before.ring[4]
+        and np.hypot(*turned) <= 0.3 * before.speed_px_s
+    )
+
+
+def _beyond(mean: NDArray[np.float64], width_px: int, height_px: int) -> bool:
+    """Whether hardly anything of the ball is in the image."""
+    x, y, margin = mean[0], mean[1], 0.8 * mean[4]
+    return bool(x < -margin or y < -margin or x > width_px - 1 + margin or y > height_px - 1 + margin)
+
+
+def _fixed_ring(parameters: TrackParameters) -> NDArray[np.float64]:
+    x, y, radius = parameters.fixed_x_px, parameters.fixed_y_px, parameters.fixed_radius_px
+    if x is None or y is None or radius is None:
+        raise ParameterError(
+            "track.ball = fixed needs the ball's place: give --fixed-ball X_PX Y_PX RADIUS_PX or --fixed-ball auto "
+            "(track.fixed_x_px, track.fixed_y_px, track.fixed_radius_px)"
+        )
+    return np.array([x, y, 0.0, 0.0, radius])
+
+
+def _result(
+    parameters: TrackParameters,
+    packet: Packet,
+    status: Status,
+    shot: int | None,
+    mean: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    hough: Circle | None = None,
+    measured: Circle | None = None,
+    reason: str | None = None,
+    candidate: Circle | None = None,
+) -> TrackResult:
+    late = parameters.latency_us
+    return TrackResult(
+        status,
+        reason,
+        shot,
+        packet.end_us - late,
+        late,
+        frozen(mean),
+        frozen(covariance),
+        hough,
+        measured,
+        candidate,
+    )
+
+
+def _no_ball(
+    parameters: TrackParameters,
+    packet: Packet,
+    status: Status,
+    reason: str,
+    hough: Circle | None = None,
+    candidate: Circle | None = None,
+) -> TrackResult:
+    nothing = np.full(5, np.nan), np.full((5, 5), np.nan)
+    return _result(parameters, packet, status, None, *nothing, hough, None, reason, candidate)

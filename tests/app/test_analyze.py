@@ -14,7 +14,14 @@ import numpy as np
 import pytest
 
 SCHEMA = json.loads((Path(__file__).parent / "analyze.schema.json").read_text(encoding="utf-8"))
-FLIGHTS = ("flight_slow_top", "flight_back", "flight_fast_top", "flight_side", "flight_mixed", "flight_two_balls")
+FLIGHTS = (
+    "flight_slow_top",
+    "flight_back",
+    "flight_fast_top",
+    "flight_side",
+    "flight_mixed",
+    "flight_two_balls",
+)
 
 
 def spinscope(*arguments: object) -> subprocess.CompletedProcess[str]:
@@ -131,7 +138,9 @@ def test_the_table_for_people_names_units_and_methods(samples: Path) -> None:
         (["{samples}/README.md"], "README.md"),
     ],
 )
-def test_wrong_input_is_one_clear_line_and_status_2(samples: Path, arguments: list[object], says: str) -> None:
+def test_wrong_input_is_one_clear_line_and_status_2(
+    samples: Path, arguments: list[object], says: str
+) -> None:
     done = spinscope("analyze", *(str(argument).replace("{samples}", str(samples)) for argument in arguments))
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1, done.stderr

@@ -87,7 +87,9 @@ def test_an_unchanged_run_computes_nothing_again(calls: dict[str, int]) -> None:
         ("filter.mode=off", set(INPUTS)),
     ],
 )
-def test_a_change_runs_its_stage_and_those_below(calls: dict[str, int], assignment: str, rerun: set[str]) -> None:
+def test_a_change_runs_its_stage_and_those_below(
+    calls: dict[str, int], assignment: str, rerun: set[str]
+) -> None:
     chain = Chain(source())
     list(chain.run(DEFAULT))
     before = dict(calls)

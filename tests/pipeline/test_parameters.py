@@ -14,7 +14,13 @@ DEFAULT = Parameters()
 
 def test_assignments_reach_every_kind() -> None:
     changed = DEFAULT.with_assignments(
-        ["logo.pad_px=3.5", "filter.mode=trail", "track.tick_us=1000", "camera.principal_x_px=600", "camera.up=0,1,0"]
+        [
+            "logo.pad_px=3.5",
+            "filter.mode=trail",
+            "track.tick_us=1000",
+            "camera.principal_x_px=600",
+            "camera.up=0,1,0",
+        ]
     )
     assert changed.logo.pad_px == 3.5
     assert changed.filter.mode == "trail"

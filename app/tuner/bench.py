@@ -1,0 +1,237 @@
+"""One opened recording, shared by all pages that look at it: its events, its overview, its clips.
+
+The unit of work is a clip: the whole of a short recording, one shot of a long one.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Hashable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from numpy.typing import NDArray
+
+from app.session import Choices, Progress, Session
+from pipeline.chain import STAGES, Chain, EventSource, Parameters, Source, Tick
+from pipeline.errors import ParameterError
+from pipeline.results import Packet, Truth
+
+CHAIN_BYTES = 250_000_000  # a clip's columns: a dozen settings of a flight of 100 ms
+CLIPS_KEPT = 2
+# Full frames of a clip take a quarter of that, so that A, B and a few earlier settings fit beside each other.
+CLIP_FRAMES_BYTES = 75_000_000
+MOST_FRAMES_BYTES = 600_000_000  # a short tick on a long clip: what a run may hold whatever else is kept
+OVERVIEW_BINS = 1200  # about one a pixel of the page's width
+MARGIN_US = 20_000  # shown before and after a shot
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Progressed:
+    """One tick of a run, and the seconds that each stage needed for it (0 where it was known)."""
+
+    tick: Tick
+    seconds: dict[str, float]
+
+
+@dataclass(slots=True, eq=False)
+class Clip:
+    """A part of the recording with the chain that runs over it; several threads may run it at once.
+
+    lock : held while the chain makes a tick
+    cost_s : what each stage took when it was computed, by the value of what it was computed with
+    """
+
+    session: Session
+    lock: threading.Lock = field(default_factory=threading.Lock)
+    cost_s: OrderedDict[Hashable, float] = field(default_factory=OrderedDict)
+
+    @property
+    def window_us(self) -> tuple[int, int]:
+        """[start, end) of the clip, file time."""
+        return self.session.source.start_us, self.session.source.end_us
+
+    def with_parameters(self, parameters: Parameters) -> Session:
+        """The clip's session with other parameters, sharing its chain."""
+        return dataclasses.replace(self.session, parameters=parameters)
+
+    def check(self, parameters: Parameters) -> None:
+        """Raise ParameterError where the values do not go together, or the frames would not fit in memory."""
+        source, chain = self.session.source, self.session.chain
+        setting = chain.setting(parameters)
+        for name, stage in STAGES.items():
+            stage.start(parameters.group(name), setting)
+        ticks = chain.tick_count(parameters)
+        if ticks * source.width_px * source.height_px > MOST_FRAMES_BYTES:
+            raise ParameterError(
+                f"track.tick_us = {parameters.track.tick_us} makes {ticks} frames of this clip, more than fit: "
+                "take a longer tick or a shorter clip"
+            )
+
+    def run(self, parameters: Parameters) -> Iterator[Progressed]:
+        """The clip's ticks; between two of them other threads may run theirs, and the run may be abandoned."""
+        chain = self.session.chain
+        with self.lock:
+            ticks = chain.run(parameters)
+        keys = {stage: self.key(parameters, stage) for stage in STAGES}
+        while True:
+            with self.lock:
+                before = dict(chain.seconds)
+                tick = next(ticks, None)
+                took = {stage: chain.seconds[stage] - before[stage] for stage in STAGES}
+                for stage, seconds in took.items():
+                    if seconds:
+                        self.cost_s[keys[stage]] = self.cost_s.pop(keys[stage], 0.0) + seconds
+                while len(self.cost_s) > 1000:
+                    self.cost_s.popitem(last=False)
+            if tick is None:
+                return
+            yield Progressed(tick, took)
+
+    def key(self, parameters: Parameters, stage: str) -> Hashable:
+        """What a stage's column of results is made from, compared by value."""
+        above = list(STAGES)[: list(STAGES).index(stage) + 1]
+        own = tuple(parameters.group(name) for name in above)
+        setting = parameters.camera, parameters.ball, parameters.spin.max_spin_rps, parameters.track.tick_us
+        return self.session.source.identity, stage, setting, own
+
+    def cost_of(self, parameters: Parameters) -> dict[str, float]:
+        """Seconds each stage took with these parameters when it was computed; absent where it never was."""
+        with self.lock:
+            keys = {stage: self.key(parameters, stage) for stage in STAGES}
+            return {stage: self.cost_s[key] for stage, key in keys.items() if key in self.cost_s}
+
+
+class Bench:
+    """A recording on the bench.
+
+    session : as opened: all events of the window, the parameters chosen on the command line
+    found : [start, end) in us of the shots of a long recording found so far, in order of time
+    """
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self.found: list[tuple[int, int]] = []
+        self._clips: OrderedDict[tuple[int, int], Clip] = OrderedDict()
+        self._lock = threading.Lock()
+
+    @classmethod
+    def open(cls, path: Path, choices: Choices, on_progress: Progress | None = None) -> Bench:
+        """Open a recording and read it once; raises SpinscopeError."""
+        return cls(Session.open(path, choices, on_progress))
+
+    @property
+    def window_us(self) -> tuple[int, int]:
+        """[start, end) of what was opened, file time."""
+        return self.session.source.start_us, self.session.source.end_us
+
+    @property
+    def truth(self) -> Truth | None:
+        """The simulator's truth, if the recording carries it."""
+        return self.session.truth
+
+    @property
+    def longest_us(self) -> int:
+        """The longest clip whose full frames may be held."""
+        source, tick_us = self.session.source, self.session.parameters.track.tick_us
+        return max(CLIP_FRAMES_BYTES // (source.width_px * source.height_px), 1) * tick_us
+
+    @property
+    def is_long(self) -> bool:
+        """Whether it is worked on shot by shot."""
+        start_us, end_us = self.window_us
+        return end_us - start_us > self.longest_us
+
+    def clip(self, start_us: int, end_us: int) -> Clip:
+        """The part [start_us, end_us) as a clip; raises ParameterError when it is none, or too long."""
+        first, last = self.window_us
+        if not first <= start_us < end_us <= last:
+            raise ParameterError(
+                f"the clip {start_us} to {end_us} us is no part of the recording: {first} to {last} us"
+            )
+        if end_us - start_us > self.longest_us:
+            raise ParameterError(
+                f"the clip {start_us} to {end_us} us is longer than {self.longest_us / 1e6:.2f} s: choose a shorter one"
+            )
+        with self._lock:
+            key = start_us, end_us
+            clip = self._clips.pop(key, None) or self._new_clip(start_us, end_us)
+            self._clips[key] = clip
+            while len(self._clips) > CLIPS_KEPT:
+                self._clips.popitem(last=False)
+            return clip
+
+    def _new_clip(self, start_us: int, end_us: int) -> Clip:
+        whole = self.session.source
+        if (start_us, end_us) == self.window_us:
+            source = whole
+        else:
+            identity = (self.session.recording.identity(), (start_us, end_us))
+            part = whole.events.between(start_us, end_us)
+            source = EventSource(identity, part, whole.width_px, whole.height_px, start_us, end_us)
+        chain = Chain(source, budget_bytes=CHAIN_BYTES, clock=time.perf_counter)
+        return Clip(dataclasses.replace(self.session, source=source, chain=chain))
+
+    def first_clip_us(self) -> tuple[int, int]:
+        """Where work starts: all of a short recording, the busiest part of a long one, which mostly is a shot."""
+        start_us, end_us = self.window_us
+        if not self.is_long:
+            return start_us, end_us
+        counts, edges_us = self.rate(OVERVIEW_BINS)
+        middle = int(edges_us[int(np.argmax(counts))])
+        half = min(self.longest_us, 200_000) // 2
+        first = int(np.clip(middle - half, start_us, end_us - 2 * half))
+        return first, first + 2 * half
+
+    def rate(self, bins: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """(n,) int64 events in bins of equal length and (n + 1,) int64 edges in us."""
+        start_us, end_us = self.window_us
+        edges = np.linspace(start_us, end_us, min(bins, end_us - start_us) + 1).round().astype(np.int64)
+        return np.diff(np.searchsorted(self.session.source.events.t_us, edges)), edges
+
+    def find_shots(self, parameters: Parameters) -> Iterator[float]:
+        """Look for the shots of the whole recording, adding them to `found`; yields the share done, tick by tick.
+
+        Runs the tracker and what it needs alone, and keeps nothing: a column of frames of 20 s would take 4 GB.
+        """
+        source, tick_us = self.session.source, parameters.track.tick_us
+        chain = Chain(source)
+        count, setting = chain.tick_count(parameters), chain.setting(parameters)
+        names = ("filter", "surface", "track")
+        states = {name: STAGES[name].start(parameters.group(name), setting) for name in names}
+        self.found = []
+        shot, begin_us, last_us = None, 0, 0
+        for index in range(count):
+            packet = _packet(source, tick_us, index)
+            results: dict[str, Any] = {"packet": packet}
+            for name in names:
+                inputs = (results[other] for other in STAGES[name].INPUTS)
+                results[name] = STAGES[name].step(parameters.group(name), states[name], *inputs)
+            track = results["track"]
+            if track.shot != shot:
+                if shot is not None:
+                    self.found = [*self.found, (begin_us, last_us)]
+                shot, begin_us = track.shot, packet.start_us
+            last_us = packet.end_us
+            yield (index + 1) / count
+        if shot is not None:
+            self.found = [*self.found, (begin_us, last_us)]
+
+    def around(self, start_us: int, end_us: int) -> tuple[int, int]:
+        """The window to work on for a shot: with a margin, within the recording and not too long."""
+        first, last = self.window_us
+        begin = max(first, start_us - MARGIN_US)
+        return begin, min(last, end_us + MARGIN_US, begin + self.longest_us)
+
+
+def _packet(source: Source, tick_us: int, index: int) -> Packet:
+    """The events of one tick of the grid anchored at file time 0."""
+    number = source.start_us // tick_us + index
+    start_us, end_us = number * tick_us, min((number + 1) * tick_us, source.end_us)
+    return Packet(number, start_us, end_us, source.between(start_us, end_us))

@@ -1,0 +1,291 @@
+"""The ball in space: turning with its spin, its logo painted on, arrows, path; and the logo held still."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from pipeline.results import SpinEstimate
+
+from . import entities as at
+from .rerun_api import Chunk, columns_at, once
+from .run import Run, shown_estimate
+from .still import density, disc_directions, sampled, sphere, texture_directions, tone, turned
+
+Floats = NDArray[np.float64]
+
+MOTION_US = 250  # the ball is placed and turned this often: 4.5 degrees at 50 rps, smooth in slow motion
+PICTURE_US = 5000  # the logo is painted this often, and every tick of 200 Hz
+EVENTS_PAINTED = 60_000  # the latest of the shot; more add nothing but time
+PAINT = np.array([32, 42, 80])
+WHITE = np.array([238, 236, 228])
+DISC = np.array([38, 43, 51])
+RPS_M = 0.0006  # an arrow's length: 50 rps reach 30 mm beyond the ball
+RING_RADII = 1.18  # of the ring that shows which way the ball turns
+
+
+@dataclass(frozen=True)
+class _Painted:
+    """The logo events of a shot up to one tick, in the body frame."""
+
+    normals: Floats
+    on: NDArray[np.bool_]
+
+
+def ball_chunks(run: Run) -> list[Chunk]:
+    """Everything in space, and the logo held still."""
+    chunks = [_mesh(run), *_motion(run), *_arrows(run), _ring(run), *_path(run), *_axes(run), *_painting(run)]
+    style = rr.LineStrips3D.from_fields(colors=[at.method_colour("normal_flow")], radii=[-1.5])
+    return [once(at.WORLD, rr.ViewCoordinates.RDF), once(at.SPIN_RING, style), *chunks]
+
+
+def _mesh(run: Run) -> Chunk:
+    """The sphere, in the body frame."""
+    longitudes, latitudes = np.linspace(-np.pi, np.pi, 65), np.linspace(-np.pi / 2, np.pi / 2, 33)
+    normals = sphere(longitudes[None, :], latitudes[:, None]).reshape(-1, 3)
+    u, v = np.meshgrid(np.linspace(0, 1, 65), np.linspace(0, 1, 33))
+    row, column = np.meshgrid(np.arange(32), np.arange(64), indexing="ij")
+    first = (row * 65 + column).ravel()
+    faces = np.concatenate(
+        [np.stack([first, first + 65, first + 1], 1), np.stack([first + 1, first + 65, first + 66], 1)]
+    )
+    return once(
+        at.MESH,
+        rr.Mesh3D(
+            vertex_positions=normals * run.ball_radius_m,
+            vertex_normals=normals,
+            vertex_texcoords=np.stack([u.ravel(), v.ravel()], axis=1),
+            triangle_indices=faces,
+        ),
+    )
+
+
+def _motion(run: Run) -> list[Chunk]:
+    """Place and attitude of the ball between the ticks: carried on from the last tick, as a robot would have it."""
+    times, places, axes, angles = [], [], [], []
+    for index, (tick, start_us) in enumerate(zip(run.ticks, _shot_starts(run), strict=True)):
+        if start_us is None:
+            continue
+        until_us = run.ends_us[index + 1] if index + 1 < len(run.ticks) else run.end_us + 1
+        t_us = np.arange(tick.packet.end_us, until_us, MOTION_US)
+        ahead = np.zeros((t_us.size, 5))
+        ahead[:, :2] = tick.track.mean[2:4] * ((t_us - tick.packet.end_us) * 1e-6)[:, None]
+        times.append(t_us)
+        places.append(run.centre_m(tick.track.mean + ahead))
+        spin = _vector(shown_estimate(tick)[0])
+        magnitude = float(np.linalg.norm(spin))
+        axes.append(np.tile(spin / magnitude if magnitude else (0.0, 0.0, 1.0), (t_us.size, 1)))
+        angles.append(2 * np.pi * magnitude * (t_us - start_us) * 1e-6)
+    if not times:
+        return [columns_at(at.BALL, run.times_us[:1], rr.Transform3D.columns(translation=[[0.0, 0.0, 1.0]]))]
+    t_us = np.concatenate([*([run.times_us[:1]] if times[0][0] > run.start_us else []), *times])
+    rows = np.maximum(np.arange(t_us.size) - (t_us.size - sum(map(len, times))), 0)
+    place = np.concatenate(places)[rows]
+    turns = [
+        rr.RotationAxisAngle(axis=axis, radians=angle)
+        for axis, angle in zip(np.concatenate(axes)[rows], np.concatenate(angles)[rows], strict=True)
+    ]
+    return [
+        columns_at(at.BALL, t_us, rr.Transform3D.columns(translation=place)),
+        columns_at(at.BODY, t_us, rr.Transform3D.columns(rotation_axis_angle=turns)),
+    ]
+
+
+def _shot_starts(run: Run) -> Iterator[int | None]:
+    """For each tick the start of the shot it belongs to: the moment of the body frame; None without a ball."""
+    shot, start_us = None, None
+    for tick in run.ticks:
+        if not tick.track.has_ball:
+            shot, start_us = None, None
+        elif tick.track.shot != shot:
+            shot, start_us = tick.track.shot, tick.packet.start_us
+        yield start_us
+
+
+def _vector(estimate: SpinEstimate | None) -> Floats:
+    return np.zeros(3) if estimate is None or estimate.vector_rps is None else estimate.vector_rps
+
+
+def _arrows(run: Run) -> list[Chunk]:
+    """One arrow a method out of the ball's surface along its axis, the trusted one thick; the truth thin."""
+    chunks: list[Chunk] = []
+    for method in run.methods:
+        vectors = [_vector(tick.spin.estimates[method]) for tick in run.ticks]
+        trusted = [tick.spin.best == method for tick in run.ticks]
+        chunks += _arrow(run, method, vectors, trusted, at.method_colour(method))
+    if run.truth is not None:
+        t_us = np.array([tick.track.t_us for tick in run.ticks])
+        spins = np.nan_to_num(run.true_values(t_us, run.truth.spin_rps)) * run.has_ball[:, None]
+        chunks += _arrow(run, "truth", list(spins), [False] * len(run.ticks), at.TRUTH_COLOUR)
+    return chunks
+
+
+def _arrow(run: Run, name: str, vectors: list[Floats], thick: list[bool], colour: at.Colour) -> list[Chunk]:
+    spins = np.array(vectors).reshape(-1, 3)
+    magnitudes = np.linalg.norm(spins, axis=1)
+    known = magnitudes > 0
+    axes = spins[known] / magnitudes[known, None]
+    columns = rr.Arrows3D.columns(
+        origins=axes * run.ball_radius_m,
+        vectors=axes * (magnitudes[known, None] * RPS_M),
+        radii=run.ball_radius_m * np.where(np.array(thick)[known], 0.07, 0.025),
+        labels=[f"{name} {magnitude:.1f} rps" for magnitude in magnitudes[known]],
+    )
+    entity = f"{at.SPIN_ARROWS}/{name}"
+    return [
+        once(entity, rr.Arrows3D.from_fields(colors=[colour], show_labels=True)),
+        columns_at(entity, run.times_us, columns, [0, *known.astype(int)]),
+    ]
+
+
+def _ring(run: Run) -> Chunk:
+    """Three quarters of a circle around the shown axis with a tip: which way the ball turns."""
+    strips, lengths = [], [0]
+    for tick in run.ticks:
+        spin = _vector(shown_estimate(tick)[0]) if tick.track.has_ball else np.zeros(3)
+        magnitude = float(np.linalg.norm(spin))
+        lengths.append(int(magnitude > 0))
+        if magnitude > 0:
+            strips.append(_turning_arrow(spin / magnitude) * run.ball_radius_m)
+    return columns_at(at.SPIN_RING, run.times_us, rr.LineStrips3D.columns(strips=strips), lengths)
+
+
+def _turning_arrow(axis: Floats) -> Floats:
+    """(n, 3) a line around the axis by the right-hand rule, ending in a barbed tip; ball radii."""
+    side = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    side /= np.linalg.norm(side)
+    other = np.cross(axis, side)
+    angle = np.radians(np.arange(0, 271, 6))
+    ring = RING_RADII * (np.cos(angle)[:, None] * side + np.sin(angle)[:, None] * other)
+    tip, back = ring[-1], np.radians(270 - 12)
+    behind = RING_RADII * (np.cos(back) * side + np.sin(back) * other)
+    barbs = [behind + 0.12 * axis, tip, behind - 0.12 * axis]
+    return np.vstack([ring, barbs])
+
+
+def _path(run: Run) -> list[Chunk]:
+    """The way flown so far, a piece a tick (the view shows all pieces up to the playhead); the truth dashed."""
+    chunks = [once(at.PATH, rr.LineStrips3D.from_fields(colors=[at.PATH_COLOUR], radii=[-2.0]))]
+    if run.fixed or not run.has_ball.any():
+        return chunks
+    places = run.centre_m(np.nan_to_num(run.means, nan=1.0))
+    shots = [tick.track.shot for tick in run.ticks]
+    goes_on = [run.has_ball[i] and i > 0 and shots[i] == shots[i - 1] for i in range(len(run.ticks))]
+    pieces = [places[i - 1 : i + 1] for i, flies in enumerate(goes_on) if flies]
+    chunks.append(columns_at(at.PATH, run.times_us, rr.LineStrips3D.columns(strips=pieces), [0, *map(int, goes_on)]))
+    if run.truth is not None:
+        positions = run.truth.position_m
+        dashes = [positions[i : i + 6] for i in range(0, len(positions) - 6, 10)]
+        style = rr.LineStrips3D(dashes, colors=[at.TRUTH_COLOUR], radii=[-1.0])
+        chunks.append(once(at.TRUE_PATH, style))
+    return chunks
+
+
+def _axes(run: Run) -> list[Chunk]:
+    """The camera frame's directions, 0.1 m long, beside the path."""
+    corner = path_bounds_m(run)[0]
+    arrows = rr.Arrows3D(
+        origins=[corner] * 3,
+        vectors=0.1 * np.eye(3),
+        colors=[at.ON, at.KALMAN_COLOUR, at.OFF],
+        labels=["x: right, 0.1 m", "y: down the image", "z: away from the camera"],
+        radii=[-1.5],
+    )
+    return [once(at.AXES, arrows)]
+
+
+def path_bounds_m(run: Run) -> tuple[Floats, Floats]:
+    """Opposite corners of the box around all places of the ball, camera frame; 0.1 m wide at least."""
+    if not run.has_ball.any():
+        return np.array([-0.4, -0.3, 1.9]), np.array([0.4, 0.3, 2.1])
+    places = run.centre_m(run.means[run.has_ball])
+    low, high = places.min(axis=0), places.max(axis=0)
+    spare = np.maximum(0.1 - (high - low), 0.0) / 2
+    return low - spare, high + spare
+
+
+def _painting(run: Run) -> list[Chunk]:
+    """The logo's events turned back by the estimate of the moment: on the ball's texture, and flat on two discs."""
+    texels, plain = texture_directions(), WHITE.astype(np.uint8)
+    blank_texture = np.broadcast_to(plain, (*texels.shape[:2], 3))
+    discs: dict[int, tuple[Floats, NDArray[np.bool_]]] = {}
+    empty_discs = _discs(None, *disc_directions(np.array([0.0, 0.0, -1.0])))
+    times, textures, pictures = [run.start_us], [blank_texture.tobytes()], [empty_discs]
+    for index, painted in _painted(run):
+        shot = run.ticks[index].track.shot
+        assert shot is not None
+        if shot not in discs:
+            discs[shot] = disc_directions(_densest(run, shot))
+        times.append(run.ticks[index].packet.end_us)
+        pictures.append(_discs(painted, *discs[shot]))
+        textures.append(_texture(painted, texels).tobytes())
+    t_us = np.array(times)
+    width, height = texels.shape[1], texels.shape[0]
+    form = rr.components.ImageFormat(width=width, height=height, color_model="RGB", channel_datatype="U8")
+    columns = rr.Mesh3D.columns(albedo_texture_buffer=textures, albedo_texture_format=[form] * len(times))
+    return [
+        columns_at(at.MESH, t_us, columns),
+        columns_at(at.STILL_LOGO, t_us, rr.EncodedImage.columns(blob=pictures)),
+        once(at.STILL_LOGO, rr.EncodedImage.from_fields(media_type="image/png")),
+    ]
+
+
+def _painted(run: Run) -> Iterator[tuple[int, _Painted]]:
+    """The ticks at which the logo is painted, with the shot's events so far in the body frame."""
+    parts: list[int] = []
+    last_us = -PICTURE_US
+    for index, (tick, start_us) in enumerate(zip(run.ticks, _shot_starts(run), strict=True)):
+        if start_us is None or (parts and run.ticks[parts[-1]].track.shot != tick.track.shot):
+            parts = []
+        if start_us is None:
+            continue
+        parts.append(index)
+        ends = index + 1 == len(run.ticks) or run.ticks[index + 1].track.shot != tick.track.shot
+        if tick.packet.end_us - last_us >= PICTURE_US or ends:
+            last_us = tick.packet.end_us
+            yield index, _turned_back(run, parts, start_us, _vector(shown_estimate(tick)[0]))
+
+
+def _turned_back(run: Run, parts: list[int], start_us: int, spin_rps: Floats) -> _Painted:
+    logos = [run.ticks[i].logo for i in parts]
+    normals = np.concatenate([logo.normals for logo in logos])[-EVENTS_PAINTED:]
+    t_us = np.concatenate([logo.events.t_us for logo in logos])[-EVENTS_PAINTED:]
+    on = np.concatenate([logo.events.on for logo in logos])[-EVENTS_PAINTED:]
+    return _Painted(turned(normals, spin_rps, (start_us - t_us) * 1e-6), on)
+
+
+def _densest(run: Run, shot: int) -> Floats:
+    """The direction in which a shot's logo lies, by its last estimate; towards the camera where there is none."""
+    parts = [i for i, tick in enumerate(run.ticks) if tick.track.shot == shot]
+    start_us = run.ticks[parts[0]].packet.start_us
+    painted = _turned_back(run, parts, start_us, _vector(shown_estimate(run.ticks[parts[-1]])[0]))
+    middle = painted.normals.sum(axis=0)
+    return middle if np.linalg.norm(middle) > 0 else np.array([0.0, 0.0, -1.0])
+
+
+def _full(counts: Floats) -> float:
+    """The count that is shown in full colour: what a tenth of the marked places exceed."""
+    marked = counts[counts > 0]
+    return float(np.quantile(marked, 0.9)) if marked.size else 0.0
+
+
+def _texture(painted: _Painted, texels: Floats) -> NDArray[np.uint8]:
+    counts = sampled(density(painted.normals), texels)
+    strength = tone(counts, _full(counts))[..., None]
+    return (WHITE + strength * (PAINT - WHITE)).astype(np.uint8)
+
+
+def _discs(painted: _Painted | None, directions: Floats, mask: NDArray[np.bool_]) -> bytes:
+    """PNG of the two halves of the ball, ON and OFF in their colours."""
+    picture = np.where(mask[..., None], DISC, at.BACKGROUND).astype(np.float64)
+    if painted is not None:
+        for polarity, colour in ((True, at.ON), (False, at.OFF)):
+            counts = sampled(density(painted.normals[painted.on == polarity]), directions) * mask
+            picture += tone(counts, _full(counts))[..., None] * (np.array(colour) - DISC)
+    rgb = picture.clip(0, 255).astype(np.uint8)
+    return bytes(cv2.imencode(".png", rgb[..., ::-1])[1])

@@ -1,0 +1,304 @@
+"""The blueprint: five tabs over the same data, in slow motion, paused where the track starts."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+
+from . import LAYOUTS
+from . import entities as at
+from .ball import path_bounds_m
+from .run import Run
+
+Floats = NDArray[np.float64]
+
+SLOW_MOTION = 0.01  # a flight of 100 ms plays for 10 s
+NAMES = {
+    "all": "All stages",
+    "tracker": "Tracker",
+    "logo": "Logo and flow",
+    "spin": "Spin",
+    "coach": "Coach",
+}
+
+
+def blueprint(run: Run, layout: str) -> rrb.Blueprint:
+    """All tabs, with the one of `layout` (a key of NAMES) in front."""
+    makers = {"all": _all, "tracker": _tracker, "logo": _logo, "spin": _spin, "coach": _coach}
+    tabs = [makers[name](run) for name in LAYOUTS]
+    end_us = run.shots[0].end_us if run.shots else run.end_us
+    return rrb.Blueprint(
+        rrb.Tabs(*tabs, active_tab=LAYOUTS.index(layout)),
+        rrb.TopPanel(state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(
+            state="collapsed",
+            timeline=at.TIMELINE,
+            playback_speed=SLOW_MOTION,
+            play_state="paused",
+            loop_mode="selection",
+            time_selection=rrb.components.AbsoluteTimeRange(min=run.first_sight_us * 1000, max=end_us * 1000),
+        ),
+        auto_layout=False,
+        auto_views=False,
+    )
+
+
+def _all(run: Run) -> rrb.Container:
+    return rrb.Vertical(
+        rrb.Horizontal(_events(run), _surface(run), _close_up(run), _space(run), column_shares=[4, 4, 3, 3]),
+        rrb.Horizontal(
+            rrb.Vertical(_status(), _state_tabs(run), row_shares=[1, 3]),
+            _logo_events(run),
+            rrb.Horizontal(_flow(run), _wheel(), column_shares=[3, 1]),
+            _still(),
+            column_shares=[4, 3, 4, 4],
+        ),
+        rrb.Horizontal(_rate(), _magnitude(run), _ball(run), _summary(), column_shares=[4, 4, 3, 5]),
+        name=NAMES["all"],
+    )
+
+
+def _tracker(run: Run) -> rrb.Container:
+    return rrb.Horizontal(
+        rrb.Vertical(
+            _surface(run), rrb.Horizontal(_close_up(run), _events(run), column_shares=[2, 3]), row_shares=[3, 2]
+        ),
+        rrb.Vertical(
+            _status(), *(_state_plot(run, name) for name in at.QUANTITIES), row_shares=[1.2, 2, 2, 2, 2, 2]
+        ),
+        rrb.Vertical(*(_residual(run, name) for name in ("x", "y", "radius")), _event_count()),
+        column_shares=[5, 4, 3],
+        name=NAMES["tracker"],
+    )
+
+
+def _logo(run: Run) -> rrb.Container:
+    return rrb.Horizontal(
+        rrb.Vertical(_logo_events(run), _close_up(run)),
+        rrb.Vertical(rrb.Horizontal(_flow(run), _wheel(), column_shares=[3, 1]), _still()),
+        rrb.Vertical(_rate(), _rhythm(), _magnitude(run)),
+        column_shares=[3, 4, 4],
+        name=NAMES["logo"],
+    )
+
+
+def _spin(run: Run) -> rrb.Container:
+    plots = [_magnitude(run), _parts(run)]
+    if run.truth is not None:
+        plots.append(_axis_error())
+    return rrb.Horizontal(
+        rrb.Vertical(_ball(run), _still(), row_shares=[3, 2]),
+        rrb.Vertical(*plots),
+        _summary(),
+        column_shares=[4, 4, 4],
+        name=NAMES["spin"],
+    )
+
+
+def _coach(run: Run) -> rrb.Container:
+    return rrb.Horizontal(
+        _ball(run, "Ball and spin"),
+        rrb.Vertical(_card(), _space(run, "Flight"), row_shares=[3, 2]),
+        column_shares=[3, 2],
+        name=NAMES["coach"],
+    )
+
+
+def _image_view(run: Run, name: str, contents: list[str]) -> rrb.Spatial2DView:
+    width, height = run.camera.width_px, run.camera.height_px
+    bounds = rrb.VisualBounds2D(x_range=[-0.5, width - 0.5], y_range=[-0.5, height - 0.5])
+    return rrb.Spatial2DView(
+        origin=at.IMAGE, contents=contents, name=name, background=at.BACKGROUND, visual_bounds=bounds
+    )
+
+
+def _ball_view(run: Run, name: str, contents: list[str], radii: float) -> rrb.Spatial2DView:
+    """A view that moves with the ball and shows that many radii around it."""
+    half = radii * run.largest_radius_px
+    bounds = rrb.VisualBounds2D(x_range=[-half, half], y_range=[-half, half])
+    return rrb.Spatial2DView(
+        origin=at.BALL_PLACE, contents=contents, name=name, background=at.BACKGROUND, visual_bounds=bounds
+    )
+
+
+CIRCLES = [at.HOUGH, at.MEASURED, at.KALMAN, at.TRUE_CIRCLE]
+
+
+def _events(run: Run) -> rrb.View:
+    return _image_view(run, "Raw events: ON red, OFF blue, dim = filtered out", [at.EVENTS])
+
+
+def _surface(run: Run) -> rrb.View:
+    name = "Surface: Hough yellow, refined orange, Kalman green"
+    return _image_view(run, name + (", truth dashed" if run.truth is not None else ""), [at.SURFACE, *CIRCLES])
+
+
+def _close_up(run: Run) -> rrb.View:
+    return _ball_view(run, "Surface around the ball", [at.SURFACE, *CIRCLES], 2.4)
+
+
+def _logo_events(run: Run) -> rrb.View:
+    contents = [at.LOGO, at.LOGO_OUTLINE, at.LOGO_MASK]
+    return _ball_view(run, "Logo events in the ball's frame", contents, 1.25)
+
+
+def _flow(run: Run) -> rrb.View:
+    return _ball_view(run, "Flow (Triplet Matching)", [at.FLOW, at.LOGO_OUTLINE], 1.25)
+
+
+def _wheel() -> rrb.View:
+    return rrb.Spatial2DView(origin=at.FLOW_WHEEL, name="Colours", background=at.BACKGROUND)
+
+
+def _still() -> rrb.View:
+    name = "Logo with the spin taken out: sharp = right (left: front, right: back)"
+    return rrb.Spatial2DView(origin=at.STILL_LOGO, name=name, background=at.BACKGROUND)
+
+
+def _plot(
+    origin: str, name: str, y_range: tuple[float, float] | None = None, corner: str = "LeftTop"
+) -> rrb.TimeSeriesView:
+    return rrb.TimeSeriesView(
+        origin=origin,
+        name=name,
+        axis_x=rrb.TimeAxis(link="LinkToGlobal"),
+        axis_y=None if y_range is None else rrb.ScalarAxis(range=y_range),
+        plot_legend=rrb.PlotLegend(corner=corner),
+    )
+
+
+def _status() -> rrb.View:
+    return rrb.StateTimelineView(
+        origin=at.STATUS, name="Tracker", time_view=rrb.TimeAxis(link="LinkToGlobal")
+    )
+
+
+def _state_plot(run: Run, name: str) -> rrb.View:
+    column = at.QUANTITIES.index(name)
+    titles = {"x": "x", "y": "y", "vx": "Velocity x", "vy": "Velocity y", "radius": "Radius"}
+    deviation = np.sqrt(run.variances[:, column])
+    values = [run.means[:, column] - deviation, run.means[:, column] + deviation]
+    if name in ("x", "y", "radius"):
+        for kind in ("hough", "measured"):
+            circles = [getattr(tick.track, kind) for tick in run.ticks if tick.track.has_ball]
+            values.append(np.array([getattr(c, f"{name}_px") for c in circles if c is not None]))
+    return _plot(f"{at.PLOT}/{name}", f"{titles[name]} [{at.UNITS[column]}]", _range(np.concatenate(values)))
+
+
+def _state_tabs(run: Run) -> rrb.Container:
+    return rrb.Tabs(*(_state_plot(run, name) for name in at.QUANTITIES), active_tab=0)
+
+
+def _residual(run: Run, name: str) -> rrb.View:
+    column = at.QUANTITIES.index(name)
+    widest = np.sqrt(run.variances[:, column])
+    measured = [getattr(tick.track.measured, f"{name}_px", np.nan) for tick in run.ticks] - run.means[:, column]
+    return _plot(
+        f"{at.RESIDUAL}/{name}", f"{name} less Kalman [px]", _range(np.concatenate([widest, -widest, measured]))
+    )
+
+
+def _event_count() -> rrb.View:
+    return _plot(at.EVENT_COUNT, "Event rate, whole sensor [Mev/s]")
+
+
+def _rate() -> rrb.View:
+    return _plot(at.RATE, "Logo's event rate [kev/s]")
+
+
+def _rhythm() -> rrb.View:
+    return _plot(at.RHYTHM, "Rhythm of the rate [kev/s] and its falling zero crossings")
+
+
+def _magnitude(run: Run) -> rrb.View:
+    values = [e.magnitude_rps for tick in run.ticks for e in tick.spin.estimates.values()]
+    values += [tick.rate.spin_rps for tick in run.ticks]
+    known = np.array([value for value in values if value is not None])
+    top = 1.3 * float(np.quantile(known, 0.95)) if known.size else 100.0
+    if run.truth is not None:
+        top = max(top, 1.3 * float(np.linalg.norm(run.truth.spin_rps, axis=1).max()))
+    return _plot(at.SPIN_MAGNITUDE, "Spin [rps], ± 1σ", (0.0, top))
+
+
+def _parts(run: Run) -> rrb.View:
+    return _plot(at.SPIN_PARTS, "Trusted spin vector, camera frame [rps]")
+
+
+def _axis_error() -> rrb.View:
+    return _plot(at.AXIS_ERROR, "Angle between axis and truth [°]", (0.0, 45.0))
+
+
+def _summary() -> rrb.View:
+    return rrb.TextDocumentView(origin=at.SUMMARY, name="Summary")
+
+
+def _card() -> rrb.View:
+    width, height = 900, 900
+    bounds = rrb.VisualBounds2D(x_range=[0, width], y_range=[0, height])
+    return rrb.Spatial2DView(origin=at.COACH, name="Shot", background=at.BACKGROUND, visual_bounds=bounds)
+
+
+def _range(values: Floats) -> tuple[float, float] | None:
+    """The values' range with a tenth to spare on either side; None for no values."""
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return None
+    low, high = float(known.min()), float(known.max())
+    spare = 0.1 * (high - low) or 1.0
+    return low - spare, high + spare
+
+
+def _ball(run: Run, name: str = "Ball: logo painted on, spin arrows") -> rrb.View:
+    """The ball from close by, from above the line of sight; moving along with it."""
+    eye = _tilted(np.zeros(3), 5.5 * run.ball_radius_m, run)
+    return rrb.Spatial3DView(
+        origin=at.BALL,
+        contents=[f"{at.BALL}/**", at.PATH],
+        name=name,
+        background=at.BACKGROUND,
+        line_grid=False,
+        eye_controls=eye,
+        time_ranges=_so_far(),
+    )
+
+
+def _space(run: Run, name: str = "Flight path, grid 0.1 m") -> rrb.View:
+    """The flight from above, tilted: right is the image's right, near is the image's lower edge."""
+    low, high = path_bounds_m(run)
+    middle, size = (low + high) / 2, max(float(np.linalg.norm(high - low)), 0.3)
+    up = np.array(run.camera.up)
+    below = min(float(low @ up), float(high @ up)) - 2 * run.ball_radius_m
+    return rrb.Spatial3DView(
+        origin=at.WORLD,
+        contents=[f"{at.WORLD}/**"],
+        name=name,
+        background=at.BACKGROUND,
+        line_grid=rrb.LineGrid3D(
+            visible=True, spacing=0.1, plane=rr.components.Plane3D(tuple(up), below), stroke_width=1.0
+        ),
+        eye_controls=_tilted(middle, 1.1 * size, run),
+        time_ranges=_so_far(),
+    )
+
+
+def _tilted(target: Floats, distance_m: float, run: Run) -> rrb.EyeControls3D:
+    """Look at the target as the camera does, tilted by 40 degrees towards the image's lower edge."""
+    tilt = np.radians(40)
+    away = np.array([0.0, np.sin(tilt), -np.cos(tilt)])
+    return rrb.EyeControls3D(
+        kind=rrb.Eye3DKind.Orbital,
+        position=target + distance_m * away,
+        look_target=target,
+        eye_up=(0.0, -np.cos(tilt), -np.sin(tilt)),
+    )
+
+
+def _so_far() -> rrb.VisibleTimeRange:
+    """Everything up to the playhead: the path keeps its earlier pieces."""
+    return rrb.VisibleTimeRange(
+        at.TIMELINE, start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.cursor_relative()
+    )

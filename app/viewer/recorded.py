@@ -1,0 +1,37 @@
+"""A run as an .rrd file."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from pipeline.errors import RecordingError
+
+from .ball import ball_chunks
+from .layouts import blueprint
+from .rerun_api import Chunk, file_with
+from .run import Run
+from .stages import STAGES
+from .summary import summary_chunks
+
+
+def chunks(run: Run) -> list[Chunk]:
+    """Everything there is to see of a run."""
+    return [chunk for stage in (*STAGES, ball_chunks, summary_chunks) for chunk in stage(run)]
+
+
+def write_rrd(run: Run, path: Path, layout: str) -> None:
+    """Write the run and its layouts, whole or not at all; raises RecordingError when that fails."""
+    made = chunks(run)
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        unfinished.touch()  # Rerun's own message for a path that cannot be written is no help
+        file_with(made, blueprint(run, layout), unfinished, run.name)
+        unfinished.replace(path)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise RecordingError(
+            f"cannot write the .rrd file ({reason}): choose another place with --save: {path}"
+        ) from None
+    finally:
+        unfinished.unlink(missing_ok=True)

@@ -1,0 +1,133 @@
+"""Rerun's API as Spinscope uses it; everything that Rerun calls experimental or unstable is used here alone.
+
+Columns only: one chunk an entity, never a call a row.
+"""
+
+from __future__ import annotations
+
+import os
+import uuid
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+from rerun.chunk import Chunk
+
+from .entities import APPLICATION, TIMELINE, Colour
+
+__all__ = ["Chunk", "band", "columns_at", "file_with", "line", "points", "once", "states", "time_column"]
+
+
+def time_column(t_us: NDArray[np.int64] | NDArray[np.float64]) -> rr.TimeColumn:
+    """File time on the timeline, to the nanosecond: the viewer shows it as seconds, 105 000 us as 0.105 000 s."""
+    nanoseconds = np.round(np.asarray(t_us) * 1000).astype(np.int64)
+    return rr.TimeColumn(TIMELINE, duration=nanoseconds.astype("timedelta64[ns]"))
+
+
+def columns_at(
+    entity: str,
+    t_us: NDArray[np.int64] | NDArray[np.float64],
+    columns: Any,
+    lengths: Sequence[int] | NDArray[np.int64] | None = None,
+) -> Chunk:
+    """One row a time; with `lengths`, that many instances a row (0 = nothing to be seen from then on)."""
+    if lengths is not None:
+        columns = columns.partition(np.asarray(lengths))
+    return Chunk.from_columns(entity, indexes=[time_column(t_us)], columns=columns)
+
+
+def once(entity: str, *archetypes: rr.AsComponents) -> Chunk:
+    """What does not change with time."""
+    batches = [batch for archetype in archetypes for batch in archetype.as_component_batches()]
+    columns = [batch.partition([len(batch.as_arrow_array())]) for batch in batches]
+    return Chunk.from_columns(entity, indexes=[], columns=columns)
+
+
+def line(
+    entity: str,
+    t_us: NDArray[Any],
+    values: NDArray[np.float64],
+    name: str,
+    colour: Colour,
+    width: float = 1.5,
+    steps: bool = False,
+) -> list[Chunk]:
+    """A line in a plot; NaN makes a gap."""
+    style = rr.SeriesLines(
+        names=name,
+        colors=[colour],
+        widths=width,
+        interpolation_mode="StepAfter" if steps else "Linear",
+        aggregation_policy="Off",
+    )
+    return [columns_at(entity, t_us, rr.Scalars.columns(scalars=values)), once(entity, style)]
+
+
+def points(
+    entity: str,
+    t_us: NDArray[Any],
+    values: NDArray[np.float64],
+    name: str,
+    colour: Colour,
+    marker: str = "circle",
+    size: float = 3.0,
+) -> list[Chunk]:
+    """Dots in a plot; NaN leaves one out."""
+    style = rr.SeriesPoints(names=name, colors=[colour], markers=marker, marker_sizes=size)
+    return [columns_at(entity, t_us, rr.Scalars.columns(scalars=values)), once(entity, style)]
+
+
+def band(
+    entity: str,
+    t_us: NDArray[Any],
+    values: NDArray[np.float64],
+    variances: NDArray[np.float64],
+    name: str,
+    unit: str,
+    colour: Colour,
+) -> list[Chunk]:
+    """A line in a plot with a translucent band of +-1 sigma; NaN makes a gap."""
+    style = rr.Measurements.from_fields(
+        names=name, units=unit, colors=[colour], widths=1.5, aggregation_policy="Off"
+    )
+    columns = rr.Measurements.columns(values=values, variances=variances)
+    return [columns_at(entity, t_us, columns), once(entity, style)]
+
+
+def states(entity: str, t_us: NDArray[Any], names: Sequence[str], colours: dict[str, Colour]) -> list[Chunk]:
+    """A lane of states over time: a row where the state changes."""
+    changed = [i for i, name in enumerate(names) if i == 0 or name != names[i - 1]]
+    style = rr.StateConfiguration(
+        values=list(colours), labels=list(colours), colors=[(*colour, 255) for colour in colours.values()]
+    )
+    columns = rr.StateChange.columns(state=[names[i] for i in changed])
+    return [columns_at(entity, np.asarray(t_us)[changed], columns), once(entity, style)]
+
+
+def file_with(chunks: Iterable[Chunk], blueprint: rrb.Blueprint, path: Path, name: str) -> None:
+    """Write an .rrd with the layouts in it, which become the active ones when it is opened.
+
+    Each recording stream leaves a few idle threads behind: fine for a file a run, not for one a slider's move.
+    """
+    recording = rr.RecordingStream(APPLICATION, recording_id=str(uuid.uuid4()))
+    recording.save(path)
+    try:
+        recording.send_blueprint(blueprint, make_active=True, make_default=True)
+        recording.send_recording_name(name)
+        rr.send_chunks(list(chunks), recording=recording)
+    finally:
+        recording.disconnect()
+
+
+def quiet_environment() -> dict[str, str]:
+    """The environment for Rerun's own program: no usage data sent, without touching the user's settings of Rerun.
+
+    Rerun sends none on a build server, which it knows by CI; RERUN_APP_ONLY skips its welcome.
+    """
+    environment = {**os.environ, "CI": "true", "RERUN_APP_ONLY": "true", "RUST_LOG": "error"}
+    environment.pop("FORCE_RERUN_ANALYTICS", None)
+    return environment

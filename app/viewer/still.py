@@ -1,0 +1,100 @@
+"""The logo with the spin taken out: events gathered on the ball's surface, turned back to one moment.
+
+A logo that stands still and sharp is the visual proof of a right spin; a wrong one smears it.
+
+The body frame is the camera frame at the shot's start, turning with the ball from then on.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+# Cells along the cube around the unit sphere: 1.8 degrees, half of what a pixel covers on a ball of 20 px radius.
+CELLS = 64
+TEXTURE_PX = (192, 96)  # 1.9 degrees a texel
+DISC_PX = 160
+GAP_PX = 12
+
+
+def turned(vectors: Floats, spin_rps: Floats, seconds: Floats) -> Floats:
+    """(n, 3) vectors, each turned by the spin (3,) for its own time (n,) (Rodrigues' formula)."""
+    magnitude = float(np.linalg.norm(spin_rps))
+    if magnitude == 0:
+        return vectors
+    axis = spin_rps / magnitude
+    angle = (2 * np.pi * magnitude) * seconds[:, None]
+    along = (vectors @ axis)[:, None] * axis
+    turned_vectors: Floats = along + np.cos(angle) * (vectors - along) + np.sin(angle) * np.cross(axis, vectors)
+    return turned_vectors
+
+
+def density(normals: Floats) -> Floats:
+    """How often the unit vectors (n, 3) fall in each cell of the cube, smoothed: (CELLS**3,) float64."""
+    cells = ((normals + 1) * (0.5 * CELLS)).astype(np.int64).clip(0, CELLS - 1)
+    flat = (cells[:, 0] * CELLS + cells[:, 1]) * CELLS + cells[:, 2]
+    counts = np.bincount(flat, minlength=CELLS**3).astype(np.float64).reshape(CELLS, CELLS, CELLS)
+    for axis in range(3):  # weights 1 2 1 along each side
+        counts = 2 * counts + np.roll(counts, 1, axis) + np.roll(counts, -1, axis)
+    return (counts / 64).ravel()
+
+
+def sampled(smooth: Floats, directions: Floats) -> Floats:
+    """The density in unit directions (..., 3), linear between the centres of the cells."""
+    place = (directions + 1) * (0.5 * CELLS) - 0.5
+    cell = np.floor(place).astype(np.int64)
+    part = place - cell
+    found = np.zeros(directions.shape[:-1])
+    for corner in np.ndindex(2, 2, 2):
+        at = (cell + corner).clip(0, CELLS - 1)
+        weight = np.prod(np.where(np.array(corner), part, 1 - part), axis=-1)
+        found += weight * smooth[(at[..., 0] * CELLS + at[..., 1]) * CELLS + at[..., 2]]
+    return found
+
+
+def texture_directions() -> Floats:
+    """(height, width, 3) unit vectors in the body frame behind the texels of the ball's texture.
+
+    The middle of the texture is the point that faced the camera, right and down are the image's.
+    """
+    width, height = TEXTURE_PX
+    longitude = ((np.arange(width) + 0.5) / width - 0.5) * 2 * np.pi
+    latitude = ((np.arange(height) + 0.5) / height - 0.5) * np.pi
+    return sphere(longitude[None, :], latitude[:, None])
+
+
+def sphere(longitude: Floats, latitude: Floats) -> Floats:
+    """(..., 3) unit vectors: longitude to the right and latitude down, from the direction to the camera."""
+    longitude, latitude = np.broadcast_arrays(longitude, latitude)
+    across = np.cos(latitude)
+    return np.stack([across * np.sin(longitude), np.sin(latitude), -across * np.cos(longitude)], axis=-1)
+
+
+def disc_directions(middle: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """(height, width, 3) unit vectors behind the pixels of two discs, and which pixels lie on a disc.
+
+    The left disc is the half of the ball around `middle` as seen from outside, the right one the other half, as if
+    turned about the vertical. Up is the image's up, as far as it can be.
+    """
+    out = middle / np.linalg.norm(middle)
+    down = np.array([0.0, 1.0, 0.0]) if abs(out[1]) < 0.9 else np.array([0.0, 0.0, 1.0])
+    down = down - (down @ out) * out
+    down /= np.linalg.norm(down)
+    right = np.cross(down, -out)  # x right, y down, the third away from the viewer
+    side = (np.arange(DISC_PX) + 0.5) / DISC_PX * 2.1 - 1.05
+    x, y = np.meshgrid(side, side)
+    on_disc = x**2 + y**2 < 1
+    z = np.sqrt(np.clip(1 - x**2 - y**2, 0, None))
+    front = x[..., None] * right + y[..., None] * down + z[..., None] * out
+    back = -x[..., None] * right + y[..., None] * down - z[..., None] * out
+    gap = np.zeros((DISC_PX, GAP_PX, 3))
+    gap[..., 2] = 1
+    mask = np.hstack([on_disc, np.zeros((DISC_PX, GAP_PX), np.bool_), on_disc])
+    return np.hstack([front, gap, back]), mask
+
+
+def tone(counts: Floats, full: float) -> Floats:
+    """Counts as 0..1, `full` and more as 1; the square root lifts thin strokes."""
+    return np.sqrt(np.clip(counts / full, 0, 1)) if full > 0 else np.zeros_like(counts)

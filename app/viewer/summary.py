@@ -1,0 +1,180 @@
+"""The run in words: Markdown that follows the playhead, and a card of big numbers for the coach."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from pipeline.chain import Tick
+from pipeline.results import SpinEstimate
+from pipeline.shots import Shot
+
+from ..words import Kind, axis_words, kind_of_spin, km_h, rpm, speed_words, spin_words
+from . import entities as at
+from .rerun_api import Chunk, columns_at, once
+from .run import Run, shown_estimate
+
+Vector = NDArray[np.float64]
+
+CARD_PX = (900, 900)
+BIG_PX, WORDS_PX, SMALL_PX = 150, 92, 44
+TEXT, FAINT = (236, 240, 243), (140, 150, 160)
+# Kalman velocity needs a moment to settle; a flight's direction is told from this speed on.
+SLOWEST_M_S = 0.2
+
+
+def summary_chunks(run: Run) -> list[Chunk]:
+    """The summary and the card at the start and at the end of every tick."""
+    texts, cards = [_opening(run)], [_card(["–", "–", "no ball yet"], ["spin", "speed", run.no_shot_reason or ""])]
+    finals = {shot.end_us: shot for shot in run.shots}
+    result: list[str] = []
+    card = cards[0]
+    for tick in run.ticks:
+        velocity = _velocity_m_s(run, tick)
+        shot = finals.get(tick.packet.end_us)
+        if shot is not None:
+            velocity = None if run.fixed else shot.velocity_m_s(run.camera, run.ball_radius_m)
+            result = _shot_result(run, tick, shot, velocity)
+        if tick.track.has_ball:
+            card = _tick_card(run, tick, velocity)
+        texts.append("\n".join(_tick_text(run, tick, velocity, result)))
+        cards.append(card)
+    return [
+        columns_at(at.SUMMARY, run.times_us, rr.TextDocument.columns(text=texts)),
+        once(at.SUMMARY, rr.TextDocument.from_fields(media_type="text/markdown")),
+        columns_at(at.COACH, run.times_us, rr.EncodedImage.columns(blob=cards)),
+        once(at.COACH, rr.EncodedImage.from_fields(media_type="image/png")),
+    ]
+
+
+def _velocity_m_s(run: Run, tick: Tick) -> Vector | None:
+    """The ball's velocity across the line of sight at the end of the tick; None for a ball in place or without one.
+
+    The way towards the camera is left to the whole shot: in one tick the radius does not tell it.
+    """
+    if run.fixed or not tick.track.has_ball:
+        return None
+    step_s = 1e-3
+    ahead = tick.track.mean.copy()
+    ahead[:2] += tick.track.mean[2:4] * step_s
+    here, there = run.centre_m(np.stack([tick.track.mean, ahead]))
+    velocity: Vector = (there - here) / step_s
+    return velocity if np.linalg.norm(velocity) >= SLOWEST_M_S else None
+
+
+def _opening(run: Run) -> str:
+    """What is said before anything is known."""
+    lines = ["## No ball yet", "", f"`{run.name}`: {run.end_us - run.start_us:,} us from {run.start_us:,} us.", ""]
+    if run.no_shot_reason:
+        lines = ["## No ball in this recording", "", f"Because: **{run.no_shot_reason}**", "", *lines[2:]]
+    lines += [f"Warning: {warning}\n" for warning in run.warnings]
+    return "\n".join(lines)
+
+
+def _tick_text(run: Run, tick: Tick, velocity: Vector | None, result: list[str]) -> list[str]:
+    if not tick.track.has_ball:
+        if result:
+            return [*result, "", "---", f"Now: {tick.track.reason or 'no ball'}"]
+        return [_opening(run), "", f"Tracker: {tick.track.status}, {tick.track.reason or 'no ball'}"]
+    if result and run.shots and any(shot.end_us == tick.packet.end_us for shot in run.shots):
+        return result
+    return [*_headline(run, tick, velocity, "so far"), *_table(run, tick, velocity), *_evidence(run, tick)]
+
+
+def _shot_result(run: Run, tick: Tick, shot: Shot, velocity: Vector | None) -> list[str]:
+    """What the whole shot says."""
+    milliseconds = (shot.end_us - shot.start_us) / 1000
+    said = f"shot {shot.number + 1} of {len(run.shots)}, {milliseconds:.0f} ms"
+    return [*_headline(run, tick, velocity, said), *_table(run, tick, velocity), *_evidence(run, tick)]
+
+
+def _headline(run: Run, tick: Tick, velocity: Vector | None, said: str) -> list[str]:
+    """The answer in a heading, or that there is none yet and why."""
+    estimate, trusted = shown_estimate(tick)
+    lines = []
+    if estimate is not None and estimate.vector_rps is not None:
+        kind = kind_of_spin(estimate.vector_rps, velocity, run.camera.up)
+        doubt = "" if trusted else " (no method is trusted)"
+        lines += [f"## {estimate.magnitude_rps:.1f} rps · {kind.name}{doubt}", ""]
+        lines += [f"{kind.sentence}. **{rpm(estimate.magnitude_rps or 0):.0f} rpm**, {speed_words(velocity)}; {said}.", ""]  # fmt: skip
+    else:
+        reasons = {e.reason for e in tick.spin.estimates.values() if e.reason}
+        lines += ["## Spin not known", "", f"{speed_words(velocity)}; {said}. {'; '.join(sorted(reasons))}", ""]
+    return lines
+
+
+def _table(run: Run, tick: Tick, velocity: Vector | None) -> list[str]:
+    """Every method's answer or refusal, and the truth where there is one."""
+    lines = ["| method | spin | axis (x, y, z) | kind |", "|---|---|---|---|"]
+    for method, estimate in tick.spin.estimates.items():
+        name = f"**{method} ✔**" if tick.spin.best == method else method
+        kind = _kind(run, estimate, velocity)
+        lines.append(f"| {name} | {spin_words(estimate)} | {axis_words(estimate)} | {kind.name if kind else ''} |")
+    if run.truth is not None:
+        truth = run.true_values(np.array([tick.track.t_us]), run.truth.spin_rps)[0]
+        if np.isfinite(truth).all() and truth.any():
+            true_estimate = SpinEstimate("truth", truth, None, None)
+            kind = _kind(run, true_estimate, velocity)
+            lines.append(f"| truth | {spin_words(true_estimate)} | {axis_words(true_estimate)} | {kind.name if kind else ''} |")  # fmt: skip
+    return [*lines, ""]
+
+
+def _kind(run: Run, estimate: SpinEstimate, velocity: Vector | None) -> Kind | None:
+    if estimate.vector_rps is None:
+        return None
+    return kind_of_spin(estimate.vector_rps, velocity, run.camera.up)
+
+
+def _evidence(run: Run, tick: Tick) -> list[str]:
+    """What the answer stands on: the tracker, the logo, the rhythm."""
+    rate, flow = tick.rate, tick.flow
+    if rate.spin_rps is None:
+        rhythm = f"no rhythm in the event rate: {rate.reason}"
+    else:
+        rhythm = f"rhythm of the event rate {rate.spin_rps:.1f} ± {rate.spin_std_rps or 0:.1f} rps"
+    slices = "" if flow.t_acc_us is None else f", flow in slices of {flow.t_acc_us} us"
+    mean, deviation = tick.track.mean, np.sqrt(np.diag(tick.track.covariance))
+    return [
+        f"Tracker {tick.track.status}: centre ({mean[0]:.1f}, {mean[1]:.1f}) ± {deviation[:2].max():.1f} px, "
+        f"radius {mean[4]:.1f} ± {deviation[4]:.1f} px; {len(tick.logo.events)} logo events in this tick.",
+        "",
+        f"{rhythm[0].upper()}{rhythm[1:]}{slices}.",
+    ]
+
+
+def _tick_card(run: Run, tick: Tick, velocity: Vector | None) -> bytes:
+    """Spin, speed and kind, each in big letters with its small print."""
+    estimate, trusted = shown_estimate(tick)
+    speed = None if velocity is None else float(np.linalg.norm(velocity))
+    speed_big = "in place" if run.fixed else "–" if speed is None else f"{km_h(speed):.0f} km/h"
+    speed_small = "" if speed is None else f"{speed:.1f} m/s"
+    if estimate is None or estimate.vector_rps is None or not trusted:
+        return _card(["–", speed_big, "spin not known"], ["", speed_small, "yet, or too little to trust"])
+    kind = kind_of_spin(estimate.vector_rps, velocity, run.camera.up)
+    magnitude, std = estimate.magnitude_rps or 0.0, estimate.magnitude_std_rps
+    margin = "" if std is None else f" ± {rpm(std):.0f}"
+    rest = kind.sentence.removeprefix(kind.name).strip(" ,")
+    return _card(
+        [f"{magnitude:.0f} rps", speed_big, kind.name],
+        [f"{rpm(magnitude):.0f}{margin} rpm", speed_small, rest],
+    )
+
+
+def _card(big: list[str], small: list[str]) -> bytes:
+    """PNG of three blocks, each a line in big letters and one in small ones."""
+    picture = Image.new("RGB", CARD_PX, at.BACKGROUND)
+    draw = ImageDraw.Draw(picture)
+    height = CARD_PX[1] // 3
+    for block, (first, second) in enumerate(zip(big, small, strict=True)):
+        size = BIG_PX
+        while draw.textlength(first, font=ImageFont.load_default(size)) > CARD_PX[0] - 80:
+            size -= 6
+        draw.text((40, block * height + 40), first, TEXT, font=ImageFont.load_default(size))
+        draw.text((46, block * height + 40 + 1.25 * size), second, FAINT, font=ImageFont.load_default(SMALL_PX))
+    file = io.BytesIO()
+    picture.save(file, "PNG")
+    return file.getvalue()

@@ -1,0 +1,193 @@
+"""What the tuner's page shows in the embedded viewer: a run, or two runs A and B, as the bytes of an .rrd.
+
+A slider's move makes a new recording of the same application, so that the viewer keeps its layout. What a stage
+looks like is drawn again only when something above it changed.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import rerun as rr
+import rerun.blueprint as rrb
+from rerun.chunk import ChunkStore
+
+from . import entities as at
+from .ball import ball_chunks
+from .layouts import NAMES, blueprint
+from .rerun_api import Chunk, columns_at, once
+from .run import Run
+from .stages import STAGES
+from .summary import summary_chunks
+
+Drawer = Callable[[Run], list[Chunk]]
+
+A = "/A"
+COMPARED = "/compare"
+COMPARE_NAME = "Compare"
+KEPT_BYTES = 120_000_000  # some forty surfaces' worth of pictures
+# Series of A are drawn in the colour of the same series of B, mixed with this.
+PALE, PALENESS = (235, 235, 235), 0.55
+
+# Each drawer with the last stage whose results it shows: what comes later cannot change its picture.
+DRAWERS: tuple[tuple[Drawer, str], ...] = (
+    *zip(STAGES, ("filter", "surface", "track", "logo", "rate", "flow", "spin"), strict=True),
+    (ball_chunks, "spin"),
+    (summary_chunks, "spin"),
+)
+
+
+class Drawings:
+    """Chunks already made, by what they show; shared by threads. The oldest go when there are too many."""
+
+    def __init__(self, budget_bytes: int = KEPT_BYTES) -> None:
+        self._budget_bytes = budget_bytes
+        self._made: OrderedDict[Hashable, tuple[list[Chunk], int]] = OrderedDict()
+        self._bytes = 0
+        self._lock = threading.Lock()
+
+    def chunks(self, run: Run, key: Callable[[str], Hashable]) -> list[Chunk]:
+        """Everything there is to see of a run.
+
+        key : tells what a stage's results were made from, by the stage's name; two runs with the same key look alike
+        """
+        made: list[Chunk] = []
+        for number, (drawer, stage) in enumerate(DRAWERS):
+            made += self._drawn(drawer, run, (number, len(run.ticks), key(stage)))
+        return made
+
+    def _drawn(self, drawer: Drawer, run: Run, key: Hashable) -> list[Chunk]:
+        with self._lock:
+            if key in self._made:
+                self._made.move_to_end(key)
+                return self._made[key][0]
+        drawn = drawer(run)
+        size = sum(chunk.to_record_batch().nbytes for chunk in drawn)
+        with self._lock:
+            if key not in self._made:
+                self._made[key] = drawn, size
+                self._bytes += size
+            while self._bytes > self._budget_bytes and len(self._made) > 1:
+                _, (_, freed) = self._made.popitem(last=False)
+                self._bytes -= freed
+        return drawn
+
+
+def compared(a: Sequence[Chunk]) -> list[Chunk]:
+    """The chunks of run A beside those of run B: under the prefix /A, paler, and named "A: ..." in plots."""
+    moved = [chunk.with_entity_path(A + chunk.entity_path) for chunk in a]
+    return [*moved, *(_pale(chunk) for chunk in moved if chunk.is_static and chunk.entity_path.startswith(f"{A}/plots"))]
+
+
+def _pale(style: Chunk) -> Chunk:
+    """The style of a series, laid over its own: what is written later holds."""
+    batch = style.to_record_batch()
+    names = {field.name.split(":")[-1]: field.name for field in batch.schema}
+    archetype = next(name.split(":")[0] for name in batch.schema.names if ":" in name)
+    name = batch.column(names["names"])[0].as_py()[0]
+    colour = batch.column(names["colors"])[0].as_py()[0] >> 8
+    parts = [(colour >> shift) & 255 for shift in (16, 8, 0)]
+    pale = [round(part + PALENESS * (light - part)) for part, light in zip(parts, PALE, strict=True)]
+    made = getattr(rr, archetype).from_fields(names=f"A: {name}", colors=[(*pale, 255)])
+    return once(style.entity_path, made)
+
+
+def rrd_bytes(chunks: Sequence[Chunk], recording_id: str) -> bytes:
+    """The chunks as one recording of this id, without a layout."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "run.rrd"
+        ChunkStore.from_chunks(list(chunks)).write_rrd(
+            path, application_id=at.APPLICATION, recording_id=recording_id
+        )
+        return path.read_bytes()
+
+
+def layout_bytes(run: Run, layout: str = "all") -> bytes:
+    """The blueprint of the page's viewer: the tabs of every viewer, and one for A beside B."""
+    made = blueprint(run, layout)
+    tabs = list(made.root_container.contents)
+    tabs.insert(len(tabs) - 1, _compare(run))
+    made.root_container.contents = tabs
+    if layout == "coach":
+        made.root_container.active_tab = len(tabs) - 1
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "page.rbl"
+        made.save(at.APPLICATION, path)
+        return path.read_bytes()
+
+
+def tab_names() -> list[str]:
+    """The names of the tabs, in order."""
+    names = list(NAMES.values())
+    return [*names[:-1], COMPARE_NAME, names[-1]]
+
+
+def note_without_a(run: Run) -> list[Chunk]:
+    """What the Compare tab says while nothing is pinned."""
+    text = "## Nothing to compare yet\n\nPress **Pin as A** beside the viewer, then go on turning knobs: that is B."
+    return _note(run, text)
+
+
+def note_with_a(run: Run, text: str) -> list[Chunk]:
+    """The Compare tab's words about A and B."""
+    return _note(run, text)
+
+
+def _note(run: Run, text: str) -> list[Chunk]:
+    times = run.times_us[:1]
+    return [
+        columns_at(COMPARED, times, rr.TextDocument.columns(text=[text])),
+        once(COMPARED, rr.TextDocument.from_fields(media_type="text/markdown")),
+    ]
+
+
+def _compare(run: Run) -> rrb.Container:
+    """A's and B's pictures side by side, their curves in the same plots."""
+    return rrb.Vertical(
+        rrb.Horizontal(
+            _picture(run, A, "A: surface and circles"),
+            _picture(run, "", "B: surface and circles"),
+            _still(A, "A: logo with the spin taken out"),
+            _still("", "B: logo with the spin taken out"),
+            column_shares=[3, 3, 2, 2],
+        ),
+        rrb.Horizontal(
+            _plots("x", "x [px], A pale"),
+            _plots("radius", "Radius [px], A pale"),
+            _plots("spin", "Spin [rps], A pale"),
+            rrb.TextDocumentView(origin=COMPARED, name="What differs"),
+            column_shares=[3, 3, 3, 2],
+        ),
+        name=COMPARE_NAME,
+    )
+
+
+def _picture(run: Run, prefix: str, name: str) -> rrb.View:
+    half = 2.4 * run.largest_radius_px
+    circles = [prefix + path for path in (at.SURFACE, at.HOUGH, at.MEASURED, at.KALMAN, at.TRUE_CIRCLE)]
+    return rrb.Spatial2DView(
+        origin=prefix + at.BALL_PLACE,
+        contents=circles,
+        name=name,
+        background=at.BACKGROUND,
+        visual_bounds=rrb.VisualBounds2D(x_range=[-half, half], y_range=[-half, half]),
+    )
+
+
+def _still(prefix: str, name: str) -> rrb.View:
+    return rrb.Spatial2DView(origin=prefix + at.STILL_LOGO, name=name, background=at.BACKGROUND)
+
+
+def _plots(quantity: str, name: str) -> rrb.View:
+    path = f"{at.PLOT}/{quantity}"
+    return rrb.TimeSeriesView(
+        origin="/",
+        contents=[f"{path}/**", f"{A}{path}/**"],
+        name=name,
+        axis_x=rrb.TimeAxis(link="LinkToGlobal"),
+        plot_legend=rrb.PlotLegend(corner="LeftTop"),
+    )

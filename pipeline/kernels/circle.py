@@ -1,0 +1,142 @@
+"""Circles in an image: the Hough vote and its peak (section 3.1)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Votes = NDArray[np.uint16]
+
+
+@njit(cache=True, nogil=True)
+def vote(
+    votes: Votes,
+    x_px: NDArray[np.int64],
+    y_px: NDArray[np.int64],
+    x0_px: int,
+    y0_px: int,
+    radius0_px: int,
+) -> None:
+    """Hough circle transform: each pixel votes for every circle that runs through it; adds into votes.
+
+    votes : (height, width, radii) uint16; votes[b, a, k] counts the pixels whose distance from the centre
+        (x0 + a, y0 + b) rounds to radius0 + k, k >= 0
+    x_px, y_px : (n,) int64, the pixels
+    """
+    height, width, radii = votes.shape
+    reach = radius0_px + radii - 1
+    for i in range(x_px.size):
+        x = x_px[i] - x0_px
+        y = y_px[i] - y0_px
+        for b in range(max(0, y - reach), min(height, y + reach + 1)):
+            dy2 = (y - b) * (y - b)
+            for a in range(max(0, x - reach), min(width, x + reach + 1)):
+                k = int(math.sqrt((x - a) * (x - a) + dy2) + 0.5) - radius0_px
+                if 0 <= k < radii:
+                    votes[b, a, k] += np.uint16(1)
+
+
+@njit(cache=True, nogil=True)
+def peak(votes: Votes, radius0_px: int) -> tuple[float, int, int, int]:
+    """The best supported circle: (support, a, b, k), its indices in the votes.
+
+    The support is votes^2 / (2 pi radius): the number of votes times the share of the outline that they fill,
+    so that neither a short arc of a large circle nor a full but tiny one wins. (0, 0, 0, 0) without votes.
+    """
+    best, best_a, best_b, best_k = 0.0, 0, 0, 0
+    for b in range(votes.shape[0]):
+        for a in range(votes.shape[1]):
+            for k in range(votes.shape[2]):
+                count = float(votes[b, a, k])
+                if count > 0.0:
+                    support = count * count / (2.0 * math.pi * max(radius0_px + k, 1))
+                    if support > best:
+                        best, best_a, best_b, best_k = support, a, b, k
+    return best, best_a, best_b, best_k
+
+
+@njit(cache=True, nogil=True)
+def bright_pixels(
+    image: NDArray[np.uint8], least: int, most_pixels: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Columns and rows (m,) int64 of the pixels of at least this value, thinned evenly to about most_pixels."""
+    count = 0
+    for y in range(image.shape[0]):
+        for x in range(image.shape[1]):
+            if image[y, x] >= least:
+                count += 1
+    stride = max(1, -(-count // max(most_pixels, 1)))
+    xs = np.empty(-(-count // stride), np.int64)
+    ys = np.empty(xs.size, np.int64)
+    seen = 0
+    for y in range(image.shape[0]):
+        for x in range(image.shape[1]):
+            if image[y, x] >= least:
+                if seen % stride == 0:
+                    xs[seen // stride] = x
+                    ys[seen // stride] = y
+                seen += 1
+    return xs, ys
+
+
+@njit(cache=True, nogil=True)
+def active_cells(
+    values: NDArray[np.uint8],
+    x_px: NDArray[np.uint16],
+    y_px: NDArray[np.uint16],
+    least: int,
+    cell_px: int,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Cells of cell_px x cell_px pixels in which one of these pixels is at least `least` in values (h, w) uint8.
+
+    Returns columns and rows (m,) int64 of the cells, rising by row, then column. Cells without an active
+    neighbour among their eight are left out: what remains of the noise is isolated.
+    """
+    bright = 0
+    for i in range(x_px.size):
+        bright += values[y_px[i], x_px[i]] >= least
+    if bright < 2:
+        return np.empty(0, np.int64), np.empty(0, np.int64)
+    rows = -(-values.shape[0] // cell_px)
+    columns = -(-values.shape[1] // cell_px)
+    active = np.zeros((rows + 2, columns + 2), np.uint8)
+    for i in range(x_px.size):
+        if values[y_px[i], x_px[i]] >= least:
+            active[y_px[i] // cell_px + 1, x_px[i] // cell_px + 1] = 1
+    xs = np.empty(rows * columns, np.int64)
+    ys = np.empty(rows * columns, np.int64)
+    m = 0
+    for b in range(1, rows + 1):
+        for a in range(1, columns + 1):
+            if active[b, a]:
+                around = 0
+                for j in range(b - 1, b + 2):
+                    for i in range(a - 1, a + 2):
+                        around += active[j, i]
+                if around > 1:
+                    xs[m] = a - 1
+                    ys[m] = b - 1
+                    m += 1
+    return xs[:m].copy(), ys[:m].copy()
+
+
+@njit(cache=True, nogil=True)
+def refined(votes: Votes, a: int, b: int, k: int) -> tuple[float, float, float]:
+    """(a, b, k) of a peak to sub-pixel: the votes' centre of mass in the 3 x 3 x 3 around it, clipped to the votes."""
+    height, width, radii = votes.shape
+    total, sum_a, sum_b, sum_k = 0.0, 0.0, 0.0, 0.0
+    for j in range(max(0, b - 1), min(height, b + 2)):
+        for i in range(max(0, a - 1), min(width, a + 2)):
+            for n in range(max(0, k - 1), min(radii, k + 2)):
+                # Squared, so that the even floor of votes under the peak weighs little.
+                weight = float(votes[j, i, n]) ** 2
+                total += weight
+                sum_a += weight * i
+                sum_b += weight * j
+                sum_k += weight * n
+    if total == 0.0:
+        return float(a), float(b), float(k)
+    return sum_a / total, sum_b / total, sum_k / total

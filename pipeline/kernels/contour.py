@@ -1,0 +1,270 @@
+"""The outline of a moving ball in the events: a circle that moves at constant velocity, fitted to sub-pixel.
+
+A `ring` is (5,) float64 [x_px, y_px, vx_px_s, vy_px_s, radius_px] at a reference time. `oval` (2,) float64 is the
+outline's known departure from a circle: at the angle phi (image frame) it lies radius * (1 + oval[0] cos 2phi +
+oval[1] sin 2phi) from the centre; a sphere seen off the optical axis is such an ellipse. Event times are tau_s,
+seconds after the reference time (mostly negative).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@njit(cache=True, nogil=True)
+def near_outline(
+    ring: Floats,
+    t_us: NDArray[np.int64],
+    x_px: NDArray[np.uint16],
+    y_px: NDArray[np.uint16],
+    reference_us: float,
+    gate_px: float,
+    most_events: int,
+    ahead_only: bool,
+) -> NDArray[np.int64]:
+    """(m,) int64 indices of events within gate_px of the moving outline, thinned evenly to about most_events.
+
+    With ahead_only, only those on the half of the outline that moves outwards.
+    """
+    near = np.empty(t_us.size, np.int64)
+    m = 0
+    inner = max(ring[4] - gate_px, 0.0) ** 2
+    outer = (ring[4] + gate_px) ** 2
+    for i in range(t_us.size):
+        tau = (t_us[i] - reference_us) * 1e-6
+        dx = x_px[i] - (ring[0] + ring[2] * tau)
+        dy = y_px[i] - (ring[1] + ring[3] * tau)
+        square = dx * dx + dy * dy
+        if inner <= square <= outer and not (ahead_only and dx * ring[2] + dy * ring[3] < 0.0):
+            near[m] = i
+            m += 1
+    stride = max(1, -(-m // max(most_events, 1)))
+    return near[:m:stride].copy()
+
+
+@njit(cache=True, nogil=True)
+def residuals(ring: Floats, oval: Floats, tau_s: Floats, x_px: Floats, y_px: Floats) -> Floats:
+    """(n,) float64 distance (px, > 0 outside) of events from the outline."""
+    out = np.empty(tau_s.size, np.float64)
+    for i in range(tau_s.size):
+        dx = x_px[i] - (ring[0] + ring[2] * tau_s[i])
+        dy = y_px[i] - (ring[1] + ring[3] * tau_s[i])
+        square = dx * dx + dy * dy + 1e-18
+        bulge = (oval[0] * (dx * dx - dy * dy) + oval[1] * 2.0 * dx * dy) / square
+        out[i] = math.sqrt(square) - ring[4] * (1.0 + bulge)
+    return out
+
+
+@njit(cache=True, nogil=True)
+def fit_ring(
+    start: Floats,
+    prior_std: Floats,
+    oval: Floats,
+    tau_s: Floats,
+    x_px: Floats,
+    y_px: Floats,
+    gate_px: float,
+    floor_px: float,
+    most_rounds: int,
+) -> tuple[Floats, Floats, float, float]:
+    """Robust fit of a moving circle to events: Gauss-Newton steps with Tukey's biweight.
+
+    start : (5,) ring to begin with; prior_std : (5,) 1 sigma by which the answer may leave it (large = freely,
+        0 = not at all: zeros for the velocity give the fit of a circle at rest)
+    gate_px : Tukey's cut-off in the first round; it then follows 4.7 robust sigma, never below floor_px and never
+        growing again
+    Returns the ring, its covariance (5, 5) from the scatter of the residuals alone, that scatter (1 sigma, px)
+    and the sum of the weights (about the number of events used).
+    """
+    ring = start.copy()
+    information = np.zeros((5, 5))
+    row = np.empty(5)
+    gate, scatter, weight_sum = gate_px, gate_px, 0.0
+    # The velocity is fitted in px/ms, so that all unknowns are of the same size.
+    scale = np.array([1.0, 1.0, 1e3, 1e3, 1.0])
+    for _ in range(most_rounds):
+        information[:] = 0.0
+        gradient = np.zeros(5)
+        for k in range(5):
+            information[k, k] = (scale[k] / max(prior_std[k], 1e-9)) ** 2 + 1e-9
+            gradient[k] = information[k, k] * (start[k] - ring[k]) / scale[k]
+        weight_sum, squares = 1e-9, 0.0
+        for i in range(tau_s.size):
+            dx = x_px[i] - (ring[0] + ring[2] * tau_s[i])
+            dy = y_px[i] - (ring[1] + ring[3] * tau_s[i])
+            distance = math.sqrt(dx * dx + dy * dy) + 1e-9
+            row[0] = dx / distance
+            row[1] = dy / distance
+            row[4] = 1.0 + oval[0] * (row[0] * row[0] - row[1] * row[1]) + oval[1] * 2.0 * row[0] * row[1]
+            error = distance - ring[4] * row[4]
+            share = error / gate
+            if share * share >= 1.0:
+                continue
+            weight = (1.0 - share * share) ** 2
+            weight_sum += weight
+            squares += weight * error * error
+            row[2] = row[0] * tau_s[i] * 1e3
+            row[3] = row[1] * tau_s[i] * 1e3
+            for j in range(5):
+                gradient[j] += weight * error * row[j]
+                for k in range(j + 1):
+                    information[j, k] += weight * row[j] * row[k]
+        for j in range(5):
+            for k in range(j):
+                information[k, j] = information[j, k]
+        step = np.linalg.solve(information, gradient)
+        ring += step * scale
+        # Tukey's weights at 4.7 sigma leave 0.83 of the variance of Gaussian residuals: 0.91 of sigma.
+        scatter = math.sqrt(squares / weight_sum) / 0.91
+        narrower = min(gate, max(4.7 * scatter, floor_px))
+        settled = np.max(np.abs(step)) < 1e-3 and narrower > 0.98 * gate
+        gate = narrower
+        if settled:
+            break
+    covariance = np.linalg.inv(information) * (scatter * scatter)
+    for j in range(5):
+        for k in range(5):
+            covariance[j, k] *= scale[j] * scale[k]
+    return ring, covariance, scatter, weight_sum
+
+
+@njit(cache=True, nogil=True)
+def vote_velocity(
+    votes: Floats,
+    ring: Floats,
+    tau_s: Floats,
+    x_px: Floats,
+    y_px: Floats,
+    on: NDArray[np.bool_],
+    step_px_s: float,
+    gate_px: float,
+) -> None:
+    """Hough vote for the velocity of a ring (5,) float64 around the one it has; adds into votes.
+
+    votes : (2 m + 1, 2 m + 1) float64; votes[m + j, m + i] is for the ring's velocity plus (i, j) * step_px_s,
+        within the disc of radius m. An event counts by its nearness to the outline moved to its time, plus where
+        the outline moves outwards and its polarity is ON or inwards and OFF, minus for the opposite: |votes| is
+        the support of a ball brighter (or, where negative, darker) than its background that moves so.
+    """
+    m = votes.shape[0] // 2
+    inner = max(ring[4] - gate_px, 0.0) ** 2
+    outer = (ring[4] + gate_px) ** 2
+    for j in range(-m, m + 1):
+        for i in range(-m, m + 1):
+            if i * i + j * j > m * m:
+                continue
+            vx = ring[2] + i * step_px_s
+            vy = ring[3] + j * step_px_s
+            total = 0.0
+            for e in range(tau_s.size):
+                dx = x_px[e] - (ring[0] + vx * tau_s[e])
+                dy = y_px[e] - (ring[1] + vy * tau_s[e])
+                square = dx * dx + dy * dy
+                if inner < square < outer:
+                    near = 1.0 - abs(math.sqrt(square) - ring[4]) / gate_px
+                    outwards = dx * vx + dy * vy
+                    if outwards != 0.0:
+                        total += near if (outwards > 0.0) == on[e] else -near
+            votes[m + j, m + i] += total
+
+
+@njit(cache=True, nogil=True)
+def support(
+    ring: Floats,
+    oval: Floats,
+    tau_s: Floats,
+    x_px: Floats,
+    y_px: Floats,
+    on: NDArray[np.bool_],
+    width_px: int,
+    height_px: int,
+    tolerance_px: float,
+    bins: int,
+) -> Floats:
+    """How well events support a moving outline: (8,) float64
+
+    [events on the outline, share of ON among those ahead of the centre, the same behind it,
+     share of the visible outline ahead that has events, the same behind it,
+     share of the whole outline that is visible, events just outside (one to four tolerances beyond), events inside].
+    The outline is cut into `bins` sectors; sectors that the motion passes at a grazing angle (|cos| < 0.25) yield
+    few events and do not count. Shares of nothing are 0.
+    """
+    counts = np.zeros(bins, np.int64)
+    ahead_on, ahead, behind_on, behind, outside, inside = 0, 0, 0, 0, 0, 0
+    error = residuals(ring, oval, tau_s, x_px, y_px)
+    for i in range(tau_s.size):
+        if error[i] > tolerance_px:
+            outside += error[i] < 4.0 * tolerance_px
+            continue
+        if error[i] < -tolerance_px:
+            inside += 1
+            continue
+        dx = x_px[i] - (ring[0] + ring[2] * tau_s[i])
+        dy = y_px[i] - (ring[1] + ring[3] * tau_s[i])
+        if dx * ring[2] + dy * ring[3] > 0.0:
+            ahead += 1
+            ahead_on += on[i]
+        else:
+            behind += 1
+            behind_on += on[i]
+        counts[int((math.atan2(dy, dx) / (2.0 * math.pi) + 1.0) * bins) % bins] += 1
+    speed = math.hypot(ring[2], ring[3]) + 1e-9
+    seen = np.zeros(2)
+    visible = np.zeros(2)
+    in_view = 0
+    for b in range(bins):
+        angle = 2.0 * math.pi * (b + 0.5) / bins
+        nx = math.cos(angle)
+        ny = math.sin(angle)
+        x = ring[0] + ring[4] * nx
+        y = ring[1] + ring[4] * ny
+        if x < 0.0 or y < 0.0 or x > width_px - 1 or y > height_px - 1:
+            continue
+        in_view += 1
+        across = (nx * ring[2] + ny * ring[3]) / speed
+        if abs(across) < 0.25:
+            continue
+        side = 0 if across > 0.0 else 1
+        visible[side] += 1.0
+        seen[side] += counts[b] >= 2
+    return np.array(
+        [
+            float(ahead + behind),
+            ahead_on / max(ahead, 1),
+            behind_on / max(behind, 1),
+            seen[0] / max(visible[0], 1.0),
+            seen[1] / max(visible[1], 1.0),
+            in_view / bins,
+            float(outside),
+            float(inside),
+        ]
+    )
+
+
+@njit(cache=True, nogil=True)
+def clear_of(
+    ring: Floats,
+    t_us: NDArray[np.int64],
+    x_px: NDArray[np.uint16],
+    y_px: NDArray[np.uint16],
+    reference_us: float,
+    margin_px: float,
+) -> NDArray[np.int64]:
+    """(m,) int64 indices of events more than margin_px outside the moving ring."""
+    chosen = np.empty(t_us.size, np.int64)
+    m = 0
+    limit = (ring[4] + margin_px) ** 2
+    for i in range(t_us.size):
+        tau = (t_us[i] - reference_us) * 1e-6
+        dx = x_px[i] - (ring[0] + ring[2] * tau)
+        dy = y_px[i] - (ring[1] + ring[3] * tau)
+        if dx * dx + dy * dy > limit:
+            chosen[m] = i
+            m += 1
+    return chosen[:m].copy()

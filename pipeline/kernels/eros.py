@@ -1,0 +1,103 @@
+"""EROS, the exponential reduced ordinal surface (section 3.1; Gava 2022), exactly, with one byte a pixel.
+
+The reference multiplies the k x k block (k odd) around each event by d = 0.3^(1/k) and sets the event's pixel
+to 255, in float64, and rounds when the surface is read. After n such fades a pixel holds 255 d^n, which reads
+0 from some n on (57 for k = 11). So it is enough to count: an event sets its pixel's life to that n, each
+fade takes one off, never below 0, and a table turns lives into values. Equal to the reference bit for bit;
+the benchmark compares the speed with the reference and with the naive loop in float32 (16 x slower at k =
+21).
+
+Lives are kept flat, the rows MARGIN_PX apart and so many rows above and below them: a block needs no check
+for the image's border. The margins' lives are always 0, for no event sets them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+# Widest block: its lives (254 at the event) still fit a byte. Half of it is the margin; being a multiple of
+# 8, it lets the image's rows start at whole words.
+K_MAX_PX = 49
+MARGIN_PX = K_MAX_PX // 2
+# Pixels faded at once: one AVX2 register. A constant trip, or the compiler will not vectorise it.
+BAND_PX = np.uint64(32)
+WORD, ONE, TWO, THREE = np.uint64(8), np.uint64(1), np.uint64(2), np.uint64(3)
+
+
+def odd_px(k_px: int) -> int:
+    """The block's width as the reference uses it: the next odd number (10 -> 11)."""
+    return k_px | 1
+
+
+def values_of_lives(k_px: int) -> NDArray[np.uint8]:
+    """(lives + 1,) uint8, what a pixel of each life reads; the last is 255, the life that an event sets.
+
+    By multiplying again and again, as the reference does: 255 x 0.3 = 76.5 is a tie that rounding errors
+    decide.
+    """
+    decay = 0.3 ** (1 / odd_px(k_px))
+    falling = [255.0]
+    while np.rint(falling[-1]) > 0:
+        falling.append(falling[-1] * decay)
+    return np.rint(falling[::-1]).astype(np.uint8)
+
+
+@njit(cache=True, nogil=True)
+def _stride_px(width_px: int) -> int:
+    """From one row of lives to the next: a margin, and the width rounded up to whole words."""
+    return MARGIN_PX + (width_px + 7) // 8 * 8
+
+
+def no_lives(width_px: int, height_px: int) -> NDArray[np.uint8]:
+    """Lives of an empty surface: flat uint8, with margins, and room behind for the last block's last band."""
+    return np.zeros((height_px + 2 * MARGIN_PX) * _stride_px(width_px) + 64, np.uint8)
+
+
+@njit(cache=True, nogil=True)
+def draw(
+    lives: NDArray[np.uint8],
+    width_px: int,
+    k_px: int,
+    full: int,
+    x_px: NDArray[np.uint16],
+    y_px: NDArray[np.uint16],
+) -> None:
+    """Add events in their order: fade the block around each, then set its pixel; changes lives.
+
+    lives : as made by `no_lives` for this width; k_px : odd, at most K_MAX_PX; full : life that an event sets
+    x_px, y_px : (n,) uint16
+    """
+    stride = np.uint64(_stride_px(width_px))
+    corner_px, half = np.uint64(MARGIN_PX - k_px // 2), np.uint64(k_px // 2)
+    for i in range(x_px.size):
+        corner = (np.uint64(y_px[i]) + corner_px) * stride + np.uint64(x_px[i]) + corner_px
+        for left in range(0, k_px, 32):
+            columns = np.uint64(k_px - left)
+            for row in range(k_px):
+                start = corner + np.uint64(row) * stride + np.uint64(left)
+                for c in range(BAND_PX):
+                    # `min` and unsigned indices make this one saturating subtraction of 32 bytes.
+                    life = lives[start + np.uint64(c)]
+                    lives[start + np.uint64(c)] = life - min(life, np.uint8(c < columns))
+        lives[corner + half * stride + half] = full
+
+
+@njit(cache=True, nogil=True)
+def read(values: NDArray[np.uint8], lives: NDArray[np.uint8], table: NDArray[np.uint8]) -> None:
+    """Write what the living pixels read into values, (height, width) uint8, which must hold zeros.
+
+    Skips what is empty, 32 pixels at a time: on a flight's surface 4 x as fast as cv2.LUT over every pixel.
+    """
+    height_px, width_px = values.shape
+    width, stride = np.uint64(width_px), np.uint64(_stride_px(width_px))
+    flat, words = values.reshape(-1), lives.view(np.uint64)
+    for y in range(height_px):
+        row = np.uint64(y + MARGIN_PX) * stride + np.uint64(MARGIN_PX)
+        out = np.uint64(y) * width
+        for left in range(np.uint64(0), width, BAND_PX):
+            word = (row + np.uint64(left)) // WORD
+            if (words[word] | words[word + ONE] | words[word + TWO] | words[word + THREE]) != 0:
+                for x in range(np.uint64(left), min(np.uint64(left) + BAND_PX, width)):
+                    flat[out + np.uint64(x)] = table[lives[row + np.uint64(x)]]

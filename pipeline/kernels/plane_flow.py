@@ -1,0 +1,143 @@
+"""Normal flow: a plane t = a x + b y + c through each event's neighbours in space and time, robustly.
+
+The gradient (a, b) of the time at which an edge arrives points across the edge, and its length is one over the speed
+of the edge (Benosman et al., "Event-Based Visual Flow", IEEE TNNLS 2014).
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@numba.njit(cache=True, nogil=True)
+def near_in_time(
+    rows: NDArray[np.int64],
+    k: int,
+    t_us: NDArray[np.int64],
+    x_px: Floats,
+    y_px: Floats,
+    on: NDArray[np.bool_],
+    reach_px: float,
+    reach_us: float,
+) -> int:
+    """Write the rows of event k's neighbours (k included) into `rows` and return how many there are.
+
+    A neighbour has k's polarity and lies within reach_px and reach_us. Of those before and of those after k, at most
+    half the length of `rows` each, nearest in time first.
+    """
+    half, n = rows.size // 2, t_us.size
+    reach2 = reach_px * reach_px
+    rows[0] = k
+    count = 1
+    for j in range(k - 1, -1, -1):
+        if t_us[k] - t_us[j] > reach_us or count >= half:
+            break
+        dx, dy = x_px[j] - x_px[k], y_px[j] - y_px[k]
+        if on[j] == on[k] and dx * dx + dy * dy <= reach2:
+            rows[count] = j
+            count += 1
+    last = count + half
+    for j in range(k + 1, n):
+        if t_us[j] - t_us[k] > reach_us or count >= last:
+            break
+        dx, dy = x_px[j] - x_px[k], y_px[j] - y_px[k]
+        if on[j] == on[k] and dx * dx + dy * dy <= reach2:
+            rows[count] = j
+            count += 1
+    return count
+
+
+@numba.njit(cache=True, nogil=True)
+def fit_plane(
+    x_px: Floats, y_px: Floats, t_us: Floats, scales_us: Floats, fewest: int, spread_px: float
+) -> tuple[float, float, float, float]:
+    """Gradient (a, b) in us/px, rms of the residuals in us and the weight behind the plane; weight 0 where none fits.
+
+    Weighted least squares, once with equal weights and then once a scale in scales_us with bisquare weights
+    (1 - (residual / scale)^2)^2, zero beyond the scale. There is no plane when fewer than `fewest` points have weight
+    or their spread (1 sigma) in some direction of the image is below spread_px.
+    """
+    a, b, c, rms, total = 0.0, 0.0, 0.0, 0.0, 0.0
+    for stage in range(scales_us.size + 1):
+        total, sx, sy, st, carrying = 0.0, 0.0, 0.0, 0.0, 0
+        sxx, sxy, syy, sxt, syt, stt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(t_us.size):
+            weight = 1.0
+            if stage > 0:
+                off = (t_us[i] - a * x_px[i] - b * y_px[i] - c) / scales_us[stage - 1]
+                if abs(off) >= 1.0:
+                    continue
+                weight = (1.0 - off * off) ** 2
+            carrying += 1
+            total += weight
+            sx, sy, st = sx + weight * x_px[i], sy + weight * y_px[i], st + weight * t_us[i]
+            sxx += weight * x_px[i] * x_px[i]
+            sxy += weight * x_px[i] * y_px[i]
+            syy += weight * y_px[i] * y_px[i]
+            sxt += weight * x_px[i] * t_us[i]
+            syt += weight * y_px[i] * t_us[i]
+            stt += weight * t_us[i] * t_us[i]
+        if carrying < fewest:
+            return 0.0, 0.0, 0.0, 0.0
+        mx, my, mt = sx / total, sy / total, st / total
+        cxx, cxy, cyy = sxx / total - mx * mx, sxy / total - mx * my, syy / total - my * my
+        cxt, cyt, ctt = sxt / total - mx * mt, syt / total - my * mt, stt / total - mt * mt
+        half_trace = 0.5 * (cxx + cyy)
+        narrow = half_trace - np.sqrt(max(half_trace * half_trace - (cxx * cyy - cxy * cxy), 0.0))
+        if narrow < spread_px * spread_px:
+            return 0.0, 0.0, 0.0, 0.0
+        determinant = cxx * cyy - cxy * cxy
+        a = (cyy * cxt - cxy * cyt) / determinant
+        b = (cxx * cyt - cxy * cxt) / determinant
+        c = mt - a * mx - b * my
+        rms = np.sqrt(max(ctt - a * cxt - b * cyt, 0.0))
+    return a, b, rms, total
+
+
+@numba.njit(cache=True, nogil=True)
+def plane_flow(
+    t_us: NDArray[np.int64],
+    x_px: Floats,
+    y_px: Floats,
+    on: NDArray[np.bool_],
+    first: int,
+    last: int,
+    reach_px: float,
+    reach_us: float,
+    scales_us: Floats,
+    speed_max_px_s: float,
+) -> tuple[NDArray[np.int64], Floats, Floats]:
+    """Rows (m,) of the events first..last-1 that have normal flow, its unit directions (m, 2) and speeds (m,) px/s.
+
+    The neighbours come from all events. A plane needs FEWEST points spread by SPREAD_PX; its residuals may not
+    exceed a third of the last scale (twice that and a second edge is in the fit), and its speed lies in
+    0..speed_max_px_s.
+    """
+    rows, found = np.empty(NEIGHBOURS, np.int64), np.empty(max(last - first, 0), np.int64)
+    directions, speeds = np.empty((found.size, 2)), np.empty(found.size)
+    x, y, t = np.empty(NEIGHBOURS), np.empty(NEIGHBOURS), np.empty(NEIGHBOURS)
+    count = 0
+    for k in range(first, last):
+        size = near_in_time(rows, k, t_us, x_px, y_px, on, reach_px, reach_us)
+        if size < FEWEST:
+            continue
+        for i in range(size):
+            j = rows[i]
+            x[i], y[i], t[i] = x_px[j] - x_px[k], y_px[j] - y_px[k], t_us[j] - t_us[k]
+        a, b, rms_us, weight = fit_plane(x[:size], y[:size], t[:size], scales_us, FEWEST, SPREAD_PX)
+        slope = np.sqrt(a * a + b * b)
+        if weight == 0.0 or rms_us > scales_us[-1] / 3.0 or slope * speed_max_px_s < 1e6:
+            continue
+        found[count], speeds[count] = k, 1e6 / slope
+        directions[count, 0], directions[count, 1] = a / slope, b / slope
+        count += 1
+    return found[:count].copy(), directions[:count].copy(), speeds[:count].copy()
+
+
+NEIGHBOURS = 64  # at most; a logo's edge leaves 10 to 40 events of one polarity in three pixels around an event
+FEWEST = 6  # points for the three unknowns of a plane: as many again to judge it by
+SPREAD_PX = 0.6  # two pixels wide: (1, 1) would be 0.5

@@ -1,0 +1,94 @@
+"""The rhythm of an event rate: moving average, low-pass, crossings, period (section 3.3)."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@numba.njit(cache=True, nogil=True)
+def moving_average(signal: Floats, weight: float) -> Floats:
+    """Exponential moving average (n,): each value moves it by `weight` of the difference; starts at the first."""
+    average = np.empty_like(signal)
+    level = signal[0] if signal.size else 0.0
+    for i in range(signal.size):
+        level += weight * (signal[i] - level)
+        average[i] = level
+    return average
+
+
+@numba.njit(cache=True, nogil=True)
+def low_passed(signal: Floats, cutoff_cycles: float) -> Floats:
+    """Butterworth low-pass of second order, forward and then backward: (n,), nothing is shifted in time.
+
+    cutoff_cycles : cut-off in cycles per sample, between 0 and 0.5
+    Each pass starts from the steady state of its first value, so an end that is not zero rings little.
+    """
+    k = np.tan(np.pi * cutoff_cycles)
+    scale = 1.0 / (1.0 + np.sqrt(2.0) * k + k * k)  # bilinear transform of 1 / (s^2 + sqrt(2) s + 1)
+    b0 = k * k * scale
+    a1, a2 = 2.0 * (k * k - 1.0) * scale, (1.0 - np.sqrt(2.0) * k + k * k) * scale
+    result = signal.copy()
+    for backward in range(2):
+        first = result[result.size - 1] if backward else result[0]
+        x1, x2, y1, y2 = first, first, first, first
+        for j in range(result.size):
+            i = result.size - 1 - j if backward else j
+            x0 = result[i]
+            y0 = b0 * (x0 + 2.0 * x1 + x2) - a1 * y1 - a2 * y2
+            x2, x1, y2, y1 = x1, x0, y1, y0
+            result[i] = y0
+    return result
+
+
+@numba.njit(cache=True, nogil=True)
+def falling_crossings(signal: Floats) -> Floats:
+    """Places (m,), in samples, where the signal falls from above zero to zero or below; linear in between."""
+    places = np.empty(signal.size)
+    count = 0
+    for i in range(signal.size - 1):
+        if signal[i] > 0.0 >= signal[i + 1]:
+            places[count] = i + signal[i] / (signal[i] - signal[i + 1])
+            count += 1
+    return places[:count].copy()
+
+
+@numba.njit(cache=True, nogil=True)
+def autocorrelation(signal: Floats, lags: int) -> Floats:
+    """Correlation (lags,) of the signal with itself, lag by lag, each lag normed by the parts that overlap.
+
+    1 where the signal repeats exactly; 0 where a part is constant zero.
+    """
+    correlation = np.zeros(lags)
+    n = signal.size
+    for lag in range(min(lags, n)):
+        product, early, late = 0.0, 0.0, 0.0
+        for i in range(n - lag):
+            product += signal[i] * signal[i + lag]
+            early += signal[i] * signal[i]
+            late += signal[i + lag] * signal[i + lag]
+        if early > 0.0 and late > 0.0:
+            correlation[lag] = product / np.sqrt(early * late)
+    return correlation
+
+
+@numba.njit(cache=True, nogil=True)
+def shortest_period(correlation: Floats, shortest: int, share: float) -> int:
+    """First lag from `shortest` on whose peak reaches `share` of the highest such peak; 0 if there is no peak.
+
+    A rotation's multiples repeat as well as the rotation itself; its parts (the letters of the logo) repeat worse.
+    """
+    highest = 0.0
+    for lag in range(max(shortest, 1), correlation.size - 1):
+        value = correlation[lag]
+        if value > correlation[lag - 1] and value >= correlation[lag + 1] and value > highest:
+            highest = value
+    if highest > 0.0:
+        for lag in range(max(shortest, 1), correlation.size - 1):
+            value = correlation[lag]
+            if value > correlation[lag - 1] and value >= correlation[lag + 1] and value >= share * highest:
+                return lag
+    return 0

@@ -1,0 +1,210 @@
+"""Decoder of ECF, the compression in Prophesee's HDF5 files (filter 0x8ECF), which no plugin package holds.
+
+A block of the file is: a 32-bit word (number of events x 4 + how pixels are packed), the first time as 64
+bits, the steps of time as runs, and then x, y and p packed in one of three ways.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import h5py
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ..errors import RecordingError
+
+Bytes = NDArray[np.uint8]
+
+ALL_PACKED, X_P_PACKED = 2, 1  # bits of the first word
+PAD_BYTES = 16  # zeros behind a block: a number cut off by its end is read from them, and found out later
+DAMAGED = -1
+
+
+class EcfBlock(NamedTuple):
+    """Room for the events of one block: t (n,) int64, x, y (n,) uint16, p (n,) uint8."""
+
+    t: NDArray[np.int64]
+    x: NDArray[np.uint16]
+    y: NDArray[np.uint16]
+    p: NDArray[np.uint8]
+
+
+class EcfRows:
+    """Rows of an ECF-compressed dataset of events."""
+
+    def __init__(self, data: h5py.Dataset, path: Path) -> None:
+        self._data, self._path = data, path
+        self._block_rows = int(data.chunks[0])
+        if self._block_rows > 1 << 22:  # Prophesee writes 16384
+            raise RecordingError(f"ECF blocks of {self._block_rows} events: the file is damaged: {path}")
+
+    def rows_of(self, first: int, upto: int) -> tuple[NDArray[Any], ...]:
+        """t, x, y and p of rows [first, upto)."""
+        size = self._block_rows
+        parts = []
+        for block in range(first // size, -(-upto // size)):
+            start = block * size
+            rows = slice(max(first - start, 0), min(upto - start, size))
+            parts.append([column[rows] for column in self._block(start, rows.stop)])
+        if not parts:
+            return _room(0)
+        return tuple(np.concatenate(columns) for columns in zip(*parts, strict=True))
+
+    def _block(self, start: int, needed: int) -> EcfBlock:
+        mask, packed = self._data.id.read_direct_chunk((start,))
+        if mask:  # stored as it is
+            records = np.frombuffer(packed, self._data.dtype)
+            return EcfBlock(records["t"], records["x"], records["y"], records["p"])
+        out = _room(self._block_rows)
+        count = decode_ecf(out, np.frombuffer(packed + bytes(PAD_BYTES), np.uint8))
+        if count < needed:
+            raise RecordingError(
+                f"the block of events from {start} on is damaged: copy or export the file again: {self._path}"
+            )
+        return out
+
+
+def _room(events: int) -> EcfBlock:
+    return EcfBlock(
+        np.empty(events, np.int64),
+        np.empty(events, np.uint16),
+        np.empty(events, np.uint16),
+        np.empty(events, np.uint8),
+    )
+
+
+@njit(cache=True, nogil=True)
+def _number(data: Bytes, at: int, size: int) -> int:
+    """Little-endian number of `size` bytes."""
+    value = 0
+    for k in range(size):
+        value |= int(data[at + k]) << (8 * k)
+    return value
+
+
+@njit(cache=True, nogil=True)
+def decode_ecf(out: EcfBlock, data: Bytes) -> int:
+    """Decode a block, data (n + PAD_BYTES,) uint8, into out; returns the number of events or DAMAGED."""
+    end = data.size - PAD_BYTES
+    if end < 12:
+        return DAMAGED
+    head = _number(data, 0, 4)
+    count = head >> 2
+    if count > out.t.size:
+        return DAMAGED
+    at = _times(out.t, count, data, 12, _number(data, 4, 8))
+    if at == DAMAGED:
+        return DAMAGED
+    if head & ALL_PACKED:
+        at = _pixels_packed(out, count, data, at)
+    else:
+        at = _runs(out.y, count, data, at, 2, 5)
+        if at != DAMAGED and head & X_P_PACKED:
+            at = _columns_packed(out, count, data, at)
+        elif at != DAMAGED:
+            at = _columns_masked(out.x, count, data, at)
+            if at != DAMAGED:
+                at = _runs(out.p, count, data, at, 1, 7)
+    return DAMAGED if at == DAMAGED or at > end else count
+
+
+@njit(cache=True, nogil=True)
+def _times(t: NDArray[np.int64], count: int, data: Bytes, at: int, now: int) -> int:
+    """Bytes of (step, run length), 4 bits each; step 15: 4 bits of a long step, the low ones first."""
+    end = data.size - PAD_BYTES
+    done, shift, long_step = 0, 0, 0
+    while done < count:
+        if at >= end:
+            return DAMAGED
+        step, run = int(data[at]) >> 4, int(data[at]) & 15
+        at += 1
+        if step == 15:
+            if shift > 56:
+                return DAMAGED
+            long_step |= run << shift
+            shift += 4
+            continue
+        now += step + long_step
+        shift, long_step = 0, 0
+        if run == 15:
+            run = _number(data, at, 2)
+            at += 2
+        run = min(run, count - done)
+        t[done : done + run] = now
+        done += run
+    return at
+
+
+@njit(cache=True, nogil=True)
+def _runs(values: NDArray[Any], count: int, data: Bytes, at: int, size: int, run_bits: int) -> int:
+    """Words of `size` bytes: a value, then `run_bits` of run length; all ones = it is in 16 bits more."""
+    end, full = data.size - PAD_BYTES, (1 << run_bits) - 1
+    done = 0
+    while done < count:
+        if at >= end:
+            return DAMAGED
+        word = _number(data, at, size)
+        at += size
+        run = word & full
+        if run == full:
+            run = _number(data, at, 2)
+            at += 2
+        run = min(run, count - done)
+        values[done : done + run] = word >> run_bits
+        done += run
+    return at
+
+
+@njit(cache=True, nogil=True)
+def _columns_masked(x: NDArray[np.uint16], count: int, data: Bytes, at: int) -> int:
+    """16-bit words: x above, and 5 bits (highest first) that say which of the next 5 columns follow."""
+    end = data.size - PAD_BYTES
+    done = 0
+    while done < count:
+        if at >= end:
+            return DAMAGED
+        word = _number(data, at, 2)
+        at += 2
+        x[done] = word >> 5
+        done += 1
+        for k in range(5):
+            if done < count and (word >> (4 - k)) & 1:
+                x[done] = (word >> 5) + k + 1
+                done += 1
+    return at
+
+
+@njit(cache=True, nogil=True)
+def _columns_packed(out: EcfBlock, count: int, data: Bytes, at: int) -> int:
+    """Four events of 12 bits (x, p) in three 16-bit words; second and third begin with their low bits."""
+    end = data.size - PAD_BYTES
+    for first in range(0, count, 4):
+        if at >= end:
+            return DAMAGED
+        a, b, c = _number(data, at, 2), _number(data, at + 2, 2), _number(data, at + 4, 2)
+        at += 6
+        four = (a >> 4, (a & 0xF) | ((b >> 8) << 4), (b & 0xFF) | ((c >> 12) << 8), c & 0xFFF)
+        for k in range(min(4, count - first)):
+            out.x[first + k] = four[k] >> 1
+            out.p[first + k] = four[k] & 1
+    return at
+
+
+@njit(cache=True, nogil=True)
+def _pixels_packed(out: EcfBlock, count: int, data: Bytes, at: int) -> int:
+    """Four events of 24 bits (y, x, p) in three 32-bit words, split in the same way."""
+    end = data.size - PAD_BYTES
+    for first in range(0, count, 4):
+        if at >= end:
+            return DAMAGED
+        a, b, c = _number(data, at, 4), _number(data, at + 4, 4), _number(data, at + 8, 4)
+        at += 12
+        four = (a >> 8, (a & 0xFF) | ((b >> 16) << 8), (b & 0xFFFF) | ((c >> 24) << 16), c & 0xFFFFFF)
+        for k in range(min(4, count - first)):
+            out.y[first + k] = (four[k] >> 12) & 0x7FF
+            out.x[first + k] = (four[k] >> 1) & 0x7FF
+            out.p[first + k] = four[k] & 1
+    return at

@@ -1,0 +1,267 @@
+"""Reading HDF5 recordings: Prophesee's compound layout and the column layout of DSEC and Spinscope."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RecordingError
+from ..results import Truth
+from .columns import ColumnTypes, named_columns, refuse_bomb, refuse_types
+from .sensor import Sensor, geometry_or_none, stated_or_none
+from .source import MAX_DISORDER_US, Columns, Pass, Progress, Triggers, translated
+
+ECF_FILTER = 0x8ECF  # Prophesee's event compression, in no plugin package; decoded in `ecf.py`
+COMPOUNDS = ("CD/events", "events")
+TRIGGERS = "EXT_TRIGGER/events"
+
+
+class Hdf5Source:
+    """One HDF5 recording."""
+
+    order_is_law = True
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.warnings: list[str] = []
+        with translated(path, "HDF5"), h5py.File(path, "r") as file:
+            self._layout = Layout.found(file, path)
+            self.format = self._layout.format
+            self.attributes = _attributes(file)
+            self.stated = _stated_sensor(file, self._layout, self.warnings)
+            self.t_offset_us = _t_offset_us(file)
+            table = Table(file, self._layout, path)
+            self.events: int | None = table.rows
+            first, last = table.times_of(0, 4096), table.times_of(max(table.rows - 4096, 0), table.rows)
+        self._types = ColumnTypes(path, first.dtype, np.concatenate([first, last]))
+        if self._types.warning:
+            self.warnings.append(self._types.warning)
+
+    def columns(self, reading: Pass) -> Iterator[Columns]:
+        """The events; rows far outside the asked times are skipped by bisection."""
+        with translated(self.path, "HDF5"), h5py.File(self.path, "r") as file:
+            table = Table(file, self._layout, self.path)
+            if TRIGGERS in file:
+                reading.triggers.append(_triggers(file[TRIGGERS]))
+            first = 0 if reading.start_us is None else self._row_before(table, reading.start_us)
+            for row in range(first, table.rows, reading.max_events):
+                upto = min(row + reading.max_events, table.rows)
+                block = self._types.columns(row, *table.rows_of(row, upto))
+                yield block
+                reading.report(upto - first, table.rows - first)
+                # No event that follows one 10 ms behind the end can lie before it (see TimeOrder).
+                if reading.end_us is not None and int(block.t_us[-1]) >= reading.end_us + MAX_DISORDER_US:
+                    return
+
+    def extent_px(self, on_progress: Progress | None) -> tuple[int, int]:
+        """One more than the largest x and y of all events."""
+        width = height = 0
+        reading = Pass(on_progress=on_progress)
+        for block in self.columns(reading):
+            width, height = max(width, int(block.x.max()) + 1), max(height, int(block.y.max()) + 1)
+        return width, height
+
+    def truth(self) -> Truth | None:
+        """The group /truth, None without it."""
+        with translated(self.path, "HDF5"), h5py.File(self.path, "r") as file:
+            if "truth" not in file:
+                return None
+            return _truth(file["truth"], self.events or 0, self.path)
+
+    def _row_before(self, table: Table, start_us: int) -> int:
+        """A row before which all events are earlier than start_us; close to the first that is not."""
+        low, high = 0, table.rows  # invariant: all rows before low are early
+        while high - low > 1:
+            middle = (low + high) // 2
+            t_us = self._types.columns(middle, *table.rows_of(middle, middle + 1)).t_us
+            # Later events may be up to 10 ms earlier than this one, earlier events up to 10 ms later.
+            if int(t_us[0]) + MAX_DISORDER_US < start_us:
+                low = middle
+            else:
+                high = middle
+        return low
+
+
+class Layout:
+    """Where in a file the events are: one compound dataset, or a group and the names of its columns."""
+
+    def __init__(self, format: str, place: str, names: dict[str, str], compound: bool) -> None:
+        self.format, self.place, self.names, self.compound = format, place, names, compound
+
+    @classmethod
+    def found(cls, file: h5py.File, path: Path) -> Layout:
+        """The layout of this file; raises RecordingError when it holds no events."""
+        for place in COMPOUNDS:
+            item = file.get(place)
+            if isinstance(item, h5py.Dataset) and item.dtype.names:
+                names = named_columns(item.dtype.names)
+                if names is not None:
+                    maker = "Prophesee HDF5" if place.startswith("CD") else "HDF5"
+                    return cls(f"{maker} compound", place, names, compound=True)
+        for place in ("events", "/"):
+            item = file.get(place)
+            if isinstance(item, h5py.Group):
+                names = named_columns(n for n in item if isinstance(item.get(n), h5py.Dataset))
+                if names is not None:
+                    return cls("HDF5 columns", place, names, compound=False)
+        present = ", ".join(sorted(file)[:8]) or "nothing"
+        raise RecordingError(
+            f"HDF5 file holds no events (it has {present}): /CD/events or /events/x, y, t, p needed: {path}"
+        )
+
+
+class Table:
+    """The event rows of an open file; checks that they can be read at all."""
+
+    def __init__(self, file: h5py.File, layout: Layout, path: Path) -> None:
+        self._path, self._layout = path, layout
+        place = file[layout.place]
+        self._sets = (
+            {layout.place: place} if layout.compound else {c: place[n] for c, n in layout.names.items()}
+        )
+        shapes = {name: data.shape for name, data in self._sets.items()}
+        if len(set(shapes.values())) > 1 or any(len(shape) != 1 for shape in shapes.values()):
+            listed = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+            raise RecordingError(
+                f"event columns differ in length ({listed}): export the recording again: {path}"
+            )
+        self.rows = int(next(iter(shapes.values()))[0])
+        if layout.compound:
+            refuse_types(path, {c: place.dtype[n] for c, n in layout.names.items()})
+        else:
+            refuse_types(path, {c: data.dtype for c, data in self._sets.items()})
+        self._ecf: Any = None
+        for data in self._sets.values():
+            self._check_storage(data)
+
+    def rows_of(self, first: int, upto: int) -> tuple[NDArray[Any], ...]:
+        """t, x, y and p of rows [first, upto), as they are in the file."""
+        if self._ecf is not None:
+            columns: tuple[NDArray[Any], ...] = self._ecf.rows_of(first, upto)
+            return columns
+        if not self._layout.compound:
+            return tuple(self._sets[c][first:upto] for c in "txyp")
+        records = self._sets[self._layout.place][first:upto]
+        return tuple(np.ascontiguousarray(records[self._layout.names[c]]) for c in "txyp")
+
+    def times_of(self, first: int, upto: int) -> NDArray[Any]:
+        """The times of rows [first, upto), as they are in the file."""
+        if self._layout.compound:
+            return self.rows_of(first, upto)[0]
+        times: NDArray[Any] = self._sets["t"][first:upto]
+        return times
+
+    def _check_storage(self, data: h5py.Dataset) -> None:
+        """Refuse data that is not all there (HDF5 would read zeros), bombs, and filters nobody can undo."""
+        unpacked = self.rows * data.dtype.itemsize
+        if data.chunks is not None:
+            chunks = -(-self.rows // data.chunks[0])
+            present = data.id.get_num_chunks()
+            if present < chunks:
+                raise RecordingError(
+                    f"only {present} of {chunks} blocks of {data.name} are in the file, the rest was lost: "
+                    f"copy or export it again: {self._path}"
+                )
+            if self._undo_filters(data):
+                return
+        elif data.id.get_storage_size() < unpacked and data.external is None:
+            raise RecordingError(f"{data.name} is not all in the file: copy or export it again: {self._path}")
+        refuse_bomb(data.id.get_storage_size(), unpacked, self._path)
+
+    def _undo_filters(self, data: h5py.Dataset) -> bool:
+        """Make sure that the filters can be undone; True if they are Prophesee's, undone here."""
+        filters = data.id.get_create_plist()
+        codes = [filters.get_filter(i)[0] for i in range(filters.get_nfilters())]
+        if codes == [ECF_FILTER] and self._layout.compound:
+            from .ecf import EcfRows  # compiles a decoder
+
+            self._ecf = EcfRows(data, self._path)
+            return True
+        missing = [code for code in codes if not h5py.h5z.filter_avail(code)]
+        if missing:
+            import hdf5plugin  # noqa: F401  registers blosc, zstd and more; 0.1 s to load
+
+            missing = [code for code in missing if not h5py.h5z.filter_avail(code)]
+        if missing:
+            raise RecordingError(
+                f"{data.name} is compressed with HDF5 filter {missing[0]}, which is not known here: "
+                f"repack it with gzip (h5repack -f GZIP=4 IN OUT): {self._path}"
+            )
+        return False
+
+
+def _attributes(file: h5py.File) -> dict[str, str | float]:
+    """Root attributes: numbers and texts as they are, short lists of numbers as "1,2,3"; no others."""
+    found: dict[str, str | float] = {}
+    for name in file.attrs:
+        value = file.attrs[name]
+        if isinstance(value, np.ndarray) and value.size == 1:
+            value = value.reshape(-1)[0]
+        if isinstance(value, bytes):
+            value = value.decode("utf-8", "replace")
+        if isinstance(value, np.generic):
+            value = value.item()
+        if (
+            isinstance(value, np.ndarray)
+            and value.ndim == 1
+            and value.size <= 16
+            and value.dtype.kind in "iuf"
+        ):
+            value = ",".join(str(item) for item in value.tolist())
+        if isinstance(value, (str, float, int)):
+            found[name] = value
+    return found
+
+
+def _stated_sensor(file: h5py.File, layout: Layout, warnings: list[str]) -> Sensor | None:
+    parent = layout.place.rpartition("/")[0]
+    for place in dict.fromkeys(("/", layout.place, parent or "/")):
+        attributes = file[place].attrs
+        if "width" in attributes and "height" in attributes:
+            return stated_or_none(_scalar(attributes["width"]), _scalar(attributes["height"]), warnings)
+        if "geometry" in attributes:
+            text = _scalar(attributes["geometry"])
+            text = text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text)
+            return geometry_or_none(text, warnings)
+    return None
+
+
+def _scalar(value: object) -> object:
+    return value.reshape(-1)[0] if isinstance(value, np.ndarray) and value.size == 1 else value
+
+
+def _t_offset_us(file: h5py.File) -> int | None:
+    item = file.get("t_offset")
+    if not isinstance(item, h5py.Dataset) or item.size != 1:
+        return None
+    return int(np.asarray(item[()]).reshape(-1)[0])
+
+
+def _triggers(data: h5py.Dataset) -> Triggers:
+    records = data[:]
+    return Triggers(
+        records["t"].astype(np.int64), (records["p"] == 1).astype(np.uint8), records["id"].astype(np.uint8)
+    )
+
+
+def _truth(group: h5py.Group, events: int, path: Path) -> Truth:
+    columns = {name: group[name][:] for name in ("t_us", "x_px", "y_px", "radius_px")}
+    vectors = {name: group[name][:] for name in ("position_m", "velocity_m_s", "spin_rps")}
+    label = group["label"][:]
+    rows = columns["t_us"].size
+    if any(c.shape != (rows,) for c in columns.values()) or any(
+        v.shape != (rows, 3) for v in vectors.values()
+    ):
+        raise RecordingError(f"/truth has columns of different lengths: simulate the recording again: {path}")
+    if label.shape != (events,):
+        raise RecordingError(
+            f"/truth/label has shape {label.shape} for {events} events: simulate the recording again: {path}"
+        )
+    t_us = columns.pop("t_us").astype(np.int64)
+    floats = {name: c.astype(np.float64) for name, c in {**columns, **vectors}.items()}
+    return Truth(t_us=t_us, label=label.astype(np.uint8), **floats)

@@ -1,0 +1,203 @@
+"""Reading Prophesee RAW files: a header of text lines, then EVT2, EVT2.1 or EVT3 words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RecordingError
+from ..results import Truth
+from .evt2 import decode_evt2
+from .evt3 import decode_evt3
+from .evt_time import BAD_WORDS, EVENTS, OUTSIDE, TIME_JUMPS, TRIGGERS, UNTIMED, Decoded, fresh_state
+from .sensor import SENSOR_OF_SYSTEM_ID, Sensor, geometry_or_none, stated_or_none
+from .source import Columns, Pass, Progress, Triggers, translated
+
+READ_BYTES = 4 << 20
+HEADER_BYTES = 64 << 10  # longer headers are none
+TRIGGER_ROOM = 1 << 14  # triggers decoded at once
+STEADY_STEPS = 16  # of 64 us between two TIME_HIGH words: sensors send one each 16 us to 1 ms
+WORD_BYTES = {"EVT2": 4, "EVT2.1": 8, "EVT3": 2}
+
+
+class RawSource:
+    """One RAW recording."""
+
+    order_is_law = False
+    t_offset_us: int | None = None
+    events: int | None = None
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.warnings: list[str] = []
+        with translated(path, "RAW"), open(path, "rb") as file:
+            head = file.read(HEADER_BYTES)
+        header, self._start = parsed_header(head)
+        self.attributes: dict[str, str | float] = dict(header)
+        options = format_options(header)
+        self._encoding = _encoding(header, options, path)
+        self.format = f"{self._encoding} RAW"
+        self.stated = _stated_sensor(header, options, self.warnings)
+        self._legacy = False
+        if self._encoding == "EVT2.1":
+            self._legacy = self._is_legacy(options.get("endianness", ""), head[self._start :])
+
+    def columns(self, reading: Pass) -> Iterator[Columns]:
+        """The events, decoded from the start: only the words before tell the time."""
+        decoder = Decoder(self._encoding, self._legacy, reading)
+        with translated(self.path, "RAW"), open(self.path, "rb") as file:
+            size = file.seek(0, 2)
+            file.seek(self._start)
+            while block := file.read(READ_BYTES):
+                yield from decoder.feed(block, final=False)
+                reading.report(file.tell(), size)
+            yield from decoder.feed(b"", final=True)
+
+    def extent_px(self, on_progress: Progress | None) -> tuple[int, int]:
+        """One more than the largest x and y of all events."""
+        width = height = 0
+        for block in self.columns(Pass(on_progress=on_progress)):
+            width, height = max(width, int(block.x.max()) + 1), max(height, int(block.y.max()) + 1)
+        return width, height
+
+    def truth(self) -> Truth | None:
+        """RAW files hold none."""
+        return None
+
+    def _is_legacy(self, endianness: str, data: bytes) -> bool:
+        """Whether the half with the type comes first (IMX636): by the header, else by the words' times."""
+        if endianness in ("legacy", "little"):
+            return endianness == "legacy"
+        if endianness:
+            raise RecordingError(
+                f"EVT2.1 with endianness {endianness} is not read: little and legacy are: {self.path}"
+            )
+        halves = np.frombuffer(data[: len(data) // 8 * 8], "<u4").reshape(-1, 2)
+        steady = []
+        for head in (halves[:, 0], halves[:, 1]):
+            times = (head[head >> 28 == 8] & 0xFFFFFFF).astype(np.int64)
+            steps = np.diff(times)
+            steady.append(int(np.count_nonzero((steps > 0) & (steps <= STEADY_STEPS))))
+        legacy = steady[0] >= steady[1]
+        order = "legacy" if legacy else "little"
+        self.warnings.append(
+            f"the EVT2.1 header states no endianness: taken as {order}, in which time is steady"
+        )
+        return legacy
+
+
+class Decoder:
+    """Words in, events out; remembers what it must from one block of bytes to the next.
+
+    encoding : EVT2, EVT2.1 or EVT3; legacy : EVT2.1 with the half that holds the type first
+    """
+
+    def __init__(self, encoding: str, legacy: bool, reading: Pass) -> None:
+        self._encoding, self._legacy, self._reading = encoding, legacy, reading
+        self._word_bytes = WORD_BYTES[encoding]
+        self._state = fresh_state()
+        self._rest = b""
+
+    def feed(self, block: bytes, final: bool) -> Iterator[Columns]:
+        """The events of the next bytes of the file; final: there are no more."""
+        data = self._rest + block
+        count = len(data) // self._word_bytes
+        done = 0
+        while done < count:
+            used, columns = self._decode(data[done * self._word_bytes : count * self._word_bytes], final)
+            done += used
+            if len(columns):
+                yield columns
+            if not used:
+                break  # the last TIME_HIGH waits for the next one
+        self._rest = data[done * self._word_bytes :]
+        damage, state = self._reading.damage, self._state.tolist()
+        damage.bad_words, damage.time_jumps = state[BAD_WORDS], state[TIME_JUMPS]
+        damage.untimed_events = state[UNTIMED]
+        if final:
+            damage.outside_events += state[OUTSIDE]
+            damage.lost_bytes = len(self._rest)
+
+    def _decode(self, data: bytes, final: bool) -> tuple[int, Columns]:
+        room = max(self._reading.max_events, 4096)
+        out = Decoded(
+            np.empty(room, np.int64),
+            np.empty(room, np.uint16),
+            np.empty(room, np.uint16),
+            np.empty(room, np.bool_),
+            np.empty(TRIGGER_ROOM, np.int64),
+            np.empty(TRIGGER_ROOM, np.uint8),
+            np.empty(TRIGGER_ROOM, np.uint8),
+            self._state,
+        )
+        if self._encoding == "EVT3":
+            used = int(decode_evt3(out, np.frombuffer(data, "<u2"), final))
+        else:
+            heads, masks = self._halves(data)
+            used = int(decode_evt2(out, heads, masks, final))
+        events, triggers = int(self._state[EVENTS]), int(self._state[TRIGGERS])
+        if triggers:
+            t_us, value, number = out.trigger_t_us, out.trigger_value, out.trigger_id
+            self._reading.triggers.append(Triggers(t_us[:triggers], value[:triggers], number[:triggers]))
+        return used, Columns(out.t_us[:events], out.x_px[:events], out.y_px[:events], out.on[:events])
+
+    def _halves(self, data: bytes) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
+        words = np.frombuffer(data, "<u4")
+        if self._encoding == "EVT2":
+            return words, np.empty(0, np.uint32)
+        first, second = np.ascontiguousarray(words.reshape(-1, 2).T)
+        return (first, second) if self._legacy else (second, first)
+
+
+def parsed_header(head: bytes) -> tuple[dict[str, str], int]:
+    """Keys and values of the lines "% key value" at the start of a file, and where they end.
+
+    The header ends with the line "% end" or, in old files, before the first line that has no "% " in front.
+    """
+    found: dict[str, str] = {}
+    at = 0
+    while head.startswith(b"% ", at):
+        end = head.find(b"\n", at)
+        if end < 0:
+            return found, len(head)  # cut within the header: no events
+        key, _, value = head[at + 2 : end].decode("utf-8", "replace").strip().partition(" ")
+        at = end + 1
+        if key == "end":
+            break
+        found[key] = value.strip()
+    return found, at
+
+
+def format_options(header: dict[str, str]) -> dict[str, str]:
+    """The parts of "EVT3;height=720;width=1280": {"": "EVT3", "height": "720", "width": "1280"}."""
+    name, *rest = header.get("format", "").split(";")
+    pairs = (item.partition("=") for item in rest)
+    return {"": name.strip(), **{key.strip(): value.strip() for key, _, value in pairs}}
+
+
+def _encoding(header: dict[str, str], options: dict[str, str], path: Path) -> str:
+    names = {"EVT2": "EVT2", "EVT21": "EVT2.1", "EVT3": "EVT3", "2.0": "EVT2", "2.1": "EVT2.1", "3.0": "EVT3"}
+    said = options[""] or header.get("evt", "")
+    if said in names:
+        return names[said]
+    if not said:
+        why = "its header names no encoding (no line '% evt 3.0' or '% format EVT3')"
+    else:
+        why = f"its encoding is {said[:40]!r}"
+    raise RecordingError(
+        f"RAW file cannot be decoded, {why}: EVT2, EVT2.1 and EVT3 are read; export it as HDF5: {path}"
+    )
+
+
+def _stated_sensor(header: dict[str, str], options: dict[str, str], warnings: list[str]) -> Sensor | None:
+    if "geometry" in header:
+        return geometry_or_none(header["geometry"], warnings)
+    if "width" in options and "height" in options:
+        return stated_or_none(options["width"], options["height"], warnings)
+    number = header.get("system_ID", "")
+    if number.isdecimal() and int(number) in SENSOR_OF_SYSTEM_ID:
+        return Sensor(*SENSOR_OF_SYSTEM_ID[int(number)], f"system_ID {number}")
+    return None

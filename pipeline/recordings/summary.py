@@ -1,0 +1,140 @@
+"""What is in a recording, from one pass over it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..events import EventBatch
+from .recording import Recording
+from .source import Progress
+
+PEAK_BIN_US = 1000  # the peak rate is that of the fullest millisecond
+# A hot pixel has 10 events or more, and over 10 times as many as the third busiest of its 8 neighbours: a
+# line in the scene that keeps firing has two busy neighbours along it. Against the truth of ten simulated
+# recordings: 85 to 100 % of the pixels found are hot, and they hold 90 % or more of the hot pixels' events.
+HOT_EVENTS = 10
+HOT_RATIO = 10
+HOT_NEIGHBOUR = 3
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingInfo:
+    """What `summary` found.
+
+    first_us, last_us : times of the first and last event; None without events
+    duration_us : last less first, 0 without events
+    on_share : share of ON events, None without events
+    mean_rate_hz : events a second over the duration; None when that is 0
+    peak_rate_hz : the same in the fullest millisecond, None without events
+    hot_pixels, hot_share : number of hot pixels (see HOT_EVENTS) and their share of the events
+    triggers : number of edges on the trigger input
+    damage : name of every kind of damage and its count, see `Damage`
+    """
+
+    path: Path
+    format: str
+    width_px: int
+    height_px: int
+    sensor_from: str
+    events: int
+    first_us: int | None
+    last_us: int | None
+    duration_us: int
+    on_share: float | None
+    mean_rate_hz: float | None
+    peak_rate_hz: float | None
+    hot_pixels: int
+    hot_share: float
+    triggers: int
+    damage: dict[str, int]
+    t_offset_us: int | None
+    attributes: dict[str, str | float]
+    warnings: list[str]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Names and values ready for JSON; the sensor's size as `width` and `height`."""
+        names = {"width_px": "width", "height_px": "height"}
+        values = {names.get(name, name): getattr(self, name) for name in self.__slots__}
+        return {**values, "path": str(self.path)}
+
+
+def summary(recording: Recording, on_progress: Progress | None = None) -> RecordingInfo:
+    """Look a recording over in one pass, in constant memory; raises RecordingError if it cannot be read."""
+    tally = _Tally(recording.width_px, recording.height_px)
+    for batch in recording.chunks(on_progress=on_progress):
+        tally.add(batch)
+    duration_us = 0 if tally.first_us is None or tally.last_us is None else tally.last_us - tally.first_us
+    hot_pixels, hot_events = tally.hot()
+    events = tally.events
+    return RecordingInfo(
+        path=recording.path,
+        format=recording.format,
+        width_px=recording.width_px,
+        height_px=recording.height_px,
+        sensor_from=recording.sensor_from,
+        events=events,
+        first_us=tally.first_us,
+        last_us=tally.last_us,
+        duration_us=duration_us,
+        on_share=tally.on / events if events else None,
+        mean_rate_hz=events / (duration_us * 1e-6) if duration_us else None,
+        peak_rate_hz=tally.peak_events / (PEAK_BIN_US * 1e-6) if events else None,
+        hot_pixels=hot_pixels,
+        hot_share=hot_events / events if events else 0.0,
+        triggers=len(recording.triggers),
+        damage=recording.damage.as_dict(),
+        t_offset_us=recording.t_offset_us,
+        attributes=recording.attributes,
+        warnings=recording.warnings,
+    )
+
+
+class _Tally:
+    """Counts over batches that follow each other."""
+
+    def __init__(self, width_px: int, height_px: int) -> None:
+        self._width_px = width_px
+        self._counts: NDArray[np.int64] = np.zeros((height_px, width_px), np.int64)
+        self.events = self.on = self.peak_events = 0
+        self.first_us: int | None = None
+        self.last_us: int | None = None
+        self._bin, self._bin_events = 0, 0  # the last, perhaps unfinished millisecond
+
+    def add(self, batch: EventBatch) -> None:
+        """Count one batch that is not empty."""
+        if self.first_us is None:
+            self.first_us = int(batch.t_us[0])
+        self.last_us = int(batch.t_us[-1])
+        self.events += len(batch)
+        self.on += int(np.count_nonzero(batch.on))
+        pixels = batch.y_px.astype(np.intp) * self._width_px + batch.x_px
+        flat = self._counts.reshape(-1)
+        flat += np.bincount(pixels, minlength=flat.size)
+        bins, counts = _runs(batch.t_us // PEAK_BIN_US)
+        if self._bin == bins[0]:
+            counts[0] += self._bin_events
+        self.peak_events = max(self.peak_events, int(counts.max()))
+        self._bin, self._bin_events = int(bins[-1]), int(counts[-1])
+
+    def hot(self) -> tuple[int, int]:
+        """Number of hot pixels, and of their events."""
+        rows, columns = np.nonzero(self._counts >= HOT_EVENTS)
+        padded = np.pad(self._counts, 1)
+        around = np.stack(
+            [padded[rows + dy, columns + dx] for dy in range(3) for dx in range(3) if (dy, dx) != (1, 1)]
+        )
+        neighbour = np.sort(around, axis=0)[-HOT_NEIGHBOUR]
+        events = self._counts[rows, columns]
+        hot = events > HOT_RATIO * neighbour
+        return int(np.count_nonzero(hot)), int(events[hot].sum())
+
+
+def _runs(rising: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The different values of a rising column, and how often each occurs."""
+    starts = np.flatnonzero(np.concatenate([[True], rising[1:] != rising[:-1]]))
+    return rising[starts], np.diff(np.append(starts, rising.size))

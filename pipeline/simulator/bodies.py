@@ -1,0 +1,189 @@
+"""Balls and arms as the kernels want them: when they are seen, how fast they move in the image, their poses."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Camera
+from . import kernels
+from .logos import RADIUS_MM, texture
+from .motion import Path, arm_ends, path
+from .scene import Arm, Ball, Scene
+from .sensor import Lens
+
+Floats = NDArray[np.float64]
+Spans = list[tuple[float, float]]
+
+PIXEL_VARIANCE_PX2 = 1 / 12  # of a square pixel's own area
+TEXTURE_SHARE = 0.6  # of the blur's sigma goes into the texture, the rest into samples around the pixel
+LOOK_S = 1e-3  # a ball of 30 m/s moves 30 mm in this time, less than its width
+
+
+@dataclass(frozen=True, eq=False)
+class PackedBody:
+    """One body at n times; see `kernels.Bodies`."""
+
+    pose: Floats
+    box: NDArray[np.int32]
+    kind: Floats
+    ink: NDArray[np.float32]
+
+
+class BallBody:
+    """A ball of a scene."""
+
+    def __init__(self, scene: Scene, number: int) -> None:
+        self.scene, self.number = scene, number
+        self.ball: Ball = scene.balls[number]
+
+    @cached_property
+    def paths(self) -> list[Path]:
+        return [path(motion, self.ball, self.scene) for motion in self.ball.motions]
+
+    def visible(self, camera: Camera, end_s: float) -> Spans:
+        """When some of the ball may be in the image."""
+        spans: Spans = []
+        for one in self.paths:
+            start, stop = max(one.start_s, 0.0), min(one.end_s, end_s)
+            if start >= stop:
+                continue
+            time = np.linspace(start, stop, max(math.ceil((stop - start) / LOOK_S), 1) + 1)
+            box = self._box(camera, one.at(time).position_m, margin_px=40.0)
+            seen = np.flatnonzero((box[:, 2] > box[:, 0]) & (box[:, 3] > box[:, 1]))
+            if seen.size:
+                first, last = max(seen[0] - 1, 0), min(seen[-1] + 1, time.size - 1)
+                spans.append((float(time[first]), float(time[last])))
+        return spans
+
+    def speed_px_s(self, camera: Camera, start_s: float, stop_s: float) -> float:
+        """How fast anything on the ball can move in the image at most."""
+        fastest = 0.0
+        for one in self.paths:
+            inside = (one.time_s >= start_s - LOOK_S) & (one.time_s <= stop_s + LOOK_S)
+            if one.start_s > stop_s or one.end_s < start_s or not inside.any():
+                if not one.start_s <= start_s <= one.end_s:
+                    continue
+                inside[:] = True
+            speed = np.linalg.norm(one.velocity_m_s[inside], axis=1)
+            if self.ball.logo.name != "none":
+                speed = speed + 2 * np.pi * self.ball.radius_m * np.linalg.norm(one.spin_rps[inside], axis=1)
+            near = one.position_m[inside, 2] - self.ball.radius_m
+            fastest = max(fastest, float(np.max(speed * camera.focal_px / np.maximum(near, 1e-3))))
+        return fastest
+
+    def distance_m(self, time_s: Floats) -> float:
+        one = self._path_at(float(time_s[time_s.size // 2]))
+        return float(one.at(time_s[time_s.size // 2 : time_s.size // 2 + 1]).position_m[0, 2])
+
+    def _path_at(self, time_s: float) -> Path:
+        for one in self.paths:
+            if one.start_s <= time_s <= one.end_s:
+                return one
+        return self.paths[-1]
+
+    def packed(self, camera: Camera, lens: Lens, time_s: Floats, every: int) -> PackedBody:
+        """The ball at these times, looked at in every so many of them."""
+        there = self._path_at(float(time_s[time_s.size // 2])).at(time_s)
+        pose = np.empty((time_s.size, kernels.POSE_COLUMNS))
+        pose[:, kernels.CENTRE : kernels.CENTRE + 3] = there.position_m
+        pose[:, kernels.TURN : kernels.TURN + 9] = np.swapaxes(there.rotation, 1, 2).reshape(-1, 9)
+        sigma = _sigma_px(camera, lens, there.position_m[:, 2])
+        pose[:, kernels.SIGMA] = sigma
+        # The texture's own blur: one for the ball's whole time, so that it is drawn once.
+        far = float(np.median(np.concatenate([one.position_m[:, 2] for one in self.paths])))
+        typical = float(_sigma_px(camera, lens, np.array([far]))[0])
+        blur_mm = TEXTURE_SHARE * typical * far / camera.focal_px * 1e3 * RADIUS_MM / (self.ball.radius_m * 1e3)
+        printed = texture(self.ball.logo, round(blur_mm, 2))
+        kind = np.zeros(kernels.BODY_COLUMNS)
+        kind[[kernels.KIND, kernels.OWNER, kernels.EVERY]] = kernels.BALL, self.number, every
+        kind[kernels.RADIUS] = self.ball.radius_m
+        kind[[kernels.ALBEDO, kernels.ALBEDO_2]] = self.ball.albedo, self.ball.ink_albedo
+        kind[[kernels.HALF_EXTENT, kernels.TEXELS]] = printed.half_extent, printed.ink.shape[0]
+        kind[kernels.CAP_COSINE] = 2.0 if self.ball.logo.name == "none" else math.cos(printed.cap_rad)
+        kind[[kernels.INK_X, kernels.INK_Y]] = printed.ink_u, printed.ink_w
+        kind[kernels.SAMPLE] = math.sqrt(3 * (1 - TEXTURE_SHARE**2)) * typical
+        box = self._box(camera, there.position_m, 4 * float(sigma.max()) + 1.0)
+        return PackedBody(pose, box, kind, printed.ink)
+
+    def _box(self, camera: Camera, position_m: Floats, margin_px: float) -> NDArray[np.int32]:
+        x, y, _ = camera.silhouette(position_m, self.ball.radius_m)
+        distance2 = np.sum(position_m**2, axis=1)
+        sin2 = self.ball.radius_m**2 / distance2
+        q = position_m[:, 2] ** 2 / distance2 - sin2
+        half = camera.focal_px * np.sqrt(sin2 * (1 - sin2)) / q + margin_px  # the longer semi-axis
+        if any(camera.distortion):
+            half = 1.1 * half + 2.0
+        return _clipped(x - half, y - half, x + half, y + half, camera)
+
+
+class ArmBody:
+    """The scene's arm, seen all the time."""
+
+    def __init__(self, scene: Scene, number: int) -> None:
+        assert scene.arm is not None
+        self.arm: Arm = scene.arm
+        self.number = number
+
+    def visible(self, camera: Camera, end_s: float) -> Spans:
+        """The whole time: the arm may come and go as it swings."""
+        return [(0.0, end_s)]
+
+    def speed_px_s(self, camera: Camera, start_s: float, stop_s: float) -> float:
+        """The hand's highest speed."""
+        arm = self.arm
+        speed = arm.length_m * arm.swing_rad * 2 * math.pi * arm.frequency_hz
+        near = min(arm.elbow_m[2], arm.elbow_m[2] - arm.length_m) - arm.radius_elbow_m
+        return speed * camera.focal_px / max(near, 0.1)
+
+    def distance_m(self, time_s: Floats) -> float:
+        elbow, hand = arm_ends(self.arm, time_s[time_s.size // 2 : time_s.size // 2 + 1])
+        return float(elbow[0, 2] + hand[0, 2]) / 2
+
+    def packed(self, camera: Camera, lens: Lens, time_s: Floats, every: int) -> PackedBody:
+        """The arm at these times, looked at in every so many of them."""
+        arm = self.arm
+        pose = np.zeros((time_s.size, kernels.POSE_COLUMNS))
+        low, high = [], []
+        for column, place, radius in zip(
+            (0, 3), arm_ends(arm, time_s), (arm.radius_elbow_m, arm.radius_hand_m), strict=True
+        ):
+            image, radius_px = camera.project(place), radius * camera.focal_px / place[:, 2]
+            pose[:, column : column + 2], pose[:, column + 2] = image, radius_px
+            low.append(image - radius_px[:, None])
+            high.append(image + radius_px[:, None])
+        sigma = _sigma_px(camera, lens, np.array([self.distance_m(time_s)]))[0]
+        pose[:, kernels.SIGMA] = sigma
+        kind = np.zeros(kernels.BODY_COLUMNS)
+        kind[[kernels.KIND, kernels.OWNER, kernels.EVERY]] = kernels.ARM, self.number, every
+        kind[[kernels.ALBEDO, kernels.ALBEDO_2]] = arm.sleeve_albedo, arm.hand_albedo
+        first, last = np.minimum(*low) - 4 * sigma - 1, np.maximum(*high) + 4 * sigma + 1
+        box = _clipped(first[:, 0], first[:, 1], last[:, 0], last[:, 1], camera)
+        return PackedBody(pose, box, kind, np.zeros((2, 2), np.float32))
+
+
+def _sigma_px(camera: Camera, lens: Lens, distance_m: Floats) -> Floats:
+    """Blur of an outline: the lens and the pixel's own area."""
+    result: Floats = np.sqrt(lens.sigma_px(distance_m, camera.focal_px) ** 2 + PIXEL_VARIANCE_PX2)
+    return result
+
+
+def _clipped(x0: Floats, y0: Floats, x1: Floats, y1: Floats, camera: Camera) -> NDArray[np.int32]:
+    """(n, 4) int32 boxes inside the image, the ends not included; empty outside."""
+    left = np.clip(np.floor(x0), 0, camera.width_px)
+    top = np.clip(np.floor(y0), 0, camera.height_px)
+    right = np.clip(np.ceil(x1) + 1, 0, camera.width_px)
+    bottom = np.clip(np.ceil(y1) + 1, 0, camera.height_px)
+    return np.stack([left, top, right, bottom], axis=1).astype(np.int32)
+
+
+def bodies_of(scene: Scene) -> list[BallBody | ArmBody]:
+    """The scene's balls in their order, then the arm."""
+    bodies: list[BallBody | ArmBody] = [BallBody(scene, number) for number in range(len(scene.balls))]
+    if scene.arm is not None:
+        bodies.append(ArmBody(scene, len(scene.balls)))
+    return bodies

@@ -1,0 +1,173 @@
+"""How balls and arms move: the physics, and poses at any time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .scene import Air, Arm, Ball, Fixed, Flight, Quaternion, Scene
+
+Floats = NDArray[np.float64]
+
+STEP_S = 0.5e-3  # a flight bends by less than a micrometre beyond a cubic in this time
+RESTITUTION = 0.89  # ball on table: the rules ask for 23 cm of rebound from 30 cm
+FRICTION = 0.25  # ball on table, sliding
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """A motion sampled at `time_s` (k,), rising; `rotation` (k, 3, 3) is ball frame -> camera frame."""
+
+    time_s: Floats
+    position_m: Floats
+    velocity_m_s: Floats
+    spin_rps: Floats
+    rotation: Floats
+
+    @property
+    def start_s(self) -> float:
+        return float(self.time_s[0])
+
+    @property
+    def end_s(self) -> float:
+        return float(self.time_s[-1])
+
+    def at(self, time_s: ArrayLike) -> Path:
+        """The poses at these times: cubic Hermite in space, constant spin since the sample before."""
+        t = np.asarray(time_s, np.float64)
+        row = np.clip(np.searchsorted(self.time_s, t, side="right") - 1, 0, self.time_s.size - 2)
+        length = self.time_s[row + 1] - self.time_s[row]
+        s = ((t - self.time_s[row]) / length)[:, None]
+        p0, p1 = self.position_m[row], self.position_m[row + 1]
+        v0, v1 = self.velocity_m_s[row], self.velocity_m_s[row + 1]
+        h = length[:, None]
+        position = (
+            (1 + 2 * s) * (1 - s) ** 2 * p0
+            + s * (1 - s) ** 2 * h * v0
+            + s**2 * (3 - 2 * s) * p1
+            + s**2 * (s - 1) * h * v1
+        )
+        velocity = 6 * s * (1 - s) * (p1 - p0) / h + (1 - s) * (1 - 3 * s) * v0 + s * (3 * s - 2) * v1
+        spin = self.spin_rps[row]
+        turned = rotations(spin * 2 * np.pi * (t - self.time_s[row])[:, None]) @ self.rotation[row]
+        return Path(t, position, velocity, spin, turned)
+
+
+def rotations(vectors_rad: ArrayLike) -> Floats:
+    """(n, 3, 3) rotation matrices about these vectors (n, 3) by their lengths (Rodrigues)."""
+    vector = np.atleast_2d(np.asarray(vectors_rad, np.float64))
+    angle = np.linalg.norm(vector, axis=1)
+    axis = np.divide(vector, angle[:, None], out=np.zeros_like(vector), where=angle[:, None] > 0)
+    cross = np.zeros((vector.shape[0], 3, 3))
+    cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = -axis[:, 2], axis[:, 1], -axis[:, 0]
+    cross[:, 1, 0], cross[:, 2, 0], cross[:, 2, 1] = axis[:, 2], -axis[:, 1], axis[:, 0]
+    sine, cosine = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
+    matrix: Floats = np.eye(3) + sine * cross + (1 - cosine) * (cross @ cross)
+    return matrix
+
+
+def matrix_of(quaternion: Quaternion) -> Floats:
+    """(3, 3) rotation matrix of a unit quaternion (w, x, y, z)."""
+    w, x, y, z = np.asarray(quaternion) / np.linalg.norm(quaternion)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def quaternion_of(matrix: Floats) -> Quaternion:
+    """The unit quaternion (w, x, y, z), w >= 0, of a rotation matrix."""
+    values, vectors = np.linalg.eigh(
+        np.array(
+            [
+                [matrix[0, 0] - matrix[1, 1] - matrix[2, 2], 0, 0, 0],
+                [matrix[1, 0] + matrix[0, 1], matrix[1, 1] - matrix[0, 0] - matrix[2, 2], 0, 0],
+                [matrix[2, 0] + matrix[0, 2], matrix[2, 1] + matrix[1, 2], matrix[2, 2] - matrix[0, 0] - matrix[1, 1], 0],
+                [matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1], np.trace(matrix)],
+            ]
+        )
+    )
+    x, y, z, w = vectors[:, np.argmax(values)] * (1 if vectors[3, np.argmax(values)] >= 0 else -1)
+    return float(w), float(x), float(y), float(z)
+
+
+def accelerations(ball: Ball, air: Air, up: Sequence[float]) -> tuple[Floats, float, float]:
+    """Gravity (3,) in m/s^2, drag in 1/m (times -|v| v) and Magnus in 1 (times 2 pi spin x v)."""
+    area = math.pi * ball.radius_m**2
+    pressure = 0.5 * air.density_kg_m3 * area / ball.mass_kg
+    return -air.gravity_m_s2 * np.asarray(up, np.float64), pressure * air.drag, pressure * air.magnus * ball.radius_m
+
+
+def path(motion: Fixed | Flight, ball: Ball, scene: Scene) -> Path:
+    """The motion sampled over its whole time."""
+    if isinstance(motion, Fixed):
+        time = np.array([motion.start_s, motion.end_s])
+        still = np.zeros((2, 3))
+        spin = np.tile(np.array(motion.spin_rps, np.float64), (2, 1))
+        turn = rotations(spin * 2 * np.pi * (time - time[0])[:, None]) @ matrix_of(motion.orientation)
+        return Path(time, np.tile(np.array(motion.position_m, np.float64), (2, 1)), still, spin, turn)
+    return _flown(motion, ball, scene)
+
+
+def _flown(flight: Flight, ball: Ball, scene: Scene) -> Path:
+    gravity, drag, magnus = accelerations(ball, scene.air, scene.up)
+    count = max(int(np.ceil((flight.end_s - flight.start_s) / STEP_S)), 1)
+    time = np.linspace(flight.start_s, flight.end_s, count + 1)
+    h = (flight.end_s - flight.start_s) / count
+    position, velocity = np.empty((count + 1, 3)), np.empty((count + 1, 3))
+    spin, rotation = np.empty((count + 1, 3)), np.empty((count + 1, 3, 3))
+    p, v = np.array(flight.position_m, np.float64), np.array(flight.velocity_m_s, np.float64)
+    w, turn = np.array(flight.spin_rps, np.float64), matrix_of(flight.orientation)
+    up = np.array(scene.up, np.float64)
+
+    def acceleration(v: Floats, w: Floats) -> Floats:
+        lift = np.array([w[1] * v[2] - w[2] * v[1], w[2] * v[0] - w[0] * v[2], w[0] * v[1] - w[1] * v[0]])
+        result: Floats = gravity - drag * math.sqrt(v @ v) * v + 2 * np.pi * magnus * lift
+        return result
+
+    for row in range(count + 1):
+        position[row], velocity[row], spin[row], rotation[row] = p, v, w, turn
+        turn = rotations(2 * np.pi * h * w)[0] @ turn
+        k1 = acceleration(v, w)
+        k2 = acceleration(v + h / 2 * k1, w)
+        k3 = acceleration(v + h / 2 * k2, w)
+        k4 = acceleration(v + h * k3, w)
+        p = p + h * (v + h / 6 * (k1 + k2 + k3))
+        v = v + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        w = w * math.exp(-flight.spin_decay_hz * h)
+        height = scene.background.height_m + p @ up  # of the centre above the table
+        if flight.bounces and height < ball.radius_m and v @ up < 0:
+            v, w = bounced(v, w, up, ball.radius_m)
+            p = p + (ball.radius_m - height) * up
+    return Path(time, position, velocity, spin, rotation)
+
+
+def bounced(velocity_m_s: Floats, spin_rps: Floats, up: Floats, radius_m: float) -> tuple[Floats, Floats]:
+    """Velocity and spin after the table: restitution, and friction until the ball grips (hollow sphere)."""
+    omega = 2 * np.pi * spin_rps
+    fall = -velocity_m_s @ up
+    slip = velocity_m_s + fall * up - radius_m * np.cross(omega, up)
+    slip_speed = float(np.linalg.norm(slip))
+    after = velocity_m_s + (1 + RESTITUTION) * fall * up
+    if slip_speed == 0:
+        return after, spin_rps
+    # A hollow sphere (I = 2/3 m r^2) grips after a tangential change of 2/5 of the slip.
+    change = -min(FRICTION * (1 + RESTITUTION) * fall, 0.4 * slip_speed) * slip / slip_speed
+    omega = omega - 1.5 / radius_m * np.cross(up, change)
+    return after + change, omega / (2 * np.pi)
+
+
+def arm_ends(arm: Arm, time_s: ArrayLike) -> tuple[Floats, Floats]:
+    """(n, 3) places of elbow and hand in the camera frame."""
+    t = np.asarray(time_s, np.float64)
+    angle = arm.swing_rad * np.sin(2 * np.pi * arm.frequency_hz * t + arm.phase_rad)
+    turn = rotations(angle[:, None] * np.asarray(arm.axis)[None, :])
+    elbow = np.tile(np.array(arm.elbow_m, np.float64), (t.size, 1))
+    return elbow, elbow + arm.length_m * (turn @ np.asarray(arm.rest, np.float64))

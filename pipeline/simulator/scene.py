@@ -1,0 +1,220 @@
+"""A scene: balls, an arm, a background and the light, in the camera frame; readable from and writable to JSON.
+
+Everything random was drawn when the scene was made, so the same scene can be simulated again with other biases.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from ..errors import ParameterError
+from .logos import Logo
+
+Vector3 = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]  # (w, x, y, z), unit: ball frame -> camera frame
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """A ball that turns in place (the ball spinner) during [start_s, end_s)."""
+
+    start_s: float
+    end_s: float
+    position_m: Vector3
+    spin_rps: Vector3
+    orientation: Quaternion  # at start_s
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A ball in free flight during [start_s, end_s), with gravity, drag and Magnus force.
+
+    position_m, velocity_m_s, spin_rps, orientation : at start_s, camera frame
+    spin_decay_hz : the spin falls as exp(-spin_decay_hz t); 0 = constant
+    bounces : whether the table of the scene throws the ball back
+    """
+
+    start_s: float
+    end_s: float
+    position_m: Vector3
+    velocity_m_s: Vector3
+    spin_rps: Vector3
+    orientation: Quaternion
+    spin_decay_hz: float = 0.0
+    bounces: bool = False
+
+
+@dataclass(frozen=True)
+class Air:
+    """What acts on a flying ball besides its weight.
+
+    drag : drag coefficient of a smooth sphere at Reynolds numbers of 10^4 to 10^5
+    magnus : lift coefficient per spin parameter (|spin| radius / speed), so that the Magnus acceleration is
+        magnus rho area radius / (2 mass) spin x velocity; 0.6 lies within the published range for 40 mm balls
+    """
+
+    gravity_m_s2: float = 9.81
+    density_kg_m3: float = 1.2
+    drag: float = 0.4
+    magnus: float = 0.6
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A matte ball with a logo; `motions` follow each other in time, between them the ball is away."""
+
+    motions: tuple[Fixed | Flight, ...]
+    radius_m: float = 0.02
+    mass_kg: float = 0.0027
+    albedo: float = 0.85
+    ink_albedo: float = 0.12
+    logo: Logo = Logo()
+
+
+@dataclass(frozen=True)
+class Arm:
+    """A forearm that swings about its elbow: a capsule, sleeve and hand of one brightness each.
+
+    The hand points along `rest` turned about `axis` by swing_rad sin(2 pi frequency_hz t + phase_rad).
+    """
+
+    elbow_m: Vector3
+    rest: Vector3  # unit vector
+    axis: Vector3  # unit vector
+    length_m: float = 0.4
+    radius_elbow_m: float = 0.045
+    radius_hand_m: float = 0.035
+    swing_rad: float = 0.7
+    frequency_hz: float = 1.0
+    phase_rad: float = 0.0
+    sleeve_albedo: float = 0.06
+    hand_albedo: float = 0.45
+
+
+@dataclass(frozen=True)
+class Background:
+    """What stands still: a plane `height_m` below the camera.
+
+    kind : "plain" (table everywhere), "table" (with white lines, and the floor beyond)
+    contrast : standard deviation of a random texture in log intensity, of grain_px pixels
+    """
+
+    kind: str = "table"
+    height_m: float = 2.0
+    albedo: float = 0.12
+    line_albedo: float = 0.7
+    floor_albedo: float = 0.25
+    contrast: float = 0.0
+    grain_px: float = 6.0
+    texture_seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("plain", "table"):
+            raise ParameterError(f"background {self.kind!r} is unknown: there are plain, table")
+
+
+@dataclass(frozen=True)
+class Light:
+    """Soft light from above: a bright ceiling (`sky`) and panels (the rest), plus what the table throws back.
+
+    illuminance_lux : on the table (the paper's 1,930 lx are the reference of all intensities)
+    flicker_depth : half the swing of the light over its mean, 0 = steady LED panels
+    """
+
+    illuminance_lux: float = 1930.0
+    sky: float = 0.7
+    bounce: float = 0.12
+    flicker_depth: float = 0.0
+    flicker_hz: float = 100.0
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything in front of the camera during [0, duration_s); the first ball is the one of the truth."""
+
+    duration_s: float
+    balls: tuple[Ball, ...]
+    arm: Arm | None = None
+    background: Background = Background()
+    light: Light = Light()
+    air: Air = Air()
+    up: Vector3 = (0.0, 0.0, -1.0)
+    description: str = ""
+    extra: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not 0 < self.duration_s <= 3600:
+            raise ParameterError(f"a scene of {self.duration_s:g} s is out of range: more than 0, at most 3600 s")
+        for ball in self.balls:
+            if not 0.001 <= ball.radius_m <= 0.5:
+                raise ParameterError(f"ball radius {ball.radius_m * 1e3:g} mm is out of range: 1 to 500 mm")
+            if not ball.mass_kg > 0:
+                raise ParameterError(f"ball mass {ball.mass_kg:g} kg is out of range: more than 0")
+            for motion in ball.motions:
+                spin = math.hypot(*motion.spin_rps)
+                if not spin <= 1000:
+                    raise ParameterError(f"spin of {spin:g} rps is out of range: at most 1000 rps")
+                if not motion.position_m[2] > 2 * ball.radius_m:
+                    raise ParameterError(f"the ball at {motion.position_m} m is not in front of the camera")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain dictionaries and lists, ready for JSON."""
+        plain: dict[str, Any] = _plain(self)
+        return plain
+
+    def to_json(self) -> str:
+        return json.dumps(self.to_dict(), sort_keys=True)
+
+    @classmethod
+    def from_dict(cls, plain: Mapping[str, Any]) -> Scene:
+        """The scene again; raises ParameterError when something is missing or unknown."""
+        try:
+            values = dict(plain)
+            values["balls"] = tuple(_ball(ball) for ball in values["balls"])
+            values["arm"] = None if values.get("arm") is None else _made(Arm, values["arm"])
+            for name, kind in (("background", Background), ("light", Light), ("air", Air)):
+                values[name] = _made(kind, values.get(name, {}))
+            return _made(cls, values)
+        except (KeyError, TypeError, AttributeError, ValueError) as error:
+            raise ParameterError(f"this is no scene of the simulator: {error}") from error
+
+    @classmethod
+    def from_json(cls, text: str) -> Scene:
+        """The scene written by `to_json`; raises ParameterError."""
+        try:
+            plain = json.loads(text)
+        except json.JSONDecodeError as error:
+            raise ParameterError(f"this is no scene of the simulator: {error}") from error
+        return cls.from_dict(plain)
+
+
+Kind = TypeVar("Kind")
+
+
+def _made(kind: type[Kind], plain: Mapping[str, Any]) -> Kind:
+    return kind(**{name: tuple(value) if isinstance(value, list) else value for name, value in plain.items()})
+
+
+def _ball(plain: Mapping[str, Any]) -> Ball:
+    values = dict(plain)
+    values["motions"] = tuple(
+        _made(Flight if "velocity_m_s" in motion else Fixed, motion)  # type: ignore[arg-type]
+        for motion in values["motions"]
+    )
+    values["logo"] = _made(Logo, values.get("logo", {}))
+    return _made(Ball, values)
+
+
+def _plain(value: Any) -> Any:
+    if dataclasses.is_dataclass(value):
+        return {item.name: _plain(getattr(value, item.name)) for item in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {name: _plain(item) for name, item in value.items()}
+    if isinstance(value, (tuple, list)):
+        return [_plain(item) for item in value]
+    return value

@@ -1,0 +1,289 @@
+"""From a scene to events: `simulate`."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..biases import PAPER, BiasParameters
+from ..camera import Camera, CameraParameters
+from ..errors import ParameterError
+from ..events import EventBatch
+from ..results import Truth
+from . import kernels
+from .backdrop import intensity_map
+from .bodies import ArmBody, BallBody, bodies_of
+from .scene import Scene
+from .sensor import EDGE, LOGO, OTHER, LabelledEvents, Lens, Sensor, noise, read_out, thresholds
+
+EDGE_STEP_PX = 0.25  # an outline moves less than this between two looks at it
+LONGEST_STEP_S = 250e-6
+CHUNK_ROWS = 2048  # poses held at a time; a multiple of the largest `every`
+LARGEST_EVERY = 64
+TRUTH_STEP_US = 500
+DARK_FLOOR = 1e-3  # dark current as an intensity: lets the logarithm live without light
+NORMALS = 1 << 16
+VERSION = 1  # of the model: raised whenever the same scene and seed give other events
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimulatedRecording:
+    """Events with their truth, and what is needed to simulate them again."""
+
+    events: EventBatch
+    truth: Truth
+    width_px: int
+    height_px: int
+    description: dict[str, Any]
+
+
+def default_camera(width_px: int = 1280, height_px: int = 720) -> Camera:
+    """The paper's camera."""
+    return Camera.of(CameraParameters(), width_px, height_px)
+
+
+def simulate(
+    scene: Scene,
+    *,
+    camera: Camera | None = None,
+    sensor: Sensor | BiasParameters = PAPER,
+    lens: Lens | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> SimulatedRecording:
+    """The events of a scene, with exact truth; the same arguments give the same events.
+
+    sensor : a pixel array in physical units, or biases to make one from
+    progress : called with the share done, 0 to 1
+    Raises ParameterError for a negative seed.
+    """
+    if seed < 0:
+        raise ParameterError(f"seed {seed} is out of range: 0 or more")
+    camera = default_camera() if camera is None else camera
+    lens = Lens() if lens is None else lens
+    array = Sensor.of(sensor) if isinstance(sensor, BiasParameters) else sensor
+    pattern, background, pixel = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
+    if array.pattern_seed is not None:
+        pattern = np.random.default_rng(array.pattern_seed)
+
+    backdrop = intensity_map(scene, camera)
+    work = _Simulation(scene, camera, array, lens, backdrop, pattern, pixel)
+    duration_us = round(scene.duration_s * 1e6)
+    moving = work.run(progress)
+    brightness = scene.light.illuminance_lux / REFERENCE_LUX
+    still = noise(array, backdrop * brightness, duration_us, camera.width_px, pattern, background)
+    read = read_out([moving, still], array, duration_us)
+    description = {
+        "version": VERSION,
+        "seed": seed,
+        "scene": scene.to_dict(),
+        "camera": dataclasses.asdict(camera),
+        "sensor": dataclasses.asdict(array),
+        "lens": dataclasses.asdict(lens),
+        "biases": sensor.as_dict() if isinstance(sensor, BiasParameters) else None,
+    }
+    truth = truth_of(scene, camera, read.label)
+    return SimulatedRecording(read.events, truth, camera.width_px, camera.height_px, description)
+
+
+def simulate_again(
+    description: dict[str, Any],
+    *,
+    sensor: Sensor | BiasParameters | None = None,
+    progress: Progress | None = None,
+) -> SimulatedRecording:
+    """The recording of a description again, or the same scene with another sensor; raises ParameterError."""
+    try:
+        scene = Scene.from_dict(description["scene"])
+        values = dict(description["camera"])
+        values["distortion"], values["up"] = tuple(values["distortion"]), tuple(values["up"])
+        camera, lens = Camera(**values), Lens(**description["lens"])
+        seed = int(description["seed"])
+        if sensor is None:
+            biases = description.get("biases")
+            sensor = Sensor(**description["sensor"]) if biases is None else BiasParameters(**biases)
+    except (KeyError, TypeError, ValueError) as error:
+        raise ParameterError(f"this is no description of a simulated recording: {error}") from error
+    return simulate(scene, camera=camera, sensor=sensor, lens=lens, seed=seed, progress=progress)
+
+
+REFERENCE_LUX = 1930.0  # the paper's setup, section 4.1
+
+
+def truth_of(scene: Scene, camera: Camera, label: NDArray[np.uint8]) -> Truth:
+    """The truth of the first ball every 500 us of its motions."""
+    columns: list[tuple[NDArray[Any], ...]] = []
+    for body in bodies_of(scene)[:1]:
+        assert isinstance(body, BallBody)
+        for path in body.paths:
+            first = -(-round(path.start_s * 1e6) // TRUTH_STEP_US) * TRUTH_STEP_US
+            t_us = np.arange(first, round(min(path.end_s, scene.duration_s) * 1e6), TRUTH_STEP_US, dtype=np.int64)
+            pose = path.at(t_us * 1e-6)
+            outline = camera.silhouette(pose.position_m, body.ball.radius_m)
+            columns.append((t_us, *outline, pose.position_m, pose.velocity_m_s, pose.spin_rps))
+    if not columns:
+        nothing, nowhere = np.empty(0), np.empty((0, 3))
+        columns.append((np.empty(0, np.int64), nothing, nothing, nothing, nowhere, nowhere, nowhere))
+    return Truth(*(np.concatenate(column) for column in zip(*columns, strict=True)), label=label)
+
+
+class _Simulation:
+    """The moving part: pixel state carried through the segments in which something moves in the image."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        camera: Camera,
+        sensor: Sensor,
+        lens: Lens,
+        backdrop: NDArray[np.float64],
+        pattern: np.random.Generator,
+        random: np.random.Generator,
+    ) -> None:
+        self.scene, self.camera, self.lens = scene, camera, lens
+        self.sensor, self.random = sensor, random
+        self.bodies = bodies_of(scene)
+        count = camera.width_px * camera.height_px
+        on, off = thresholds(sensor, count, pattern)
+        column, row = np.meshgrid(np.arange(camera.width_px), np.arange(camera.height_px))
+        rays = camera.rays(column.ravel(), row.ravel())
+        self.view = kernels.View(
+            np.ascontiguousarray(rays[:, 0]),
+            np.ascontiguousarray(rays[:, 1]),
+            backdrop,
+            on,
+            off,
+            random.standard_normal(NORMALS),
+        )
+        light = scene.light
+        self.physics = kernels.Physics(
+            tau_us=1e6 / (2 * math.pi * sensor.cutoff_hz),
+            dark_tau_us=sensor.dark_tau_us,
+            forget_per_us=2 * math.pi * sensor.highpass_hz * 1e-6,
+            refractory_us=sensor.refractory_us,
+            off_after_on_us=sensor.off_after_on_us,
+            contrast_noise=sensor.contrast_noise,
+            up_x=float(scene.up[0]),
+            up_y=float(scene.up[1]),
+            up_z=float(scene.up[2]),
+            sky=light.sky,
+            bounce=light.bounce,
+            brightness=light.illuminance_lux / REFERENCE_LUX,
+            floor=DARK_FLOOR,
+            flicker_depth=light.flicker_depth,
+            flicker_per_us=2 * math.pi * light.flicker_hz * 1e-6,
+            focal_px=camera.focal_px,
+            width_px=camera.width_px,
+        )
+        self.pixels = self._at_rest(count)
+        self.found: list[LabelledEvents] = []
+
+    def _at_rest(self, count: int) -> kernels.Pixels:
+        buffer = 4 * count if self.scene.light.flicker_depth else 1 << 20
+        return kernels.Pixels(
+            state=np.zeros((count, kernels.STATE_COLUMNS)),
+            role=np.full(count, kernels.NEW, np.uint8),
+            owner=np.zeros(count, np.uint8),
+            seen_in=np.full(count, -1, np.int32),
+            listing=np.zeros(count, np.int32),
+            cursor=np.zeros(3, np.int64),
+            event_us=np.empty(buffer),
+            event_word=np.empty(buffer, np.int64),
+        )
+
+    def run(self, progress: Progress | None) -> LabelledEvents:
+        """All events of moving bodies (and flicker), delayed and jittered, not sorted."""
+        end = self.scene.duration_s
+        visible = [body.visible(self.camera, end) for body in self.bodies]
+        edges = sorted({0.0, end, *(min(t, end) for spans in visible for span in spans for t in span)})
+        for start, stop in zip(edges[:-1], edges[1:], strict=True):
+            middle = (start + stop) / 2
+            there = [
+                body
+                for body, spans in zip(self.bodies, visible, strict=True)
+                if any(a <= middle < b for a, b in spans)
+            ]
+            if there or self.pixels.cursor[0] or self.scene.light.flicker_depth:
+                self._segment(there, start, stop, progress)
+        if not self.found:
+            return LabelledEvents(EventBatch.empty(), np.empty(0, np.uint8))
+        return LabelledEvents(
+            EventBatch.concatenate(part.events for part in self.found),
+            np.concatenate([part.label for part in self.found]),
+        )
+
+    def _segment(
+        self, there: Sequence[BallBody | ArmBody], start: float, stop: float, progress: Progress | None
+    ) -> None:
+        """Simulate [start, stop], in which these bodies and no others may be seen."""
+        wanted = [
+            min(EDGE_STEP_PX / max(body.speed_px_s(self.camera, start, stop), 1e-3), LONGEST_STEP_S) for body in there
+        ]
+        step = min(wanted, default=LONGEST_STEP_S)
+        every = [min(1 << int(math.log2(own / step)), LARGEST_EVERY) for own in wanted]
+        rows = max(math.ceil((stop - start) / step), 1)
+        fresh = start == 0.0
+        if fresh and self.scene.light.flicker_depth:
+            self._list_all()
+        for first in range(0, rows, CHUNK_ROWS):
+            if not (there or self.pixels.cursor[0]):
+                break  # everything has come to rest
+            count = min(CHUNK_ROWS, rows - first)
+            time_s = start + (stop - start) * np.arange(first, first + count + 1) / rows
+            self.pixels.seen_in[:] = -1
+            packed = _packed(there, every, self.camera, self.lens, time_s)
+            row = 0 if fresh and first == 0 else 1
+            while row <= count:
+                row = kernels.run(
+                    self.pixels, self.view, packed, self.physics, time_s * 1e6, row, fresh and first == 0 and row == 0
+                )
+                self._collect()
+            if progress is not None:
+                progress(min(float(time_s[-1]) / self.scene.duration_s, 1.0))
+
+    def _list_all(self) -> None:
+        """Under flickering light every pixel works all the time."""
+        kernels.begin_all(self.pixels, self.view, self.physics)
+
+    def _collect(self) -> None:
+        pixels, sensor = self.pixels, self.sensor
+        count = int(pixels.cursor[1])
+        pixels.cursor[1] = 0
+        late = sensor.delay_us + sensor.jitter_us * self.random.standard_normal(count)
+        word = pixels.event_word[:count]
+        y, x = np.divmod(word >> 16, self.camera.width_px)
+        # A delay is never negative: jitter beyond that is cut.
+        t_us = np.floor(pixels.event_us[:count] + np.maximum(late, 0.0)).astype(np.int64)
+        other, logo, on = (word >> 8) & 0xFF > 0, word & 2 > 0, word & 1 > 0
+        label = np.where(other, OTHER, np.where(logo, LOGO, EDGE)).astype(np.uint8)
+        self.found.append(LabelledEvents(EventBatch(t_us, x.astype(np.uint16), y.astype(np.uint16), on), label))
+
+
+def _packed(
+    there: Sequence[BallBody | ArmBody],
+    every: Sequence[int],
+    camera: Camera,
+    lens: Lens,
+    time_s: NDArray[np.float64],
+) -> kernels.Bodies:
+    """The bodies at these times in the kernels' form, from far to near."""
+    order = sorted(range(len(there)), key=lambda k: -there[k].distance_m(time_s))
+    packed = [there[k].packed(camera, lens, time_s, every[k]) for k in order]
+    side = max((body.ink.shape[0] for body in packed), default=2)
+    ink = np.zeros((len(packed), side, side), np.float32)
+    for k, body in enumerate(packed):
+        ink[k, : body.ink.shape[0], : body.ink.shape[1]] = body.ink
+    pose = np.empty((time_s.size, len(packed), kernels.POSE_COLUMNS))
+    box = np.empty((time_s.size, len(packed), 4), np.int32)
+    kind = np.empty((len(packed), kernels.BODY_COLUMNS))
+    for k, body in enumerate(packed):
+        pose[:, k], box[:, k], kind[k] = body.pose, body.box, body.kind
+    return kernels.Bodies(pose, box, kind, ink)

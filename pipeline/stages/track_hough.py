@@ -1,0 +1,143 @@
+"""Hough circles for the tracker: one near a prediction, candidates anywhere, and the one of a single image."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..events import EventBatch
+from ..kernels import circle as kernels
+from ..kernels import contour
+from ..results import Circle
+from .surface import SurfaceResult
+
+# A surface pixel at half of full brightness or more counts as an edge that is there now.
+EDGE_LEVEL = 128
+# Votes reach this far around a predicted centre, at least.
+REACH_PX = 6
+# Cells of the coarse search: a ball of 5 px radius is then still a ring around an empty cell.
+CELL_PX = 4
+# More edge pixels than this are thinned: a ring of 40 px radius two pixels wide has 500.
+MOST_PIXELS = 250
+
+
+def hough_near(
+    surface: SurfaceResult,
+    x_px: float,
+    y_px: float,
+    radius_from_px: float,
+    radius_to_px: float,
+    reach_px: int = REACH_PX,
+) -> Circle | None:
+    """The best circle of the surface with its centre within reach_px of this place and a radius between these.
+
+    None when no edge pixel votes for such a circle.
+    """
+    first_radius = max(1, round(radius_from_px))
+    radii = max(1, round(radius_to_px) - first_radius + 1)
+    margin = first_radius + radii + reach_px
+    height, width = surface.values.shape
+    x0, y0 = max(0, round(x_px) - margin), max(0, round(y_px) - margin)
+    x1, y1 = min(width, round(x_px) + margin + 1), min(height, round(y_px) + margin + 1)
+    if x0 >= x1 or y0 >= y1:
+        return None
+    xs, ys = kernels.bright_pixels(surface.cleaned(x0, y0, x1, y1), EDGE_LEVEL, MOST_PIXELS)
+    votes = np.zeros((2 * reach_px + 1, 2 * reach_px + 1, radii), np.uint16)
+    left, top = round(x_px) - reach_px, round(y_px) - reach_px
+    kernels.vote(votes, xs + x0, ys + y0, left, top, first_radius)
+    return _circle_of_peak(votes, left, top, first_radius)
+
+
+def candidates(
+    surface: SurfaceResult,
+    events: EventBatch,
+    radius_min_px: float,
+    radius_max_px: float,
+    most: int,
+) -> Iterator[Circle]:
+    """Circles anywhere, best first: a coarse vote of the cells with fresh edges, refined pixel by pixel.
+
+    events : the contour events that may belong to an edge (where the surface is bright)
+    Nothing comes when fewer than five cells are active.
+    """
+    columns, rows = kernels.active_cells(surface.values, events.x_px, events.y_px, EDGE_LEVEL, CELL_PX)
+    if columns.size < 5:
+        return
+    first_radius = max(1, math.floor(radius_min_px / CELL_PX))
+    radii = math.ceil(radius_max_px / CELL_PX) - first_radius + 1
+    reach = first_radius + radii
+    left, top = int(columns.min()) - reach, int(rows.min()) - reach
+    shape = (int(rows.max()) + reach + 1 - top, int(columns.max()) + reach + 1 - left, radii)
+    votes = np.zeros(shape, np.uint16)
+    kernels.vote(votes, columns, rows, left, top, first_radius)
+    for _ in range(most):
+        support, a, b, k = kernels.peak(votes, first_radius)
+        if support < 1.0:
+            return
+        centre = (np.array([left + a, top + b]) + 0.5) * CELL_PX - 0.5
+        radius = (first_radius + k) * CELL_PX
+        near = max(1, (first_radius + k) // 2)
+        votes[max(0, b - near) : b + near + 1, max(0, a - near) : a + near + 1] = 0
+        found = hough_near(
+            surface,
+            *centre,
+            max(radius - 1.5 * CELL_PX, radius_min_px),
+            min(radius + 1.5 * CELL_PX, radius_max_px),
+            2 * CELL_PX,
+        )
+        if found is not None:
+            yield found
+
+
+def find_circle(image: NDArray[Any], radius_min_px: float, radius_max_px: float) -> Circle | None:
+    """The circle that the set pixels of one image draw best, to sub-pixel; None when they draw none.
+
+    image : (height, width) bool or uint8; pixels of at least half its maximum count. For single frames without
+        times and polarities, such as accumulated events; the centre may lie outside the image.
+    The score is the share of the outline's directions (out of 24) that have a pixel within 1.5 px; less than half
+    is no circle.
+    """
+    pixels = np.ascontiguousarray(image).view(np.uint8)
+    brightest = int(pixels.max(initial=0))
+    if brightest == 0:
+        return None
+    xs, ys = kernels.bright_pixels(pixels, (brightest + 1) // 2, 4000)
+    first_radius = max(1, math.floor(radius_min_px))
+    radii = math.ceil(radius_max_px) - first_radius + 1
+    height, width = pixels.shape
+    votes = np.zeros((height + 2 * radii, width + 2 * radii, radii), np.uint16)
+    kernels.vote(votes, xs, ys, -radii, -radii, first_radius)
+    start = _circle_of_peak(votes, -radii, -radii, first_radius)
+    if start is None:
+        return None
+    x, y, still = xs.astype(np.float64), ys.astype(np.float64), np.zeros(xs.size)
+    ring, _, _, weight = contour.fit_ring(
+        np.array([start.x_px, start.y_px, 0.0, 0.0, start.radius_px]),
+        np.array([1e6, 1e6, 0.0, 0.0, 1e6]),
+        np.zeros(2),
+        still,
+        x,
+        y,
+        0.25 * start.radius_px + 1.0,
+        1.5,
+        10,
+    )
+    if weight < 5 or not radius_min_px <= ring[4] <= radius_max_px:
+        ring = np.array([start.x_px, start.y_px, 0.0, 0.0, start.radius_px])
+    near = np.abs(contour.residuals(ring, np.zeros(2), still, x, y)) < 1.5
+    angle = np.arctan2(y[near] - ring[1], x[near] - ring[0]) % (2 * math.pi)
+    score = np.unique((angle * 12 / math.pi).astype(np.int64)).size / 24
+    return Circle(float(ring[0]), float(ring[1]), float(ring[4]), score) if score >= 0.5 else None
+
+
+def _circle_of_peak(votes: NDArray[np.uint16], left_px: int, top_px: int, first_radius_px: int) -> Circle | None:
+    support, a, b, k = kernels.peak(votes, first_radius_px)
+    if support == 0.0:
+        return None
+    x, y, radius = kernels.refined(votes, a, b, k)
+    score = min(1.0, int(votes[b, a, k]) / (2 * math.pi * (first_radius_px + k)))
+    return Circle(left_px + x, top_px + y, first_radius_px + radius, score)

@@ -1,0 +1,218 @@
+"""The ball's outline measured in the events, to sub-pixel: the refinement of the tracker's Hough circles.
+
+Only the half of the outline that moves outwards is fitted, the background-to-ball edge: it is as sharp as the
+pixels allow whatever the light. At the other half the ball's own shading fires before the edge comes, by up to
+0.8 px on the samples, which differs from shot to shot.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Camera
+from ..events import EventBatch
+from ..kernels import contour as kernels
+from ..results import Circle
+
+Floats = NDArray[np.float64]
+
+# Events used for a fit: beyond this the pixels' common errors outweigh the statistical one (0.1 px / sqrt(n)).
+MOST_EVENTS = 300
+# An event this near the fitted outline supports it: four times the scatter seen on clean outlines (0.1-0.15 px),
+# and room for the early events behind.
+ON_OUTLINE_PX = 1.2
+SECTORS = 32
+# A ring's scatter above this is no outline but a band of events.
+MOST_SCATTER_PX = 0.5
+# The velocity vote looks this far back in time; longer bends the test, shorter leaves too few events.
+VOTE_US = 1500
+# Events that vote for the velocity: a ring of them stands out among some 200 velocities.
+MOST_VOTERS = 120
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What may be a ball: radii in px, speeds in ball radii a second (so that they hold at any distance)."""
+
+    radius_min_px: float
+    radius_max_px: float
+    speed_min_radii_s: float
+    speed_max_radii_s: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sighting:
+    """One measured outline at the end of a tick.
+
+    ring : (5,) float64 [x, y, vx, vy, radius] of the outline as the events show it (px, px/s)
+    covariance : (5, 5) float64, from the scatter of the events alone
+    scatter_px : 1 sigma of the events' distances from the outline
+    events : events on the outline, both halves
+    ahead, behind : share of the visible outline that has events, where it moves outwards and inwards
+    contrast : share of ON events ahead less that behind: +1 for a bright ball, -1 for a dark one
+    visible : share of the outline that is in the image
+    clutter : events just outside the outline, for each one on it
+    """
+
+    ring: Floats
+    covariance: Floats
+    scatter_px: float
+    events: int
+    ahead: float
+    behind: float
+    contrast: float
+    ahead_on: float
+    visible: float
+    clutter: float
+
+    @property
+    def speed_px_s(self) -> float:
+        return math.hypot(self.ring[2], self.ring[3])
+
+    def circle(self, outline_px: float) -> Circle:
+        """The ball's silhouette: the outline less the width by which pixels see it too large."""
+        return Circle(
+            float(self.ring[0]), float(self.ring[1]), float(self.ring[4]) - outline_px, (self.ahead + self.behind) / 2
+        )
+
+    @property
+    def trusted(self) -> bool:
+        """Whether this one outline alone is enough to start a track: both halves, each of its own polarity."""
+        return (
+            self.ahead >= 0.8
+            and self.behind >= 0.6
+            and abs(self.contrast) >= 0.8
+            and self.visible >= 0.6
+            and self.clutter <= 0.3
+        )
+
+    @property
+    def promising(self) -> bool:
+        """Whether this may be a ball coming in: the half ahead is there and of one polarity."""
+        return self.ahead >= 0.7 and max(self.ahead_on, 1 - self.ahead_on) >= 0.85 and self.clutter <= 0.5
+
+
+def oval_of(camera: Camera, x_px: float, y_px: float) -> Floats:
+    """(2,) float64 departure from a circle of a sphere's outline around this pixel, as the contour kernels take it.
+
+    The semi-axes are as 1 to cos(theta), the longer one pointing away from the principal point (`Camera`).
+    """
+    x, y = x_px - camera.principal_x_px, y_px - camera.principal_y_px
+    square = x * x + y * y
+    if square < 1.0:
+        return np.zeros(2)
+    ratio = math.sqrt(1.0 + square / camera.focal_px**2)
+    strength = (ratio - 1.0) / (ratio + 1.0) / square
+    return np.array([(x * x - y * y) * strength, 2.0 * x * y * strength])
+
+
+def measure(
+    events: EventBatch,
+    end_us: int,
+    camera: Camera,
+    expected: Floats,
+    gate_px: float,
+    prior_std: Floats,
+) -> Sighting | None:
+    """Fit the outline near an expected ring (5,) at end_us; None when there are too few events or no ring results.
+
+    gate_px : events this near the expected outline take part; prior_std (5,) : how firmly the expectation holds
+    """
+    oval = oval_of(camera, expected[0], expected[1])
+    chosen = kernels.near_outline(
+        expected, events.t_us, events.x_px, events.y_px, end_us, gate_px, MOST_EVENTS, True
+    )
+    if chosen.size < 12:
+        return None
+    ring, covariance, scatter, weight = kernels.fit_ring(
+        expected, prior_std, oval, *_columns(events, chosen, end_us), gate_px, 0.5, 8
+    )
+    if not (np.all(np.isfinite(ring)) and ring[4] > 1.0 and weight >= 8.0 and scatter <= MOST_SCATTER_PX):
+        return None
+    return _judged(events, end_us, camera, ring, covariance, scatter, oval)
+
+
+def _judged(
+    events: EventBatch,
+    end_us: int,
+    camera: Camera,
+    ring: Floats,
+    covariance: Floats,
+    scatter: float,
+    oval: Floats,
+) -> Sighting:
+    around = kernels.near_outline(
+        ring, events.t_us, events.x_px, events.y_px, end_us, 4 * ON_OUTLINE_PX, 400, False
+    )
+    found, ahead_on, behind_on, ahead, behind, visible, outside, _ = kernels.support(
+        ring,
+        oval,
+        *_columns(events, around, end_us),
+        events.on[around],
+        camera.width_px,
+        camera.height_px,
+        ON_OUTLINE_PX,
+        SECTORS,
+    ).tolist()
+    return Sighting(
+        ring,
+        covariance,
+        scatter,
+        int(found),
+        ahead,
+        behind,
+        ahead_on - behind_on,
+        ahead_on,
+        visible,
+        outside / max(found, 1.0),
+    )
+
+
+def sight(events: EventBatch, end_us: int, camera: Camera, circle: Circle, limits: Limits) -> Sighting | None:
+    """The moving outline behind a Hough circle: its velocity by vote, then the fit; None when there is none."""
+    radius = circle.radius_px
+    fastest = limits.speed_max_radii_s * radius
+    recent = events.between(end_us - VOTE_US, end_us)
+    reach = 1.3 * radius + fastest * VOTE_US * 1e-6
+    chosen = np.flatnonzero(
+        (np.abs(recent.x_px - circle.x_px) <= reach) & (np.abs(recent.y_px - circle.y_px) <= reach)
+    )
+    chosen = chosen[:: max(1, chosen.size // MOST_VOTERS)]
+    if chosen.size < 12:
+        return None
+    columns = _columns(recent, chosen, end_us)
+    ring = np.array([circle.x_px, circle.y_px, 0.0, 0.0, radius])
+    # Two rounds: all velocities with an outline as wide as the steps, then between them. The second width is what
+    # a Hough circle may be off, about 2 px on balls of 20 px.
+    for gate, span in ((0.3 * radius, fastest), (max(2.0, 0.15 * radius), 0.3 * radius / (VOTE_US * 1e-6))):
+        velocity_step = gate / (VOTE_US * 1e-6)
+        m = math.ceil(span / velocity_step)
+        votes = np.zeros((2 * m + 1, 2 * m + 1))
+        kernels.vote_velocity(votes, ring, *columns, recent.on[chosen], velocity_step, gate)
+        row, column = divmod(int(np.argmax(np.abs(votes))), votes.shape[1])
+        ring[2] += (column - m) * velocity_step
+        ring[3] += (row - m) * velocity_step
+    free = np.full(5, 1e9)
+    first = measure(recent, end_us, camera, ring, 1.5 * gate, free)
+    if first is None:
+        return None
+    found = measure(events, end_us, camera, first.ring, 3.0, free)
+    if found is None:
+        return None
+    size = found.ring[4]
+    fits = limits.radius_min_px <= size <= limits.radius_max_px
+    speed = found.speed_px_s / size
+    return found if fits and limits.speed_min_radii_s <= speed <= limits.speed_max_radii_s else None
+
+
+def _columns(events: EventBatch, chosen: NDArray[np.int64], end_us: int) -> tuple[Floats, Floats, Floats]:
+    """Seconds after end_us, and pixels, of the chosen events, as float64."""
+    return (
+        (events.t_us[chosen] - end_us) * 1e-6,
+        events.x_px[chosen].astype(np.float64),
+        events.y_px[chosen].astype(np.float64),
+    )

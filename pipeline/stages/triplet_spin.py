@@ -1,0 +1,120 @@
+"""The paper's spin from Triplet Matching's flow (section 3.3), and the full-rank solve of the same flow."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Setting
+from ..kernels.sphere import surface_velocity
+from ..results import SpinEstimate
+from .flow import FlowResult
+from .rate import RateResult
+
+if TYPE_CHECKING:
+    from .spin import SpinParameters
+
+Floats = NDArray[np.float64]
+
+# The full-rank solve needs logo seen from several sides: with all e_r within about 6 degrees of each other
+# (sin^2 = 0.01) the component along them is left to noise.
+FEWEST_DIRECTIONS = 0.01
+
+
+class TripletSpin:
+    """Triplet Matching's spin of one shot, slice by slice.
+
+    For v = omega x r the paper's omega = e_r x v / |r| is omega - (e_r . omega) e_r: each event gives the part of the
+    spin perpendicular to its e_r only, and their mean loses what the logo's places have in common. A logo that stays
+    60 degrees from the axis costs about 25 degrees of axis, sidespin with a logo at 45 degrees half the magnitude.
+    `least_squares` solves sum(I - e_r e_r^T) omega = sum e_r x v / |r| and loses nothing by that; what is left is
+    that the flow of a local method is normal flow.
+
+    The paper has no refusal besides having no flow, and so has none here.
+
+    Magnitude: section 3.3 takes "a better estimate of the spin magnitude" from the event rate, and only that explains
+    the errors of 0.5 rps with 0.1 rps spread at 100 ms beside 30 rps at 10 ms (table 1). So once the event rate has
+    a rhythm, it gives the magnitude (and t_acc) and the flow gives the axis; `triplet_magnitude = flow` uses it for
+    t_acc alone.
+    """
+
+    def __init__(self, parameters: SpinParameters, setting: Setting) -> None:
+        self.parameters = parameters
+        self.setting = setting
+        self.end_us: list[int] = []
+        self.counts: list[int] = []
+        self.moments: list[Floats] = []  # a slice's sum of e_r x v / |r|, rad/s
+        self.squares: list[Floats] = []  # a slice's sum of I - e_r e_r^T
+
+    def estimate(self, end_us: int, flow: FlowResult, rate: RateResult) -> SpinEstimate:
+        """The estimate from the shot's slices so far (those of the last spin.window_us)."""
+        self._add(flow)
+        self._forget(end_us - self.parameters.window_us)
+        if not self.counts:
+            return SpinEstimate.refused("triplet", "no flow")
+        counts = np.array(self.counts, np.float64)
+        moments, squares = np.array(self.moments), np.array(self.squares)
+        if self.parameters.triplet_solve == "paper":
+            spin, covariance = _mean_of_slices(moments / counts[:, None])
+        else:
+            matrix = squares.sum(axis=0)
+            if np.linalg.eigvalsh(matrix)[0] < FEWEST_DIRECTIONS * counts.sum():
+                return SpinEstimate.refused("triplet", "the logo is seen from one side only", int(counts.sum()))
+            spin, covariance = _full_rank(matrix, moments, squares)
+        vector_rps, covariance_rps2 = spin / (2 * math.pi), covariance / (2 * math.pi) ** 2
+        if self.parameters.triplet_magnitude == "rate" and rate.spin_rps is not None:
+            vector_rps, covariance_rps2 = _with_magnitude(vector_rps, covariance_rps2, rate)
+        return SpinEstimate("triplet", vector_rps, covariance_rps2, None, int(counts.sum()))
+
+    def _add(self, flow: FlowResult) -> None:
+        if not flow.t_us.size:
+            return
+        velocity = surface_velocity(
+            flow.points_m, flow.normals, flow.vx_px_s, flow.vy_px_s, self.setting.camera.focal_px
+        )
+        moment = np.cross(flow.normals, velocity) / self.setting.ball_radius_m
+        firsts = np.flatnonzero(np.diff(flow.slice_index, prepend=flow.slice_index[0] - 1))
+        for first, last in zip(firsts, [*firsts[1:], flow.slice_index.size], strict=True):
+            normals = flow.normals[first:last]
+            self.end_us.append(int(flow.t_us[last - 1]))
+            self.counts.append(int(last - first))
+            self.moments.append(moment[first:last].sum(axis=0))
+            self.squares.append((last - first) * np.eye(3) - normals.T @ normals)
+
+    def _forget(self, before_us: int) -> None:
+        keep = next((i for i, end_us in enumerate(self.end_us) if end_us >= before_us), len(self.end_us))
+        for column in (self.end_us, self.counts, self.moments, self.squares):
+            del column[:keep]
+
+
+def _mean_of_slices(spins: Floats) -> tuple[Floats, Floats]:
+    """Mean over the slices and its covariance from their spread; a single slice is as uncertain as it is long."""
+    mean = spins.mean(axis=0)
+    if len(spins) == 1:
+        return mean, np.eye(3) * float(mean @ mean)
+    return mean, np.cov(spins.T) / len(spins)
+
+
+def _full_rank(matrix: Floats, moments: Floats, squares: Floats) -> tuple[Floats, Floats]:
+    """Least squares over all slices, with the covariance that the slices' own residuals give."""
+    inverse = np.linalg.inv(matrix)
+    spin = inverse @ moments.sum(axis=0)
+    if len(moments) == 1:
+        return spin, np.eye(3) * float(spin @ spin)
+    residuals = moments - squares @ spin
+    return spin, inverse @ (residuals.T @ residuals) @ inverse * len(moments) / (len(moments) - 1)
+
+
+def _with_magnitude(vector_rps: Floats, covariance_rps2: Floats, rate: RateResult) -> tuple[Floats, Floats]:
+    """The same axis with the event rate's magnitude: across the axis the covariance is scaled, along it replaced."""
+    assert rate.spin_rps is not None and rate.spin_std_rps is not None
+    length = float(np.linalg.norm(vector_rps))
+    if length == 0.0:
+        return vector_rps, covariance_rps2
+    axis = vector_rps / length
+    across = np.eye(3) - np.outer(axis, axis)
+    scaled = across @ covariance_rps2 @ across * (rate.spin_rps / length) ** 2
+    return rate.spin_rps * axis, scaled + np.outer(axis, axis) * rate.spin_std_rps**2

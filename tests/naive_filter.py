@@ -1,0 +1,36 @@
+"""The slow twin of the filters: one dictionary entry a pixel, the definitions word by word."""
+
+from __future__ import annotations
+
+
+class NaiveFilter:
+    """One filter with its memory of every pixel."""
+
+    def __init__(self, mode: str, threshold_us: int) -> None:
+        self.mode, self.threshold_us = mode, threshold_us
+        self.last: dict[tuple[int, int], tuple[int, bool]] = {}
+        self.passed_since_change: set[tuple[int, int]] = set()
+
+    def passes(self, t_us: int, x_px: int, y_px: int, on: bool) -> bool:
+        """Whether this event, the next one, passes."""
+        pixel = (x_px, y_px)
+        before = self.last.get(pixel)
+        self.last[pixel] = (t_us, on)
+        if before is None or before[1] != on:
+            self.passed_since_change.discard(pixel)
+        passed = self._passes(pixel, before, t_us, on)
+        if passed:
+            self.passed_since_change.add(pixel)
+        return passed
+
+    def _passes(self, pixel: tuple[int, int], before: tuple[int, bool] | None, t_us: int, on: bool) -> bool:
+        if self.mode == "off":
+            return True
+        if before is None:
+            return self.mode == "trail"
+        pause_us, same = t_us - before[0], before[1] == on
+        if self.mode == "trail":
+            return not same or pause_us >= self.threshold_us
+        if self.mode == "stc":
+            return same and pause_us <= self.threshold_us
+        return same and pause_us <= self.threshold_us and pixel not in self.passed_since_change

@@ -1,0 +1,211 @@
+"""Slow, obvious twins of the readers' kernels: whole files as lists, one word after the other."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+Event = tuple[int, int, int, bool]  # t_us, x, y, on
+Ints = NDArray[np.int64]
+MAX_DISORDER_US = 10_000
+
+
+@dataclass
+class NaiveDecoded:
+    """Events and triggers (t_us, value, id) as the words say, and what was wrong."""
+
+    events: list[Event] = field(default_factory=list)
+    triggers: list[tuple[int, int, int]] = field(default_factory=list)
+    bad_words: int = 0
+    time_jumps: int = 0
+    untimed: int = 0
+    outside: int = 0
+
+
+class NaiveClock:
+    """The rule for TIME_HIGH words, in plain numbers: `turn` values until it wraps."""
+
+    def __init__(self, decoded: NaiveDecoded, turn: int, unit_us: int, free_steps: int) -> None:
+        self.decoded, self.turn, self.unit_us, self.free_steps = decoded, turn, unit_us, free_steps
+        self.high: int | None = None
+        self.sure = False
+
+    def take(self, value: int, following: int | None) -> None:
+        """A TIME_HIGH word with the value of the next one in the file, None at its end."""
+        if self.high is None:
+            if following is not None and (following - value) % self.turn >= self.turn // 2:
+                self.decoded.time_jumps += 1
+            else:
+                self.high, self.sure = value, True
+            return
+        ahead = (value - self.high) % self.turn
+        if ahead > self.free_steps:
+            if following is None:
+                believed = ahead * self.unit_us <= 1_000_000
+                contradicted = False
+            else:
+                believed, contradicted = True, (following - self.high) % self.turn < ahead
+            if not believed or contradicted:
+                self.decoded.time_jumps += 1
+                self.sure = self.sure and contradicted
+                return
+        if ahead > self.turn // 2 and self.high + ahead - self.turn >= 0:
+            ahead -= self.turn
+        self.high, self.sure = self.high + ahead, True
+
+
+def next_high(words: list[int], at: int, shift: int, mask: int) -> int | None:
+    """Value of the first TIME_HIGH word after `at`."""
+    return next((w & mask for w in words[at + 1 :] if w >> shift == 0x8), None)
+
+
+def naive_evt3(words: list[int]) -> NaiveDecoded:
+    """EVT3, word by word."""
+    out = NaiveDecoded()
+    clock = NaiveClock(out, 4096, 4096, 1)
+    low, row, base, on = 0, None, None, False
+    for at, word in enumerate(words):
+        kind, value = word >> 12, word & 0xFFF
+        if kind == 0x0:
+            row = value & 0x7FF
+        elif kind == 0x2:
+            if clock.sure and row is not None:
+                out.events.append((clock.high * 4096 + low, value & 0x7FF, row, bool(value & 0x800)))
+            else:
+                out.untimed += 1
+        elif kind == 0x3:
+            base, on = value & 0x7FF, bool(value & 0x800)
+        elif kind in (0x4, 0x5):
+            width = 12 if kind == 0x4 else 8
+            for bit in range(width):
+                if value & (1 << bit):
+                    if not clock.sure or row is None or base is None:
+                        out.untimed += 1
+                    elif base + bit >= 2048:
+                        out.outside += 1
+                    else:
+                        out.events.append((clock.high * 4096 + low, base + bit, row, on))
+            if base is not None:
+                base += width
+        elif kind == 0x6:
+            low = value
+        elif kind == 0x8:
+            before = clock.high
+            clock.take(value, next_high(words, at, 12, 0xFFF))
+            if clock.high != before:
+                low = 0
+        elif kind == 0xA:
+            if clock.sure:
+                out.triggers.append((clock.high * 4096 + low, value & 1, value >> 8))
+        elif kind not in (0x7, 0xE, 0xF):
+            out.bad_words += 1
+    return out
+
+
+def naive_evt2(heads: list[int], masks: list[int] | None = None) -> NaiveDecoded:
+    """EVT2, or EVT2.1 with the masks of the pixels behind x, word by word."""
+    out = NaiveDecoded()
+    clock = NaiveClock(out, 1 << 28, 64, 155)
+    for at, word in enumerate(heads):
+        kind, low = word >> 28, (word >> 22) & 0x3F
+        if kind in (0x0, 0x1):
+            mask = 1 if masks is None else masks[at]
+            for bit in range(32):
+                x = ((word >> 11) & 0x7FF) + bit
+                if mask & (1 << bit):
+                    if not clock.sure:
+                        out.untimed += 1
+                    elif x >= 2048:
+                        out.outside += 1
+                    else:
+                        out.events.append((clock.high * 64 + low, x, word & 0x7FF, kind == 0x1))
+        elif kind == 0x8:
+            clock.take(word & 0xFFFFFFF, next_high(heads, at, 28, 0xFFFFFFF))
+        elif kind == 0xA:
+            if clock.sure:
+                out.triggers.append((clock.high * 64 + low, word & 1, (word >> 8) & 0x1F))
+        elif kind not in (0xE, 0xF):
+            out.bad_words += 1
+    return out
+
+
+def naive_order(events: list[Event]) -> tuple[list[Event], int, int]:
+    """Events in order of time, how many were earlier than the one before, and how many too late to keep."""
+    kept, latest, late = [], None, 0
+    for event in events:
+        latest = event[0] if latest is None else max(latest, event[0])
+        if event[0] < latest - MAX_DISORDER_US:
+            late += 1
+        else:
+            kept.append(event)
+    backward = sum(b[0] < a[0] for a, b in pairwise(events))
+    return sorted(kept, key=lambda event: event[0]), backward, late
+
+
+def ecf_block(
+    t: NDArray[np.int64], x: NDArray[np.int64], y: NDArray[np.int64], p: NDArray[np.int64], way: int
+) -> bytes:
+    """A block of Prophesee's ECF: way 2 packs y, x, p together, 1 packs x and p, 0 none; times must not fall."""
+    n = len(t)
+    out = struct.pack("<IQ", n << 2 | way, int(t[0])) + _ecf_times([int(v) for v in t])
+    events = [(int(a), int(b), int(c)) for a, b, c in zip(y, x, p, strict=True)] + [(0, 0, 0)] * (-n % 4)
+    if way == 2:
+        for k in range(0, len(events), 4):
+            a, b, c, d = ((y << 12) | (x << 1) | p for y, x, p in events[k : k + 4])
+            out += struct.pack("<3I", a << 8 | b & 0xFF, (b >> 8) << 16 | c & 0xFFFF, (c >> 16) << 24 | d)
+        return out
+    out += _ecf_runs([int(v) for v in y], "<H", 5)
+    if way == 1:
+        for k in range(0, len(events), 4):
+            a, b, c, d = ((x << 1) | p for _, x, p in events[k : k + 4])
+            out += struct.pack("<3H", a << 4 | b & 0xF, (b >> 4) << 8 | c & 0xFF, (c >> 8) << 12 | d)
+        return out
+    return out + _ecf_columns([int(v) for v in x]) + _ecf_runs([int(v) for v in p], "<B", 7)
+
+
+def _run_lengths(values: list[int]) -> list[tuple[int, int]]:
+    runs: list[tuple[int, int]] = []
+    for value in values:
+        if runs and runs[-1][0] == value:
+            runs[-1] = (value, runs[-1][1] + 1)
+        else:
+            runs.append((value, 1))
+    return runs
+
+
+def _ecf_times(t: list[int]) -> bytes:
+    out, now = b"", t[0]
+    for value, count in _run_lengths(t):
+        step = value - now
+        if step >= 15:
+            while step:
+                out += bytes([0xF0 | step & 15])
+                step >>= 4
+        now = value
+        out += bytes([step << 4 | min(count, 15)]) + (struct.pack("<H", count) if count >= 15 else b"")
+    return out
+
+
+def _ecf_runs(values: list[int], word: str, bits: int) -> bytes:
+    full, out = (1 << bits) - 1, b""
+    for value, count in _run_lengths(values):
+        out += struct.pack(word, value << bits | min(count, full))
+        out += struct.pack("<H", count) if count >= full else b""
+    return out
+
+
+def _ecf_columns(x: list[int]) -> bytes:
+    out, k = b"", 0
+    while k < len(x):
+        first, word = x[k], x[k] << 5
+        k += 1
+        for step in range(1, 6):
+            if k < len(x) and x[k] == first + step:
+                word |= 1 << (5 - step)
+                k += 1
+        out += struct.pack("<H", word)
+    return out

@@ -1,0 +1,140 @@
+"""What every stage must keep, tried on real stages with real events: the flight and the spinner of the samples."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from pipeline.chain import STAGES, Chain, EventSource, Parameters, Tick
+from pipeline.events import EventBatch
+
+FIXED = Parameters().with_values(
+    {"track": {"ball": "fixed", "fixed_x_px": 528.43, "fixed_y_px": 426.87, "fixed_radius_px": 16.49}}
+)
+CASES = {
+    "flight": ("flight_fast_top", Parameters(), 20_000, 60_000),
+    "flight at 1 kHz": ("flight_back", Parameters().with_assignments(["track.tick_us=1000"]), 30_000, 55_000),
+    "spinner": ("spinner_ball2_side", FIXED, 0, 40_000),
+}
+
+
+def leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Every array and plain value inside a nested result, with its path."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        for field in dataclasses.fields(value):
+            yield from leaves(getattr(value, field.name), f"{path}.{field.name}")
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            yield from leaves(item, f"{path}[{key}]")
+    elif isinstance(value, (list, tuple)):
+        for number, item in enumerate(value):
+            yield from leaves(item, f"{path}[{number}]")
+    else:
+        yield path, value
+
+
+def assert_same(one: Any, other: Any) -> None:
+    """Equal to the last bit, NaN equal to NaN."""
+    pairs = list(zip(leaves(one), leaves(other), strict=True))
+    assert pairs
+    for (path, a), (_, b) in pairs:
+        if isinstance(a, np.ndarray):
+            assert a.dtype == b.dtype, path
+            assert np.array_equal(a, b, equal_nan=a.dtype.kind == "f"), path
+        else:
+            assert a == b or (a != a and b != b), path
+
+
+@pytest.fixture(scope="module", params=CASES)
+def case(request: pytest.FixtureRequest, samples: Path) -> tuple[EventSource, Parameters]:
+    name, parameters, start_us, end_us = CASES[request.param]
+    with h5py.File(samples / f"{name}.h5") as file:
+        t, x, y, p = (file[f"events/{key}"][:] for key in "txyp")
+    events = EventBatch.checked(t, x, y, p == 1, width_px=1280, height_px=720).between(start_us, end_us)
+    return EventSource(name, events, 1280, 720, start_us, end_us), parameters
+
+
+@pytest.fixture(scope="module")
+def ticks(case: tuple[EventSource, Parameters]) -> list[Tick]:
+    source, parameters = case
+    return list(Chain(source).run(parameters))
+
+
+def test_every_stage_says_something_in_the_end(ticks: list[Tick]) -> None:
+    assert any(len(tick.logo.events) for tick in ticks)
+    assert any(len(tick.flow.t_us) for tick in ticks)
+    assert any(estimate.status == "ok" for tick in ticks for estimate in tick.spin.estimates.values())
+
+
+def test_a_second_run_is_equal_bit_for_bit(case: tuple[EventSource, Parameters], ticks: list[Tick]) -> None:
+    source, parameters = case
+    for one, other in zip(ticks, Chain(source).run(parameters), strict=True):
+        assert_same(one, other)
+
+
+def test_live_gives_the_same_as_batch(case: tuple[EventSource, Parameters], ticks: list[Tick]) -> None:
+    """The source grows by uneven bits, as a USB driver brings them."""
+    source, parameters = case
+    chain = Chain(dataclasses.replace(source, growing=True, end_us=source.start_us))
+    for end_us in range(source.start_us, source.end_us, 7300):
+        chain.source = dataclasses.replace(source, growing=True, end_us=end_us)
+        for _ in chain.run(parameters):
+            pass
+    chain.source = source
+    for one, other in zip(ticks, chain.run(parameters), strict=True):
+        assert_same(one, other)
+
+
+@pytest.mark.parametrize("name", STAGES)
+def test_a_stage_leaves_inputs_and_earlier_results_alone(
+    case: tuple[EventSource, Parameters], ticks: list[Tick], name: str
+) -> None:
+    source, parameters = case
+    stage, group = STAGES[name], parameters.group(name)
+    state = stage.start(group, Chain(source).setting(parameters))
+    inputs = [[getattr(tick, other) for other in stage.INPUTS] for tick in ticks]
+    before = copy.deepcopy(inputs)
+    results, stable = [], []
+    for given in inputs:
+        results.append(stage.step(group, state, *given))
+        stable.append(copy.deepcopy(results[-1]))
+    for given, kept in zip(inputs, before, strict=True):
+        assert_same(given, kept)
+    for number, (result, kept) in enumerate(zip(results, stable, strict=True)):
+        assert_same(result, kept)
+        assert_same(result, getattr(ticks[number], name))
+
+
+@pytest.mark.parametrize("name", STAGES)
+def test_stop_and_resume_gives_the_same(
+    case: tuple[EventSource, Parameters], ticks: list[Tick], name: str
+) -> None:
+    """A deep copy of the state half way is as good as the state itself: nothing hides elsewhere."""
+    source, parameters = case
+    stage, group = STAGES[name], parameters.group(name)
+    state = stage.start(group, Chain(source).setting(parameters))
+    half = len(ticks) // 2
+    for number, tick in enumerate(ticks):
+        if number == half:
+            state = copy.deepcopy(state)
+        result = stage.step(group, state, *(getattr(tick, other) for other in stage.INPUTS))
+        assert_same(result, getattr(tick, name))
+
+
+def test_results_hold_no_state(ticks: list[Tick]) -> None:
+    """No two ticks' results share memory that someone could still write to."""
+    for one, other in zip(ticks, ticks[1:], strict=False):
+        for name in STAGES:
+            arrays = [a for _, a in leaves(getattr(one, name)) if isinstance(a, np.ndarray) and a.size]
+            later = [a for _, a in leaves(getattr(other, name)) if isinstance(a, np.ndarray) and a.size]
+            for a in arrays:
+                for b in later:
+                    if np.shares_memory(a, b):
+                        assert not a.flags.writeable, name

@@ -1,0 +1,70 @@
+"""The filter stage: two filters over one packet, their state from packet to packet."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from pipeline.camera import Camera, CameraParameters, Setting
+from pipeline.events import EventBatch
+from pipeline.results import Packet
+from pipeline.stages import filter as stage
+from pipeline.stages.filter import MODES, FilterParameters
+from tests.naive_filter import NaiveFilter
+
+WIDTH, HEIGHT, TICK_US = 9, 7, 1000
+SETTING = Setting(Camera.of(CameraParameters(), WIDTH, HEIGHT), 0.02, 150.0)
+START_US = 1_600_000_000_000_000
+
+
+def packets(seed: int, ticks: int = 6, events_a_tick: int = 150) -> list[Packet]:
+    """Random events; the third tick has none."""
+    rng = np.random.default_rng(seed)
+    result = []
+    for index in range(ticks):
+        start_us, count = START_US + index * TICK_US, 0 if index == 2 else events_a_tick
+        batch = EventBatch(
+            np.sort(rng.integers(start_us, start_us + TICK_US, count)),
+            rng.integers(0, WIDTH, count).astype(np.uint16),
+            rng.integers(0, HEIGHT, count).astype(np.uint16),
+            rng.random(count) < 0.7,
+        )
+        result.append(Packet(index, start_us, start_us + TICK_US, batch))
+    return result
+
+
+def rows(batch: EventBatch) -> list[tuple[int, int, int, bool]]:
+    return list(
+        zip(batch.t_us.tolist(), batch.x_px.tolist(), batch.y_px.tolist(), batch.on.tolist(), strict=True)
+    )
+
+
+@pytest.mark.parametrize(("mode", "logo_mode"), list(itertools.product(MODES, MODES)))
+@pytest.mark.parametrize("logo_threshold_us", [200, 500])
+def test_every_pair_of_filters_equals_two_twins(mode: str, logo_mode: str, logo_threshold_us: int) -> None:
+    parameters = FilterParameters(
+        mode=mode, threshold_us=200, logo_mode=logo_mode, logo_threshold_us=logo_threshold_us
+    )
+    state = stage.start(parameters, SETTING)
+    twin, logo_twin = NaiveFilter(mode, 200), NaiveFilter(logo_mode, logo_threshold_us)
+    for packet in packets(seed=1):
+        result = stage.step(parameters, state, packet)
+        expected = [e for e in rows(packet.events) if twin.passes(*e)]
+        assert rows(result.surface_events) == expected
+        assert rows(result.logo_events) == [e for e in rows(packet.events) if logo_twin.passes(*e)]
+
+
+def test_equal_settings_are_filtered_once_and_off_copies_nothing() -> None:
+    (packet, *_) = packets(seed=2)
+    same = FilterParameters(mode="trail", threshold_us=300, logo_mode="trail", logo_threshold_us=300)
+    result = stage.step(same, stage.start(same, SETTING), packet)
+    assert result.surface_events is result.logo_events
+    off = FilterParameters(mode="off", logo_mode="stc")
+    result = stage.step(off, stage.start(off, SETTING), packet)
+    assert result.surface_events is packet.events
+    assert 0 < len(result.logo_events) < len(packet.events)
+    both_off = FilterParameters(mode="off", logo_mode="off", threshold_us=1)
+    result = stage.step(both_off, stage.start(both_off, SETTING), packet)
+    assert result.surface_events is result.logo_events is packet.events
