@@ -146,9 +146,7 @@ def naive_order(events: list[Event]) -> tuple[list[Event], int, int]:
     return sorted(kept, key=lambda event: event[0]), backward, late
 
 
-def ecf_block(
-    t: NDArray[np.int64], x: NDArray[np.int64], y: NDArray[np.int64], p: NDArray[np.int64], way: int
-) -> bytes:
+def ecf_block(t: Ints, x: Ints, y: Ints, p: Ints, way: int) -> bytes:
     """A block of Prophesee's ECF: way 2 packs y, x, p together, 1 packs x and p, 0 none; times must not fall."""
     n = len(t)
     out = struct.pack("<IQ", n << 2 | way, int(t[0])) + _ecf_times([int(v) for v in t])

@@ -15,7 +15,7 @@ from pipeline.results import SpinEstimate
 from . import entities as at
 from .rerun_api import Chunk, columns_at, once
 from .run import Run, shown_estimate
-from .still import density, disc_directions, sampled, sphere, texture_directions, tone, turned
+from .still import Sampler, density, disc_directions, sphere, texture_directions, tone, turned
 
 Floats = NDArray[np.float64]
 
@@ -58,7 +58,6 @@ def _mesh(run: Run) -> Chunk:
         at.MESH,
         rr.Mesh3D(
             vertex_positions=normals * run.ball_radius_m,
-            vertex_normals=normals,
             vertex_texcoords=np.stack([u.ravel(), v.ravel()], axis=1),
             triangle_indices=faces,
         ),
@@ -188,12 +187,13 @@ def _path(run: Run) -> list[Chunk]:
 
 def _axes(run: Run) -> list[Chunk]:
     """The camera frame's directions, 0.1 m long, beside the path."""
-    corner = path_bounds_m(run)[0]
+    low, high = path_bounds_m(run)
+    corner = np.array([low[0] - 0.1, high[1], high[2]])
     arrows = rr.Arrows3D(
         origins=[corner] * 3,
         vectors=0.1 * np.eye(3),
         colors=[at.ON, at.KALMAN_COLOUR, at.OFF],
-        labels=["x: right, 0.1 m", "y: down the image", "z: away from the camera"],
+        labels=["x", "y", "z"],
         radii=[-1.5],
     )
     return [once(at.AXES, arrows)]
@@ -211,19 +211,20 @@ def path_bounds_m(run: Run) -> tuple[Floats, Floats]:
 
 def _painting(run: Run) -> list[Chunk]:
     """The logo's events turned back by the estimate of the moment: on the ball's texture, and flat on two discs."""
-    texels, plain = texture_directions(), WHITE.astype(np.uint8)
-    blank_texture = np.broadcast_to(plain, (*texels.shape[:2], 3))
-    discs: dict[int, tuple[Floats, NDArray[np.bool_]]] = {}
-    empty_discs = _discs(None, *disc_directions(np.array([0.0, 0.0, -1.0])))
-    times, textures, pictures = [run.start_us], [blank_texture.tobytes()], [empty_discs]
+    texels = texture_directions()
+    on_texture = Sampler(texels)
+    discs: dict[int, _Discs] = {}
+    times = [run.start_us]
+    textures = [np.broadcast_to(WHITE.astype(np.uint8), texels.shape).tobytes()]
+    pictures = [_Discs.around(np.array([0.0, 0.0, -1.0])).picture(None)]
     for index, painted in _painted(run):
         shot = run.ticks[index].track.shot
         assert shot is not None
         if shot not in discs:
-            discs[shot] = disc_directions(_densest(run, shot))
+            discs[shot] = _Discs.around(_densest(run, shot))
         times.append(run.ticks[index].packet.end_us)
-        pictures.append(_discs(painted, *discs[shot]))
-        textures.append(_texture(painted, texels).tobytes())
+        pictures.append(discs[shot].picture(painted))
+        textures.append(_texture(painted, on_texture).tobytes())
     t_us = np.array(times)
     width, height = texels.shape[1], texels.shape[0]
     form = rr.components.ImageFormat(width=width, height=height, color_model="RGB", channel_datatype="U8")
@@ -274,18 +275,31 @@ def _full(counts: Floats) -> float:
     return float(np.quantile(marked, 0.9)) if marked.size else 0.0
 
 
-def _texture(painted: _Painted, texels: Floats) -> NDArray[np.uint8]:
-    counts = sampled(density(painted.normals), texels)
+def _texture(painted: _Painted, sampler: Sampler) -> NDArray[np.uint8]:
+    counts = sampler(density(painted.normals))
     strength = tone(counts, _full(counts))[..., None]
     return (WHITE + strength * (PAINT - WHITE)).astype(np.uint8)
 
 
-def _discs(painted: _Painted | None, directions: Floats, mask: NDArray[np.bool_]) -> bytes:
-    """PNG of the two halves of the ball, ON and OFF in their colours."""
-    picture = np.where(mask[..., None], DISC, at.BACKGROUND).astype(np.float64)
-    if painted is not None:
-        for polarity, colour in ((True, at.ON), (False, at.OFF)):
-            counts = sampled(density(painted.normals[painted.on == polarity]), directions) * mask
-            picture += tone(counts, _full(counts))[..., None] * (np.array(colour) - DISC)
-    rgb = picture.clip(0, 255).astype(np.uint8)
-    return bytes(cv2.imencode(".png", rgb[..., ::-1])[1])
+@dataclass(frozen=True)
+class _Discs:
+    """The two halves of the ball, flat, side by side."""
+
+    sampler: Sampler
+    mask: NDArray[np.bool_]
+
+    @classmethod
+    def around(cls, middle: Floats) -> _Discs:
+        """The left one around this direction of the body frame."""
+        directions, mask = disc_directions(middle)
+        return cls(Sampler(directions[mask]), mask)
+
+    def picture(self, painted: _Painted | None) -> bytes:
+        """PNG with ON and OFF in their colours."""
+        picture = np.where(self.mask[..., None], DISC, at.BACKGROUND).astype(np.float64)
+        if painted is not None:
+            for polarity, colour in ((True, at.ON), (False, at.OFF)):
+                counts = self.sampler(density(painted.normals[painted.on == polarity]))
+                picture[self.mask] += tone(counts, _full(counts))[:, None] * (np.array(colour) - DISC)
+        rgb = picture.clip(0, 255).astype(np.uint8)
+        return bytes(cv2.imencode(".png", rgb[..., ::-1])[1])

@@ -9,6 +9,7 @@ TIMELINE = "t"
 
 # The image plane: pixels as in the recording, origin at the centre of the top-left pixel.
 IMAGE = "/image"
+FRAME = "/image/frame"
 EVENTS = "/image/events"
 SURFACE = "/image/surface"
 HOUGH = "/image/hough"
@@ -17,15 +18,16 @@ KALMAN = "/image/kalman"
 TRUE_CIRCLE = "/image/truth"
 # Children of the ball move with it: pixels from its centre.
 BALL_PLACE = "/image/ball"
+BALL_CENTRE = "/image/ball/centre"
 LOGO = "/image/ball/logo"
 LOGO_OUTLINE = "/image/ball/outline"
 LOGO_MASK = "/image/ball/mask"
 FLOW = "/image/ball/flow"
-FLOW_WHEEL = "/flow_wheel"
+FLOW_WHEEL = "/image/ball/wheel"
 STILL_LOGO = "/still_logo"
 
 # Plots.
-STATUS = "/track/status"
+STATUS = "/tracker"
 QUANTITIES = ("x", "y", "vx", "vy", "radius")
 UNITS = ("px", "px", "px/s", "px/s", "px")
 PLOT = "/plots"
@@ -62,7 +64,7 @@ KALMAN_COLOUR: Colour = (76, 217, 100)
 TRUTH_COLOUR: Colour = (214, 120, 255)
 MASK_COLOUR: Colour = (130, 140, 150)
 PATH_COLOUR: Colour = (76, 217, 100)
-BACKGROUND: Colour = (13, 16, 20)
+BACKGROUND: Colour = (16, 16, 16)
 METHOD_COLOURS: dict[str, Colour] = {
     "triplet": (255, 167, 38),
     "normal_flow": (38, 198, 218),

@@ -11,6 +11,7 @@ from . import LAYOUTS
 from . import entities as at
 from .ball import path_bounds_m
 from .run import Run
+from .summary import CARD_PX
 
 Floats = NDArray[np.float64]
 
@@ -51,13 +52,14 @@ def _all(run: Run) -> rrb.Container:
     return rrb.Vertical(
         rrb.Horizontal(_events(run), _surface(run), _close_up(run), _space(run), column_shares=[4, 4, 3, 3]),
         rrb.Horizontal(
-            rrb.Vertical(_status(), _state_tabs(run), row_shares=[1, 3]),
+            rrb.Vertical(_status(), _state_tabs(run), row_shares=[2, 5]),
             _logo_events(run),
-            rrb.Horizontal(_flow(run), _wheel(), column_shares=[3, 1]),
+            _flow(run),
             _still(),
-            column_shares=[4, 3, 4, 4],
+            column_shares=[4, 3, 3, 4],
         ),
-        rrb.Horizontal(_rate(), _magnitude(run), _ball(run), _summary(), column_shares=[4, 4, 3, 5]),
+        rrb.Horizontal(_rate(legend=False), _magnitude(run, legend=False), _ball(run), _summary(), column_shares=[4, 4, 3, 5]),
+        row_shares=[4, 4, 5],
         name=NAMES["all"],
     )
 
@@ -79,7 +81,7 @@ def _tracker(run: Run) -> rrb.Container:
 def _logo(run: Run) -> rrb.Container:
     return rrb.Horizontal(
         rrb.Vertical(_logo_events(run), _close_up(run)),
-        rrb.Vertical(rrb.Horizontal(_flow(run), _wheel(), column_shares=[3, 1]), _still()),
+        rrb.Vertical(_flow(run), _still()),
         rrb.Vertical(_rate(), _rhythm(), _magnitude(run)),
         column_shares=[3, 4, 4],
         name=NAMES["logo"],
@@ -129,12 +131,11 @@ CIRCLES = [at.HOUGH, at.MEASURED, at.KALMAN, at.TRUE_CIRCLE]
 
 
 def _events(run: Run) -> rrb.View:
-    return _image_view(run, "Raw events: ON red, OFF blue, dim = filtered out", [at.EVENTS])
+    return _image_view(run, "Raw events: ON red, OFF blue", [at.FRAME, at.EVENTS])
 
 
 def _surface(run: Run) -> rrb.View:
-    name = "Surface: Hough yellow, refined orange, Kalman green"
-    return _image_view(run, name + (", truth dashed" if run.truth is not None else ""), [at.SURFACE, *CIRCLES])
+    return _image_view(run, "Surface: Hough yellow, Kalman green", [at.FRAME, at.SURFACE, *CIRCLES])
 
 
 def _close_up(run: Run) -> rrb.View:
@@ -142,32 +143,31 @@ def _close_up(run: Run) -> rrb.View:
 
 
 def _logo_events(run: Run) -> rrb.View:
-    contents = [at.LOGO, at.LOGO_OUTLINE, at.LOGO_MASK]
+    contents = [at.BALL_CENTRE, at.LOGO, at.LOGO_OUTLINE, at.LOGO_MASK]
     return _ball_view(run, "Logo events in the ball's frame", contents, 1.25)
 
 
 def _flow(run: Run) -> rrb.View:
-    return _ball_view(run, "Flow (Triplet Matching)", [at.FLOW, at.LOGO_OUTLINE], 1.25)
-
-
-def _wheel() -> rrb.View:
-    return rrb.Spatial2DView(origin=at.FLOW_WHEEL, name="Colours", background=at.BACKGROUND)
+    view = _ball_view(run, "Flow: colour = direction", [at.FLOW, at.LOGO_OUTLINE, at.FLOW_WHEEL], 1.25)
+    radius = run.largest_radius_px
+    view.properties["VisualBounds2D"] = rrb.VisualBounds2D(x_range=[-1.2 * radius, 2.3 * radius], y_range=[-1.2 * radius, 1.2 * radius])
+    return view
 
 
 def _still() -> rrb.View:
-    name = "Logo with the spin taken out: sharp = right (left: front, right: back)"
+    name = "Spin taken out: logo stands still"
     return rrb.Spatial2DView(origin=at.STILL_LOGO, name=name, background=at.BACKGROUND)
 
 
 def _plot(
-    origin: str, name: str, y_range: tuple[float, float] | None = None, corner: str = "LeftTop"
+    origin: str, name: str, y_range: tuple[float, float] | None = None, legend: bool = True
 ) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(
         origin=origin,
         name=name,
         axis_x=rrb.TimeAxis(link="LinkToGlobal"),
         axis_y=None if y_range is None else rrb.ScalarAxis(range=y_range),
-        plot_legend=rrb.PlotLegend(corner=corner),
+        plot_legend=rrb.PlotLegend(corner="RightTop", visible=legend),
     )
 
 
@@ -177,7 +177,7 @@ def _status() -> rrb.View:
     )
 
 
-def _state_plot(run: Run, name: str) -> rrb.View:
+def _state_plot(run: Run, name: str, legend: bool = True) -> rrb.View:
     column = at.QUANTITIES.index(name)
     titles = {"x": "x", "y": "y", "vx": "Velocity x", "vy": "Velocity y", "radius": "Radius"}
     deviation = np.sqrt(run.variances[:, column])
@@ -186,11 +186,11 @@ def _state_plot(run: Run, name: str) -> rrb.View:
         for kind in ("hough", "measured"):
             circles = [getattr(tick.track, kind) for tick in run.ticks if tick.track.has_ball]
             values.append(np.array([getattr(c, f"{name}_px") for c in circles if c is not None]))
-    return _plot(f"{at.PLOT}/{name}", f"{titles[name]} [{at.UNITS[column]}]", _range(np.concatenate(values)))
+    return _plot(f"{at.PLOT}/{name}", f"{titles[name]} [{at.UNITS[column]}]", _range(np.concatenate(values)), legend)
 
 
 def _state_tabs(run: Run) -> rrb.Container:
-    return rrb.Tabs(*(_state_plot(run, name) for name in at.QUANTITIES), active_tab=0)
+    return rrb.Tabs(*(_state_plot(run, name, legend=False) for name in at.QUANTITIES), active_tab=0)
 
 
 def _residual(run: Run, name: str) -> rrb.View:
@@ -206,22 +206,22 @@ def _event_count() -> rrb.View:
     return _plot(at.EVENT_COUNT, "Event rate, whole sensor [Mev/s]")
 
 
-def _rate() -> rrb.View:
-    return _plot(at.RATE, "Logo's event rate [kev/s]")
+def _rate(legend: bool = True) -> rrb.View:
+    return _plot(at.RATE, "Logo's event rate [kev/s]", legend=legend)
 
 
 def _rhythm() -> rrb.View:
     return _plot(at.RHYTHM, "Rhythm of the rate [kev/s] and its falling zero crossings")
 
 
-def _magnitude(run: Run) -> rrb.View:
+def _magnitude(run: Run, legend: bool = True) -> rrb.View:
     values = [e.magnitude_rps for tick in run.ticks for e in tick.spin.estimates.values()]
     values += [tick.rate.spin_rps for tick in run.ticks]
     known = np.array([value for value in values if value is not None])
     top = 1.3 * float(np.quantile(known, 0.95)) if known.size else 100.0
     if run.truth is not None:
         top = max(top, 1.3 * float(np.linalg.norm(run.truth.spin_rps, axis=1).max()))
-    return _plot(at.SPIN_MAGNITUDE, "Spin [rps], ± 1σ", (0.0, top))
+    return _plot(at.SPIN_MAGNITUDE, "Spin [rps], ± 1σ", (0.0, top), legend)
 
 
 def _parts(run: Run) -> rrb.View:
@@ -237,8 +237,7 @@ def _summary() -> rrb.View:
 
 
 def _card() -> rrb.View:
-    width, height = 900, 900
-    bounds = rrb.VisualBounds2D(x_range=[0, width], y_range=[0, height])
+    bounds = rrb.VisualBounds2D(x_range=[0, CARD_PX], y_range=[0, CARD_PX])
     return rrb.Spatial2DView(origin=at.COACH, name="Shot", background=at.BACKGROUND, visual_bounds=bounds)
 
 
@@ -280,7 +279,7 @@ def _space(run: Run, name: str = "Flight path, grid 0.1 m") -> rrb.View:
         line_grid=rrb.LineGrid3D(
             visible=True, spacing=0.1, plane=rr.components.Plane3D(tuple(up), below), stroke_width=1.0
         ),
-        eye_controls=_tilted(middle, 1.1 * size, run),
+        eye_controls=_tilted(middle, 1.5 * size, run),
         time_ranges=_so_far(),
     )
 

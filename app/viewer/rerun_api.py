@@ -6,12 +6,14 @@ Columns only: one chunk an entity, never a call a row.
 from __future__ import annotations
 
 import os
+import sys
 import uuid
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
@@ -20,6 +22,30 @@ from rerun.chunk import Chunk
 from .entities import APPLICATION, TIMELINE, Colour
 
 __all__ = ["Chunk", "band", "columns_at", "file_with", "line", "points", "once", "states", "time_column"]
+
+
+class _NoPandas:
+    """A finder of modules that says there is no pandas."""
+
+    @staticmethod
+    def find_spec(name: str, path: object = None, target: object = None) -> None:
+        if name == "pandas":
+            raise ModuleNotFoundError(name)
+
+
+def _leave_pandas_out() -> None:
+    """Keep pyarrow from loading pandas, which takes a second, only to ask whether our columns are pandas' own.
+
+    It looks for pandas once, at its first array, and remembers what it found.
+    """
+    sys.meta_path.insert(0, _NoPandas)  # type: ignore[arg-type]  # has what is called of a finder
+    try:
+        pa.array(np.zeros(1))
+    finally:
+        sys.meta_path.remove(_NoPandas)  # type: ignore[arg-type]
+
+
+_leave_pandas_out()
 
 
 def time_column(t_us: NDArray[np.int64] | NDArray[np.float64]) -> rr.TimeColumn:
@@ -121,6 +147,41 @@ def file_with(chunks: Iterable[Chunk], blueprint: rrb.Blueprint, path: Path, nam
         rr.send_chunks(list(chunks), recording=recording)
     finally:
         recording.disconnect()
+
+
+def playhead_request(t_us: int) -> bytes:
+    """The web viewer's request to put the playhead there, paused (`ViewerControlRequest` as protobuf).
+
+    A blueprint cannot say where the playhead is, and the address of the page does so for Rerun's servers only.
+    Field numbers of Rerun 0.41; a viewer that does not know them leaves the playhead at the start.
+    """
+    timeline = _field(1, TIMELINE.encode())
+    time = bytes([1 << 3]) + _varint(t_us * 1000)
+    cursor = _field(2, timeline) + _field(3, time) + bytes([5 << 3, 1])
+    return _field(6, cursor)
+
+
+def _field(number: int, content: bytes) -> bytes:
+    """A protobuf field of bytes, text or a message."""
+    return bytes([number << 3 | 2]) + _varint(len(content)) + content
+
+
+def _varint(value: int) -> bytes:
+    """A protobuf integer: seven bits a byte, lowest first, negative ones as 64 bits."""
+    value &= (1 << 64) - 1
+    digits = []
+    while value > 0x7F:
+        digits.append(value & 0x7F | 0x80)
+        value >>= 7
+    return bytes([*digits, value])
+
+
+def program() -> str:
+    """Path of Rerun's own program, which comes with its package."""
+    import rerun_cli
+
+    name = "rerun.exe" if sys.platform == "win32" else "rerun"
+    return str(Path(rerun_cli.__file__).with_name(name))
 
 
 def quiet_environment() -> dict[str, str]:

@@ -54,7 +54,10 @@ def filter_chunks(run: Run) -> list[Chunk]:
     ]  # fmt: skip
     context = [rr.AnnotationInfo(i, name, colour) for i, (name, colour) in enumerate(at.EVENT_CLASSES)]
     columns = rr.Points2D.columns(positions=np.concatenate(positions), class_ids=np.concatenate(classes))
+    width, height = run.camera.width_px, run.camera.height_px
+    frame = rr.Boxes2D(array=[-0.5, -0.5, width, height], array_format="xywh", colors=[at.MASK_COLOUR], radii=[-0.5])
     return [
+        once(at.FRAME, frame),
         once(at.EVENTS, rr.AnnotationContext(context), rr.Points2D.from_fields(radii=[-1.0])),
         columns_at(at.EVENTS, run.times_us, columns, lengths),
         *(chunk for rate in rates for chunk in rate),
@@ -108,7 +111,10 @@ def logo_chunks(run: Run) -> list[Chunk]:
     context = [rr.AnnotationInfo(i, name, colour) for i, (name, colour) in enumerate(at.EVENT_CLASSES)]
     lengths = [0, *(len(logo.events) for logo in logos)]
     radii = [logo.radius_px for logo in logos]
+    arm = 0.05 * run.largest_radius_px
+    cross = rr.LineStrips2D([[[-arm, 0], [arm, 0]], [[0, -arm], [0, arm]]], colors=[at.MASK_COLOUR], radii=[-0.7])
     return [
+        once(at.BALL_CENTRE, cross),
         once(at.LOGO, rr.AnnotationContext(context), rr.Points2D.from_fields(radii=[-2.0])),
         columns_at(at.LOGO, run.times_us, columns, lengths),
         *_rings(run, at.LOGO_OUTLINE, radii, at.KALMAN_COLOUR),
@@ -135,10 +141,11 @@ def flow_chunks(run: Run) -> list[Chunk]:
     blank = np.zeros((2 * half_px + 1, 2 * half_px + 1, 3), np.uint8)
     pictures = [blank, *(hsv_image(tick.flow, half_px) for tick in run.ticks)]
     corner = rr.Transform3D(translation=[-half_px - 0.5, -half_px - 0.5, 0.0])
+    beside = rr.Transform3D(translation=[1.2 * half_px, -0.4 * half_px, 0.0], scale=0.8 * half_px / WHEEL_PX)
     return [
         once(at.FLOW, corner, rr.EncodedImage.from_fields(media_type="image/png", draw_order=-10.0)),
         columns_at(at.FLOW, run.times_us, rr.EncodedImage.columns(blob=[_png(p) for p in pictures])),
-        once(at.FLOW_WHEEL, rr.EncodedImage(contents=_png(hsv_wheel(WHEEL_PX)), media_type="image/png")),
+        once(at.FLOW_WHEEL, beside, rr.EncodedImage(contents=_png(hsv_wheel(WHEEL_PX)), media_type="image/png")),
     ]
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-# Cells along the cube around the unit sphere: 1.8 degrees, half of what a pixel covers on a ball of 20 px radius.
+# Cells along the cube around the unit sphere: 2 degrees, two thirds of what a pixel covers on a ball of 20 px radius.
 CELLS = 64
 TEXTURE_PX = (192, 96)  # 1.9 degrees a texel
 DISC_PX = 160
@@ -33,25 +33,39 @@ def turned(vectors: Floats, spin_rps: Floats, seconds: Floats) -> Floats:
 
 def density(normals: Floats) -> Floats:
     """How often the unit vectors (n, 3) fall in each cell of the cube, smoothed: (CELLS**3,) float64."""
-    cells = ((normals + 1) * (0.5 * CELLS)).astype(np.int64).clip(0, CELLS - 1)
+    cells = (_place(normals) + 0.5).astype(np.int64)
     flat = (cells[:, 0] * CELLS + cells[:, 1]) * CELLS + cells[:, 2]
     counts = np.bincount(flat, minlength=CELLS**3).astype(np.float64).reshape(CELLS, CELLS, CELLS)
-    for axis in range(3):  # weights 1 2 1 along each side
+    for axis in range(3):  # weights 1 2 1 along each side; the outermost cells are empty, nothing wraps around
         counts = 2 * counts + np.roll(counts, 1, axis) + np.roll(counts, -1, axis)
     return (counts / 64).ravel()
 
 
-def sampled(smooth: Floats, directions: Floats) -> Floats:
-    """The density in unit directions (..., 3), linear between the centres of the cells."""
-    place = (directions + 1) * (0.5 * CELLS) - 0.5
-    cell = np.floor(place).astype(np.int64)
-    part = place - cell
-    found = np.zeros(directions.shape[:-1])
-    for corner in np.ndindex(2, 2, 2):
-        at = (cell + corner).clip(0, CELLS - 1)
-        weight = np.prod(np.where(np.array(corner), part, 1 - part), axis=-1)
-        found += weight * smooth[(at[..., 0] * CELLS + at[..., 1]) * CELLS + at[..., 2]]
-    return found
+def _place(directions: Floats) -> Floats:
+    """Where unit vectors lie among the centres of the cells, two cells away from the cube's sides."""
+    return directions * (0.5 * CELLS - 3) + (0.5 * CELLS - 0.5)
+
+
+class Sampler:
+    """Reads densities in given directions, linear between the centres of the cells."""
+
+    def __init__(self, directions: Floats) -> None:
+        """directions : (..., 3) unit vectors."""
+        place = _place(directions)
+        cell = np.floor(place).astype(np.int64)
+        part = place - cell
+        self._corners, self._weights = [], []
+        for corner in np.ndindex(2, 2, 2):
+            at = cell + corner
+            self._corners.append((at[..., 0] * CELLS + at[..., 1]) * CELLS + at[..., 2])
+            self._weights.append(np.prod(np.where(np.array(corner), part, 1 - part), axis=-1))
+
+    def __call__(self, smooth: Floats) -> Floats:
+        """(...) the density in every direction."""
+        found = np.zeros(self._weights[0].shape)
+        for corner, weight in zip(self._corners, self._weights, strict=True):
+            found += weight * smooth[corner]
+        return found
 
 
 def texture_directions() -> Floats:

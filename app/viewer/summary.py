@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from functools import lru_cache
 
 import numpy as np
 import rerun as rr
@@ -13,23 +14,23 @@ from pipeline.chain import Tick
 from pipeline.results import SpinEstimate
 from pipeline.shots import Shot
 
-from ..words import Kind, axis_words, kind_of_spin, km_h, rpm, speed_words, spin_words
+from ..words import axis_words, kind_of_spin, km_h, rpm, speed_words
 from . import entities as at
 from .rerun_api import Chunk, columns_at, once
 from .run import Run, shown_estimate
 
 Vector = NDArray[np.float64]
 
-CARD_PX = (900, 900)
-BIG_PX, WORDS_PX, SMALL_PX = 150, 92, 44
-TEXT, FAINT = (236, 240, 243), (140, 150, 160)
+CARD_PX = 640
+BIG_PX, SMALL_PX = 108, 32
+TEXT, FAINT = 240, 150  # grey values
 # Kalman velocity needs a moment to settle; a flight's direction is told from this speed on.
 SLOWEST_M_S = 0.2
 
 
 def summary_chunks(run: Run) -> list[Chunk]:
     """The summary and the card at the start and at the end of every tick."""
-    texts, cards = [_opening(run)], [_card(["–", "–", "no ball yet"], ["spin", "speed", run.no_shot_reason or ""])]
+    texts, cards = [_opening(run)], [_card(("–", "–", "no ball yet"), ("spin", "speed", run.no_shot_reason or ""))]
     finals = {shot.end_us: shot for shot in run.shots}
     result: list[str] = []
     card = cards[0]
@@ -82,14 +83,14 @@ def _tick_text(run: Run, tick: Tick, velocity: Vector | None, result: list[str])
         return [_opening(run), "", f"Tracker: {tick.track.status}, {tick.track.reason or 'no ball'}"]
     if result and run.shots and any(shot.end_us == tick.packet.end_us for shot in run.shots):
         return result
-    return [*_headline(run, tick, velocity, "so far"), *_table(run, tick, velocity), *_evidence(run, tick)]
+    return [*_headline(run, tick, velocity, "so far"), *_table(run, tick), *_evidence(run, tick)]
 
 
 def _shot_result(run: Run, tick: Tick, shot: Shot, velocity: Vector | None) -> list[str]:
     """What the whole shot says."""
     milliseconds = (shot.end_us - shot.start_us) / 1000
     said = f"shot {shot.number + 1} of {len(run.shots)}, {milliseconds:.0f} ms"
-    return [*_headline(run, tick, velocity, said), *_table(run, tick, velocity), *_evidence(run, tick)]
+    return [*_headline(run, tick, velocity, said), *_table(run, tick), *_evidence(run, tick)]
 
 
 def _headline(run: Run, tick: Tick, velocity: Vector | None, said: str) -> list[str]:
@@ -107,26 +108,25 @@ def _headline(run: Run, tick: Tick, velocity: Vector | None, said: str) -> list[
     return lines
 
 
-def _table(run: Run, tick: Tick, velocity: Vector | None) -> list[str]:
+def _table(run: Run, tick: Tick) -> list[str]:
     """Every method's answer or refusal, and the truth where there is one."""
-    lines = ["| method | spin | axis (x, y, z) | kind |", "|---|---|---|---|"]
+    lines = ["| method | spin [rps] | axis (x, y, z) |", "|---|---|---|"]
     for method, estimate in tick.spin.estimates.items():
         name = f"**{method} ✔**" if tick.spin.best == method else method
-        kind = _kind(run, estimate, velocity)
-        lines.append(f"| {name} | {spin_words(estimate)} | {axis_words(estimate)} | {kind.name if kind else ''} |")
+        lines.append(f"| {name} | {_magnitude(estimate)} | {axis_words(estimate)} |")
     if run.truth is not None:
         truth = run.true_values(np.array([tick.track.t_us]), run.truth.spin_rps)[0]
         if np.isfinite(truth).all() and truth.any():
             true_estimate = SpinEstimate("truth", truth, None, None)
-            kind = _kind(run, true_estimate, velocity)
-            lines.append(f"| truth | {spin_words(true_estimate)} | {axis_words(true_estimate)} | {kind.name if kind else ''} |")  # fmt: skip
+            lines.append(f"| truth | {_magnitude(true_estimate)} | {axis_words(true_estimate)} |")
     return [*lines, ""]
 
 
-def _kind(run: Run, estimate: SpinEstimate, velocity: Vector | None) -> Kind | None:
-    if estimate.vector_rps is None:
-        return None
-    return kind_of_spin(estimate.vector_rps, velocity, run.camera.up)
+def _magnitude(estimate: SpinEstimate) -> str:
+    magnitude, std = estimate.magnitude_rps, estimate.magnitude_std_rps
+    if magnitude is None:
+        return f"refused: {estimate.reason}"
+    return f"{magnitude:.1f}" if std is None else f"{magnitude:.1f} ± {std:.1f}"
 
 
 def _evidence(run: Run, tick: Tick) -> list[str]:
@@ -153,28 +153,34 @@ def _tick_card(run: Run, tick: Tick, velocity: Vector | None) -> bytes:
     speed_big = "in place" if run.fixed else "–" if speed is None else f"{km_h(speed):.0f} km/h"
     speed_small = "" if speed is None else f"{speed:.1f} m/s"
     if estimate is None or estimate.vector_rps is None or not trusted:
-        return _card(["–", speed_big, "spin not known"], ["", speed_small, "yet, or too little to trust"])
+        return _card(("–", speed_big, "spin not known"), ("", speed_small, "yet, or too little to trust"))
     kind = kind_of_spin(estimate.vector_rps, velocity, run.camera.up)
     magnitude, std = estimate.magnitude_rps or 0.0, estimate.magnitude_std_rps
     margin = "" if std is None else f" ± {rpm(std):.0f}"
     rest = kind.sentence.removeprefix(kind.name).strip(" ,")
     return _card(
-        [f"{magnitude:.0f} rps", speed_big, kind.name],
-        [f"{rpm(magnitude):.0f}{margin} rpm", speed_small, rest],
+        (f"{magnitude:.0f} rps", speed_big, kind.name),
+        (f"{rpm(magnitude):.0f}{margin} rpm", speed_small, rest),
     )
 
 
-def _card(big: list[str], small: list[str]) -> bytes:
+@lru_cache(maxsize=256)
+def _card(big: tuple[str, str, str], small: tuple[str, str, str]) -> bytes:
     """PNG of three blocks, each a line in big letters and one in small ones."""
-    picture = Image.new("RGB", CARD_PX, at.BACKGROUND)
+    picture = Image.new("L", (CARD_PX, CARD_PX), at.BACKGROUND[0])
     draw = ImageDraw.Draw(picture)
-    height = CARD_PX[1] // 3
     for block, (first, second) in enumerate(zip(big, small, strict=True)):
-        size = BIG_PX
-        while draw.textlength(first, font=ImageFont.load_default(size)) > CARD_PX[0] - 80:
-            size -= 6
-        draw.text((40, block * height + 40), first, TEXT, font=ImageFont.load_default(size))
-        draw.text((46, block * height + 40 + 1.25 * size), second, FAINT, font=ImageFont.load_default(SMALL_PX))
+        left, top = 36, 30 + block * CARD_PX // 3
+        size = _fitting(draw, first, BIG_PX)
+        draw.text((left, top), first, TEXT, font=ImageFont.load_default(size))
+        font = ImageFont.load_default(_fitting(draw, second, SMALL_PX))
+        draw.text((left + 4, top + 1.2 * size), second, FAINT, font=font)
     file = io.BytesIO()
     picture.save(file, "PNG")
     return file.getvalue()
+
+
+def _fitting(draw: ImageDraw.ImageDraw, text: str, size: int) -> int:
+    """The size in which the text fits on the card, this one at most."""
+    width = draw.textlength(text, font=ImageFont.load_default(size))
+    return min(size, int(size * (CARD_PX - 60) / max(width, 1)))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 FEWEST = 8  # events for the line's two parameters, its drift, and enough left to judge it by
-NEIGHBOURS = 128  # at most
+NEIGHBOURS = 64  # at most, half of them before and half after
 
 
 @numba.njit(cache=True, nogil=True)

@@ -60,9 +60,9 @@ class BallBody:
                 spans.append((float(time[first]), float(time[last])))
         return spans
 
-    def speed_px_s(self, camera: Camera, start_s: float, stop_s: float) -> float:
-        """How fast anything on the ball can move in the image at most."""
-        fastest = 0.0
+    def speeds_px_s(self, camera: Camera, start_s: float, stop_s: float) -> tuple[float, float]:
+        """How fast the outline and the ball's surface can move in the image at most."""
+        outline, surface = 0.0, 0.0
         for one in self.paths:
             inside = (one.time_s >= start_s - LOOK_S) & (one.time_s <= stop_s + LOOK_S)
             if one.start_s > stop_s or one.end_s < start_s or not inside.any():
@@ -70,11 +70,12 @@ class BallBody:
                     continue
                 inside[:] = True
             speed = np.linalg.norm(one.velocity_m_s[inside], axis=1)
-            if self.ball.logo.name != "none":
-                speed = speed + 2 * np.pi * self.ball.radius_m * np.linalg.norm(one.spin_rps[inside], axis=1)
-            near = one.position_m[inside, 2] - self.ball.radius_m
-            fastest = max(fastest, float(np.max(speed * camera.focal_px / np.maximum(near, 1e-3))))
-        return fastest
+            turn = 2 * np.pi * self.ball.radius_m * np.linalg.norm(one.spin_rps[inside], axis=1)
+            turn *= self.ball.logo.name != "none"
+            scale = camera.focal_px / np.maximum(one.position_m[inside, 2] - self.ball.radius_m, 1e-3)
+            outline = max(outline, float(np.max(speed * scale)))
+            surface = max(surface, float(np.max((speed + turn) * scale)))
+        return outline, surface
 
     def distance_m(self, time_s: Floats) -> float:
         one = self._path_at(float(time_s[time_s.size // 2]))
@@ -86,8 +87,8 @@ class BallBody:
                 return one
         return self.paths[-1]
 
-    def packed(self, camera: Camera, lens: Lens, time_s: Floats, every: int) -> PackedBody:
-        """The ball at these times, looked at in every so many of them."""
+    def packed(self, camera: Camera, lens: Lens, time_s: Floats, every: int, slower: int) -> PackedBody:
+        """The ball at these times, looked at in every so many of them; slower: see `kernels`."""
         there = self._path_at(float(time_s[time_s.size // 2])).at(time_s)
         pose = np.empty((time_s.size, kernels.POSE_COLUMNS))
         pose[:, kernels.CENTRE : kernels.CENTRE + 3] = there.position_m
@@ -100,7 +101,7 @@ class BallBody:
         blur_mm = TEXTURE_SHARE * typical * far / camera.focal_px * 1e3 * RADIUS_MM / (self.ball.radius_m * 1e3)
         printed = texture(self.ball.logo, round(blur_mm, 2))
         kind = np.zeros(kernels.BODY_COLUMNS)
-        kind[[kernels.KIND, kernels.OWNER, kernels.EVERY]] = kernels.BALL, self.number, every
+        kind[[kernels.KIND, kernels.OWNER, kernels.EVERY, kernels.SLOWER]] = kernels.BALL, self.number, every, slower
         kind[kernels.RADIUS] = self.ball.radius_m
         kind[[kernels.ALBEDO, kernels.ALBEDO_2]] = self.ball.albedo, self.ball.ink_albedo
         kind[[kernels.HALF_EXTENT, kernels.TEXELS]] = printed.half_extent, printed.ink.shape[0]
@@ -133,19 +134,20 @@ class ArmBody:
         """The whole time: the arm may come and go as it swings."""
         return [(0.0, end_s)]
 
-    def speed_px_s(self, camera: Camera, start_s: float, stop_s: float) -> float:
-        """The hand's highest speed."""
+    def speeds_px_s(self, camera: Camera, start_s: float, stop_s: float) -> tuple[float, float]:
+        """The hand's highest speed, twice."""
         arm = self.arm
         speed = arm.length_m * arm.swing_rad * 2 * math.pi * arm.frequency_hz
         near = min(arm.elbow_m[2], arm.elbow_m[2] - arm.length_m) - arm.radius_elbow_m
-        return speed * camera.focal_px / max(near, 0.1)
+        speed *= camera.focal_px / max(near, 0.1)
+        return speed, speed
 
     def distance_m(self, time_s: Floats) -> float:
         elbow, hand = arm_ends(self.arm, time_s[time_s.size // 2 : time_s.size // 2 + 1])
         return float(elbow[0, 2] + hand[0, 2]) / 2
 
-    def packed(self, camera: Camera, lens: Lens, time_s: Floats, every: int) -> PackedBody:
-        """The arm at these times, looked at in every so many of them."""
+    def packed(self, camera: Camera, lens: Lens, time_s: Floats, every: int, slower: int) -> PackedBody:
+        """The arm at these times, looked at in every so many of them; slower: see `kernels`."""
         arm = self.arm
         pose = np.zeros((time_s.size, kernels.POSE_COLUMNS))
         low, high = [], []
@@ -159,7 +161,7 @@ class ArmBody:
         sigma = _sigma_px(camera, lens, np.array([self.distance_m(time_s)]))[0]
         pose[:, kernels.SIGMA] = sigma
         kind = np.zeros(kernels.BODY_COLUMNS)
-        kind[[kernels.KIND, kernels.OWNER, kernels.EVERY]] = kernels.ARM, self.number, every
+        kind[[kernels.KIND, kernels.OWNER, kernels.EVERY, kernels.SLOWER]] = kernels.ARM, self.number, every, slower
         kind[[kernels.ALBEDO, kernels.ALBEDO_2]] = arm.sleeve_albedo, arm.hand_albedo
         first, last = np.minimum(*low) - 4 * sigma - 1, np.maximum(*high) + 4 * sigma + 1
         box = _clipped(first[:, 0], first[:, 1], last[:, 0], last[:, 1], camera)

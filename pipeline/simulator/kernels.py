@@ -40,10 +40,10 @@ SIGMA = 12  # blur of the outline in px
 POSE_COLUMNS = 13
 
 # Columns of what a body is like.
-KIND, OWNER, EVERY, RADIUS, ALBEDO, ALBEDO_2, HALF_EXTENT, TEXELS, CAP_COSINE, INK_X, INK_Y, SAMPLE = range(12)
-BODY_COLUMNS = 12
+KIND, OWNER, EVERY, SLOWER, RADIUS, ALBEDO, ALBEDO_2, HALF_EXTENT, TEXELS, CAP_COSINE, INK_X, INK_Y, SAMPLE = range(13)
+BODY_COLUMNS = 13  # SLOWER: so many looks pass while the outline moves as far as the surface in one
 
-CALM_LOOKS = 4  # looks left out inside a ball, where only soft shading moves: 1 px at a quarter pixel a look
+LOOKS_A_PIXEL = 4  # at least, of any motion
 
 
 class Pixels(NamedTuple):
@@ -52,7 +52,9 @@ class Pixels(NamedTuple):
     state: Floats  # (n, STATE_COLUMNS)
     role: Bytes  # (n,)
     owner: Bytes  # (n,) body that changed the light last
-    seen_in: Ints  # (n,) the pixel needs no look up to and including this row
+    looked: Ints  # (n,) row of the last look
+    rest: Ints  # (n,) the body below needs no look up to and including this row
+    rest_body: Bytes  # (n,)
     listing: Ints  # (n,) the pixels at work, in front
     cursor: NDArray[np.int64]  # [pixels at work, events written, normals used]
     event_us: Floats
@@ -124,9 +126,10 @@ def _ink_at(ink, body, pose, k, row, x, y, z):
 
 @njit(cache=True, nogil=True)
 def _ball_light(ink, body, pose, k, row, physics, ray_x, ray_y):
-    """(cover 0..1, intensity, intensity without logo, calm) of ball k seen along a ray.
+    """(cover 0..1, intensity, intensity without logo, looks) of ball k seen along a ray.
 
-    Calm: neither the outline nor the logo comes near within the next pixel of motion.
+    looks : the next look that matters is so many ahead, for neither outline nor logo comes near before, and shading
+        moves by less than a pixel
     """
     cx, cy, cz = pose[row, k, CENTRE], pose[row, k, CENTRE + 1], pose[row, k, CENTRE + 2]
     radius = body[k, RADIUS]
@@ -141,7 +144,8 @@ def _ball_light(ink, body, pose, k, row, physics, ray_x, ray_y):
     if inside * inside < SURE_SIGMAS * SURE_SIGMAS * sigma * sigma * slope2:
         cover = 0.5 * math.erfc(-inside / (math.sqrt(slope2) * sigma * 1.4142135623730951))
     elif inside < 0.0:
-        return 0.0, 0.0, 0.0, False
+        away = -inside / math.sqrt(slope2) - SURE_SIGMAS * sigma
+        return 0.0, 0.0, 0.0, 1.0 + away * LOOKS_A_PIXEL * body[k, SLOWER]
     # The surface point; beyond the outline the nearest point of the limb stands in.
     far = (along - math.sqrt(max(inside, 0.0))) / length2
     nx, ny, nz = far * ray_x - cx, far * ray_y - cy, far - cz
@@ -164,8 +168,11 @@ def _ball_light(ink, body, pose, k, row, physics, ray_x, ray_y):
     pixel = slant / physics.focal_px
     gap = max(body[k, CAP_COSINE] - bz, abs(bx) - body[k, INK_X], abs(by) - body[k, INK_Y])
     if gap >= reach:
+        looks = body[k, SLOWER]
         deep = SURE_SIGMAS * sigma + 1.0
-        return cover, plain, plain, gap >= reach + pixel and inside > 0.0 and inside * inside > deep * deep * slope2
+        if inside > 0.0 and inside * inside > deep * deep * slope2:
+            looks *= LOOKS_A_PIXEL
+        return cover, plain, plain, min(looks, 1.0 + (gap - reach) / pixel * LOOKS_A_PIXEL)
     # Gauss-Hermite, three points an axis: the blur left over from the texture's own.
     dark = 0.0
     for i in range(-1, 2):
@@ -180,12 +187,12 @@ def _ball_light(ink, body, pose, k, row, physics, ray_x, ray_y):
             mx, my, mz = far * x - cx, far * y - cy, far - cz
             norm = 1.0 / math.sqrt(mx * mx + my * my + mz * mz)
             dark += weight * _ink_at(ink, body, pose, k, row, mx * norm, my * norm, mz * norm)
-    return cover, plain + dark * (body[k, ALBEDO_2] - body[k, ALBEDO]) * shade, plain, False
+    return cover, plain + dark * (body[k, ALBEDO_2] - body[k, ALBEDO]) * shade, plain, 1.0
 
 
 @njit(cache=True, nogil=True)
 def _arm_light(body, pose, k, row, x, y):
-    """(cover, intensity) of arm k at a pixel."""
+    """(cover, intensity, looks) of arm k at a pixel; see `_ball_light`."""
     ax, ay, ar = pose[row, k, 0], pose[row, k, 1], pose[row, k, 2]
     bx, by, br = pose[row, k, 3] - ax, pose[row, k, 4] - ay, pose[row, k, 5]
     share = ((x - ax) * bx + (y - ay) * by) / max(bx * bx + by * by, 1e-9)
@@ -193,14 +200,16 @@ def _arm_light(body, pose, k, row, x, y):
     distance = ar + held * (br - ar) - math.hypot(x - ax - held * bx, y - ay - held * by)
     sigma = pose[row, k, SIGMA]
     if distance <= -SURE_SIGMAS * sigma:
-        return 0.0, 0.0
+        return 0.0, 0.0, 1.0 + (-distance - SURE_SIGMAS * sigma) * LOOKS_A_PIXEL
     cover = 1.0
     if distance < SURE_SIGMAS * sigma:
         cover = 0.5 * math.erfc(-distance / (sigma * 1.4142135623730951))
     # The sleeve ends at three quarters of the way to the hand.
-    beyond = (share - 0.75) * math.sqrt(bx * bx + by * by) / sigma
-    hand = 0.5 * math.erfc(-min(max(beyond, -5.0), 5.0) / 1.4142135623730951)
-    return cover, body[k, ALBEDO] + hand * (body[k, ALBEDO_2] - body[k, ALBEDO])
+    beyond = (share - 0.75) * math.sqrt(bx * bx + by * by)
+    hand = 0.5 * math.erfc(-min(max(beyond / sigma, -5.0), 5.0) / 1.4142135623730951)
+    spare = min(distance, abs(beyond)) - SURE_SIGMAS * sigma
+    looks = 1.0 + max(spare, 0.0) * LOOKS_A_PIXEL
+    return cover, body[k, ALBEDO] + hand * (body[k, ALBEDO_2] - body[k, ALBEDO]), looks
 
 
 @njit(cache=True, nogil=True)
@@ -312,67 +321,66 @@ def _begin(state, role, listing, cursor, sensor, physics, p, intensity, plain_in
 
 @njit(cache=True, nogil=True)
 def _light(owner, background, box, kind, pose, ink, physics, row, x, y, ray_x, ray_y):
-    """(covered, calm, intensity, intensity without logos) at a pixel; writes the nearest body into owner."""
+    """(covered, looks, intensity, intensity without logos) at a pixel; writes the nearest body into owner."""
     p = y * physics.width_px + x
     intensity = background[p]
     plain = intensity
-    covered, calm, bodies = False, True, 0
+    covered, looks, bodies = False, 1.0, 0
     for k in range(kind.shape[0]):
         if x < box[row, k, 0] or y < box[row, k, 1] or x >= box[row, k, 2] or y >= box[row, k, 3]:
             continue
         if kind[k, KIND] == BALL:
-            cover, body, body_plain, still = _ball_light(ink, kind, pose, k, row, physics, ray_x, ray_y)
+            cover, body, body_plain, ahead = _ball_light(ink, kind, pose, k, row, physics, ray_x, ray_y)
         else:
-            cover, body = _arm_light(kind, pose, k, row, float(x), float(y))
-            body_plain, still = body, False
+            cover, body, ahead = _arm_light(kind, pose, k, row, float(x), float(y))
+            body_plain = body
         bodies += 1
-        calm = still and bodies == 1
+        looks = ahead if bodies == 1 else 1.0
         if cover > 0.0:
             covered = True
             intensity += cover * (body - intensity)
             plain += cover * (body_plain - plain)
             if cover > 0.02:
                 owner[p] = int(kind[k, OWNER])
-    return covered, calm, intensity, plain
+    return covered, looks, intensity, plain
 
 
 @njit(cache=True, nogil=True)
 def _look(pixels, view, bodies, physics, row, k, since_us, now_us, gain, fresh):
     """Go over the pixels in the box of body k."""
     box, kind, pose, ink = bodies.box, bodies.kind, bodies.pose, bodies.ink
-    state, role, owner, seen_in, listing, cursor = (
-        pixels.state,
-        pixels.role,
-        pixels.owner,
-        pixels.seen_in,
-        pixels.listing,
-        pixels.cursor,
-    )
+    state, role, owner, listing, cursor = pixels.state, pixels.role, pixels.owner, pixels.listing, pixels.cursor
+    looked, resting, rest_body = pixels.looked, pixels.rest, pixels.rest_body
     events = (cursor, pixels.event_us, pixels.event_word)
     sensor = (view.threshold_on, view.threshold_off, view.normals)
     background, ray_x, ray_y = view.background, view.ray_x, view.ray_y
-    floor, rest_rows = physics.floor, CALM_LOOKS * int(kind[k, EVERY]) - 1
+    floor, every, slower = physics.floor, int(kind[k, EVERY]), kind[k, SLOWER]
+    steady = physics.flicker_depth == 0.0
     for y in range(box[row, k, 1], box[row, k, 3]):
         for x in range(box[row, k, 0], box[row, k, 2]):
             p = y * physics.width_px + x
-            if seen_in[p] >= row:
+            if looked[p] == row or (resting[p] >= row and rest_body[p] == k):
                 continue
-            covered, calm, intensity, plain = _light(
+            covered, looks, intensity, plain = _light(
                 owner, background, box, kind, pose, ink, physics, row, x, y, ray_x[p], ray_y[p]
             )
-            seen_in[p] = row + rest_rows if calm else row
+            looked[p] = row
             listed = role[p] == LISTED
-            if not (covered or listed):
-                continue
-            intensity = intensity * gain + floor
-            plain = plain * gain + floor
-            if fresh:
-                _begin(state, role, listing, cursor, sensor, physics, p, intensity, plain, now_us)
-                continue
-            if not listed:
-                rest = background[p] * gain + floor
-                _begin(state, role, listing, cursor, sensor, physics, p, rest, rest, since_us)
-            _advance(state, events, sensor, physics, p, owner[p], intensity, plain, now_us)
+            if covered or listed:
+                intensity = intensity * gain + floor
+                plain = plain * gain + floor
+                if fresh:
+                    _begin(state, role, listing, cursor, sensor, physics, p, intensity, plain, now_us)
+                    continue
+                if not listed:
+                    before = background[p] * gain + floor
+                    _begin(state, role, listing, cursor, sensor, physics, p, before, before, since_us)
+                _advance(state, events, sensor, physics, p, owner[p], intensity, plain, now_us)
+                if looks > slower and not _settled(state, p):  # its events want their times right
+                    looks = slower
+            if steady and looks >= 2.0:
+                resting[p] = row + every * (int(looks) - 1)
+                rest_body[p] = k
 
 
 @njit(cache=True, nogil=True)
@@ -387,21 +395,23 @@ def _settled(state, p):
 def _tails(pixels, view, bodies, physics, row, now_us, gain):
     """Go on with the pixels that bodies have left, and let go those that have come to rest."""
     box, state, width = bodies.box, pixels.state, physics.width_px
-    cursor, listing, role, owner, seen_in = (
+    cursor, listing, role, owner, looked = (
         pixels.cursor,
         pixels.listing,
         pixels.role,
         pixels.owner,
-        pixels.seen_in,
+        pixels.looked,
     )
     events = (cursor, pixels.event_us, pixels.event_word)
     sensor = (view.threshold_on, view.threshold_off, view.normals)
     background = view.background
+    # Under flicker every pixel works: forty looks a period are enough for its sine.
+    pause_us = 0.05 * math.pi / physics.flicker_per_us if physics.flicker_depth > 0.0 else 0.0
     i = 0
     while i < cursor[0]:
         p = listing[i]
         i += 1
-        if seen_in[p] >= row:
+        if looked[p] == row or now_us - state[p, TIME] < pause_us:
             continue
         y, x = p // width, p % width
         near = False

@@ -26,6 +26,7 @@ EDGE_STEP_PX = 0.25  # an outline moves less than this between two looks at it
 LONGEST_STEP_S = 250e-6
 CHUNK_ROWS = 2048  # poses held at a time; a multiple of the largest `every`
 LARGEST_EVERY = 64
+MOST_SLOWER = 8  # how much longer the outline of a fast spinning ball may go without a look than its surface
 TRUTH_STEP_US = 500
 DARK_FLOOR = 1e-3  # dark current as an intensity: lets the logarithm live without light
 NORMALS = 1 << 16
@@ -192,7 +193,9 @@ class _Simulation:
             state=np.zeros((count, kernels.STATE_COLUMNS)),
             role=np.full(count, kernels.NEW, np.uint8),
             owner=np.zeros(count, np.uint8),
-            seen_in=np.full(count, -1, np.int32),
+            looked=np.full(count, -1, np.int32),
+            rest=np.full(count, -1, np.int32),
+            rest_body=np.zeros(count, np.uint8),
             listing=np.zeros(count, np.int32),
             cursor=np.zeros(3, np.int64),
             event_us=np.empty(buffer),
@@ -224,11 +227,14 @@ class _Simulation:
         self, there: Sequence[BallBody | ArmBody], start: float, stop: float, progress: Progress | None
     ) -> None:
         """Simulate [start, stop], in which these bodies and no others may be seen."""
-        wanted = [
-            min(EDGE_STEP_PX / max(body.speed_px_s(self.camera, start, stop), 1e-3), LONGEST_STEP_S) for body in there
-        ]
+        speeds = [body.speeds_px_s(self.camera, start, stop) for body in there]
+        wanted = [min(EDGE_STEP_PX / max(surface, 1e-3), LONGEST_STEP_S) for _, surface in speeds]
         step = min(wanted, default=LONGEST_STEP_S)
         every = [min(1 << int(math.log2(own / step)), LARGEST_EVERY) for own in wanted]
+        slower = [
+            int(min(EDGE_STEP_PX / max(outline, 1e-3) / own, MOST_SLOWER))
+            for (outline, _), own in zip(speeds, wanted, strict=True)
+        ]
         rows = max(math.ceil((stop - start) / step), 1)
         fresh = start == 0.0
         if fresh and self.scene.light.flicker_depth:
@@ -238,8 +244,9 @@ class _Simulation:
                 break  # everything has come to rest
             count = min(CHUNK_ROWS, rows - first)
             time_s = start + (stop - start) * np.arange(first, first + count + 1) / rows
-            self.pixels.seen_in[:] = -1
-            packed = _packed(there, every, self.camera, self.lens, time_s)
+            self.pixels.looked[:] = -1
+            self.pixels.rest[:] = -1
+            packed = _packed(there, every, slower, self.camera, self.lens, time_s)
             row = 0 if fresh and first == 0 else 1
             while row <= count:
                 row = kernels.run(
@@ -270,13 +277,14 @@ class _Simulation:
 def _packed(
     there: Sequence[BallBody | ArmBody],
     every: Sequence[int],
+    slower: Sequence[int],
     camera: Camera,
     lens: Lens,
     time_s: NDArray[np.float64],
 ) -> kernels.Bodies:
     """The bodies at these times in the kernels' form, from far to near."""
     order = sorted(range(len(there)), key=lambda k: -there[k].distance_m(time_s))
-    packed = [there[k].packed(camera, lens, time_s, every[k]) for k in order]
+    packed = [there[k].packed(camera, lens, time_s, every[k], max(slower[k], 1)) for k in order]
     side = max((body.ink.shape[0] for body in packed), default=2)
     ink = np.zeros((len(packed), side, side), np.float32)
     for k, body in enumerate(packed):

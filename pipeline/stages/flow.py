@@ -59,6 +59,9 @@ class FlowResult:
     normal_t_us, normal_x_px, normal_y_px, normal_points_m, normal_normals : the same for the m events with normal
         flow of a local plane; these come PLANE_REACH t_acc late, when their neighbours after them are known
     normal_direction, normal_speed_px_s : (m, 2) float64 unit vectors across the edge, (m,) float64 speed along them
+    normal_in_image : (m,) bool, the plane was fitted in the image and the ball's motion taken off afterwards; an
+        event can have both kinds. A logo that turns against the flight hardly moves in the image: few pixels then see
+        it pass, too far apart in the ball's frame to be neighbours there.
     """
 
     t_acc_us: int | None
@@ -79,6 +82,7 @@ class FlowResult:
     normal_normals: NDArray[np.float64]
     normal_direction: NDArray[np.float64]
     normal_speed_px_s: NDArray[np.float64]
+    normal_in_image: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,11 +96,21 @@ class Logo:
     points_m: NDArray[np.float64]
     normals: NDArray[np.float64]
     of_outline: NDArray[np.bool_]
+    centre_x_px: NDArray[np.float64]
+    centre_y_px: NDArray[np.float64]
 
     @classmethod
     def of(cls, logo: LogoResult) -> Logo:
         return cls(
-            logo.events.t_us, logo.x_px, logo.y_px, logo.events.on, logo.points_m, logo.normals, logo.of_outline
+            logo.events.t_us,
+            logo.x_px,
+            logo.y_px,
+            logo.events.on,
+            logo.points_m,
+            logo.normals,
+            logo.of_outline,
+            logo.centre_x_px,
+            logo.centre_y_px,
         )
 
     def __getitem__(self, rows: slice | NDArray[np.bool_] | NDArray[np.int64]) -> Logo:
@@ -108,6 +122,8 @@ class Logo:
             self.points_m[rows],
             self.normals[rows],
             self.of_outline[rows],
+            self.centre_x_px[rows],
+            self.centre_y_px[rows],
         )
 
     @classmethod
@@ -121,6 +137,8 @@ class Logo:
             np.concatenate([part.points_m for part in parts]),
             np.concatenate([part.normals for part in parts]),
             np.concatenate([part.of_outline for part in parts]),
+            np.concatenate([part.centre_x_px for part in parts]),
+            np.concatenate([part.centre_y_px for part in parts]),
         )
 
     def between(self, start_us: float, end_us: float) -> Logo:
@@ -137,6 +155,8 @@ NO_EVENTS = Logo(
     np.empty((0, 3)),
     np.empty((0, 3)),
     np.empty(0, np.bool_),
+    np.empty(0),
+    np.empty(0),
 )
 
 
@@ -171,7 +191,7 @@ def step(
     if not track.has_ball:
         state.shot, state.events = None, NO_EVENTS
         none = (NO_EVENTS, nothing, nothing, np.empty(0, np.int64))
-        return _result(None, math.nan, math.nan, none, (NO_EVENTS, np.empty((0, 2)), nothing))
+        return _result(None, math.nan, math.nan, none, (NO_EVENTS, np.empty((0, 2)), nothing, np.empty(0, np.bool_)))
     if track.shot != state.shot:
         state.shot, state.events = track.shot, NO_EVENTS
         state.slice_start_us, state.slice_index, state.planes_until_us = packet.start_us, 0, packet.start_us
@@ -179,7 +199,7 @@ def step(
     t_acc_us = _t_acc_us(parameters, rate)
     bound_px_s = 2 * math.pi * state.setting.max_spin_rps * logo.radius_px
     triplets = _ended_slices(parameters, state, packet.end_us, t_acc_us, bound_px_s)
-    planes = _planes(parameters, state, packet.end_us, t_acc_us, bound_px_s)
+    planes = _planes(parameters, state, track, packet.end_us, t_acc_us, bound_px_s)
     keep_us = min(state.slice_start_us, state.planes_until_us - PLANE_REACH * t_acc_us)
     state.events = state.events.between(keep_us, packet.end_us)
     return _result(t_acc_us, bound_px_s, logo.radius_px, triplets, planes)
@@ -220,18 +240,38 @@ def _ended_slices(
 
 
 def _planes(
-    parameters: FlowParameters, state: State, end_us: int, t_acc_us: int, bound_px_s: float
-) -> tuple[Logo, Floats, Floats]:
-    """Events that are PLANE_REACH t_acc old and have normal flow, with its directions and speeds."""
-    events, reach_us = state.events, PLANE_REACH * t_acc_us
+    parameters: FlowParameters, state: State, track: TrackResult, end_us: int, t_acc_us: int, bound_px_s: float
+) -> tuple[Logo, Floats, Floats, NDArray[np.bool_]]:
+    """Events that are PLANE_REACH t_acc old and have normal flow, its directions and speeds, and in which frame.
+
+    Without the events of the outline: they would be taken for a logo that stands still.
+    """
+    events, reach_us = state.events[~state.events.of_outline], PLANE_REACH * t_acc_us
     until_us = max(end_us - reach_us, state.planes_until_us)
-    first, last = np.searchsorted(events.t_us, [state.planes_until_us, until_us])
+    first, last = (int(row) for row in np.searchsorted(events.t_us, [state.planes_until_us, until_us]))
     state.planes_until_us = until_us
+    scales_us, ball_px_s = np.array(PLANE_SCALES) * t_acc_us, track.mean[2:4]
+    ball_speed_px_s = float(np.linalg.norm(ball_px_s))
     rows, directions, speeds = plane_flow(
-        events.t_us, events.x_px, events.y_px, events.on, int(first), int(last), parameters.reach_px, reach_us,
-        np.array(PLANE_SCALES) * t_acc_us, bound_px_s,
+        events.t_us, events.x_px, events.y_px, events.on, first, last, parameters.reach_px, reach_us, scales_us,
+        bound_px_s,
     )  # fmt: skip
-    return events[rows], directions, speeds
+    if ball_speed_px_s == 0.0:
+        return events[rows], directions, speeds, np.zeros(rows.size, np.bool_)
+    image_rows, along, absolute = plane_flow(
+        events.t_us, events.x_px + events.centre_x_px, events.y_px + events.centre_y_px, events.on, first, last,
+        parameters.reach_px, reach_us, scales_us, bound_px_s + ball_speed_px_s,
+    )  # fmt: skip
+    relative = absolute - along @ ball_px_s
+    sense = np.where(relative < 0, -1.0, 1.0)
+    fit = (relative * sense > 0) & (relative * sense <= bound_px_s)
+    in_image = np.arange(rows.size + int(fit.sum())) >= rows.size
+    return (
+        events[np.concatenate([rows, image_rows[fit]])],
+        np.concatenate([directions, (along * sense[:, None])[fit]]),
+        np.concatenate([speeds, (relative * sense)[fit]]),
+        in_image,
+    )
 
 
 def _result(
@@ -239,10 +279,10 @@ def _result(
     bound_px_s: float,
     radius_px: float,
     triplets: tuple[Logo, Floats, Floats, NDArray[np.int64]],
-    planes: tuple[Logo, Floats, Floats],
+    planes: tuple[Logo, Floats, Floats, NDArray[np.bool_]],
 ) -> FlowResult:
     full, vx_px_s, vy_px_s, slice_index = triplets
-    normal, direction, speed_px_s = planes
+    normal, direction, speed_px_s, in_image = planes
     return FlowResult(
         t_acc_us=t_acc_us,
         speed_bound_px_s=bound_px_s,
@@ -262,4 +302,5 @@ def _result(
         normal_normals=frozen(normal.normals),
         normal_direction=frozen(direction),
         normal_speed_px_s=frozen(speed_px_s),
+        normal_in_image=frozen(in_image),
     )

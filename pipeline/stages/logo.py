@@ -48,6 +48,7 @@ class LogoResult:
     of_outline : (n,) bool, the event may well be the moving ball's own outline, see `_of_outline`
     position_std_px : 1 sigma of the centre across one axis, NaN without a ball
     radius_std_px : 1 sigma of the radius, NaN without a ball
+    velocity_std_px_s : 1 sigma of the centre's velocity along one axis, NaN without a ball
     """
 
     events: EventBatch
@@ -62,6 +63,7 @@ class LogoResult:
     of_outline: NDArray[np.bool_]
     position_std_px: float
     radius_std_px: float
+    velocity_std_px_s: float
 
 
 def start(parameters: LogoParameters, setting: Setting) -> Setting:
@@ -82,7 +84,7 @@ def step(
         none = frozen(np.empty(0))
         empty, no = frozen(np.empty((0, 3))), frozen(np.empty(0, np.bool_))
         return LogoResult(
-            EventBatch.empty(), none, none, none, none, math.nan, parameters.pad_px, empty, empty, no, math.nan, math.nan
+            EventBatch.empty(), none, none, none, none, math.nan, parameters.pad_px, empty, empty, no, *(math.nan,) * 3
         )
     radius_px = float(track.mean[4])
     events = filtered.logo_events[_rows(filtered.logo_events, track, radius_px - parameters.pad_px)]
@@ -105,6 +107,7 @@ def step(
         of_outline=frozen(_of_outline(from_centre, events.on, track)),
         position_std_px=math.sqrt(0.5 * (track.covariance[0, 0] + track.covariance[1, 1])),
         radius_std_px=math.sqrt(track.covariance[4, 4]),
+        velocity_std_px_s=math.sqrt(0.5 * (track.covariance[2, 2] + track.covariance[3, 3])),
     )
 
 

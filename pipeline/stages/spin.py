@@ -4,8 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..camera import Setting
 from ..parameters import ParameterGroup, choice, tunable
-from ..results import SpinEstimate
+from ..results import Packet, SpinEstimate
+from .flow import FlowResult
+from .logo import LogoResult
+from .normal_flow_spin import NormalFlowSpin
+from .rate import RateResult
+from .track import TrackResult
+from .triplet_spin import TripletSpin
 
 INPUTS = ("packet", "track", "logo", "rate", "flow")
 METHODS = ("triplet", "normal_flow")
@@ -17,6 +24,12 @@ class SpinParameters(ParameterGroup):
 
     max_spin_rps: float = tunable(
         150.0, 1.0, 1000.0, 5.0, "rps", "highest spin looked for; bounds the flow's speed"
+    )
+    window_us: int = tunable(
+        500_000, 5000, 10_000_000, 5000, "us", "how far back in time the events of an estimate may lie"
+    )
+    triplet_magnitude: str = choice(
+        "rate", ("rate", "flow"), "triplet: magnitude from the event rate's rhythm, or from the flow"
     )
     triplet_solve: str = choice(
         "paper", ("paper", "least_squares"), "triplet: the paper's mean, or full rank"
@@ -33,3 +46,54 @@ class SpinResult:
 
     estimates: dict[str, SpinEstimate]
     best: str | None
+
+
+@dataclass(slots=True)
+class State:
+    """The estimators of the present shot."""
+
+    setting: Setting
+    shot: int | None = None
+    triplet: TripletSpin | None = None
+    normal_flow: NormalFlowSpin | None = None
+
+
+# The program trusts an answer whose axis it knows to 12 degrees and whose magnitude to 3 rps or a tenth.
+TRUSTED_AXIS_DEG, TRUSTED_RPS, TRUSTED_SHARE = 12.0, 3.0, 0.1
+
+
+def start(parameters: SpinParameters, setting: Setting) -> State:
+    """No shot yet."""
+    return State(setting)
+
+
+def step(
+    parameters: SpinParameters,
+    state: State,
+    packet: Packet,
+    track: TrackResult,
+    logo: LogoResult,
+    rate: RateResult,
+    flow: FlowResult,
+) -> SpinResult:
+    """Every method's estimate from the present shot up to the end of this tick."""
+    if not track.has_ball:
+        state.shot, state.triplet, state.normal_flow = None, None, None
+        reason = track.reason or "no ball"
+        return SpinResult({method: SpinEstimate.refused(method, reason) for method in METHODS}, None)
+    if state.triplet is None or state.normal_flow is None or state.shot != track.shot:
+        state.shot = track.shot
+        state.triplet = TripletSpin(parameters, state.setting)
+        state.normal_flow = NormalFlowSpin(parameters, state.setting)
+    estimates = {
+        "triplet": state.triplet.estimate(packet.end_us, flow, rate),
+        "normal_flow": state.normal_flow.estimate(packet.end_us, logo, flow),
+    }
+    return SpinResult(estimates, "normal_flow" if _trusted(estimates["normal_flow"]) else None)
+
+
+def _trusted(estimate: SpinEstimate) -> bool:
+    magnitude, std, axis_std = estimate.magnitude_rps, estimate.magnitude_std_rps, estimate.axis_std_deg
+    if magnitude is None or std is None or axis_std is None:
+        return False
+    return axis_std <= TRUSTED_AXIS_DEG and std <= max(TRUSTED_RPS, TRUSTED_SHARE * magnitude)

@@ -25,7 +25,7 @@ from .filter import FilterResult
 from .surface import SurfaceResult
 from .track_hough import candidates, hough_near
 from .track_kalman import OBSERVED, BallFilter
-from .track_outline import VOTE_US, Limits, Sighting, measure, sight
+from .track_outline import VOTE_US, Edge, Limits, Sighting, measure, sight
 
 INPUTS = ("packet", "filter", "surface")
 Status = Literal["searching", "starting", "tracking", "coasting", "lost"]
@@ -41,7 +41,8 @@ class TrackParameters(ParameterGroup):
     radius_max_px: float = tunable(40.0, 3.0, 500.0, 0.5, "px", "largest radius looked for")
     speed_min_m_s: float = tunable(1.0, 0.0, 100.0, 0.1, "m/s", "slowest ball that counts as a shot")
     speed_max_m_s: float = tunable(25.0, 1.0, 200.0, 1.0, "m/s", "fastest ball looked for")
-    latency_us: float = tunable(65.0, 0.0, 10_000.0, 5.0, "us", "how late the pixels report an edge")
+    latency_us: float = tunable(45.0, 0.0, 10_000.0, 5.0, "us", "how late the pixels report an edge")
+    lag_px: float = tunable(0.1, -2.0, 5.0, 0.05, "px", "how far the outline seems behind, at any speed")
     outline_px: float = tunable(0.5, 0.0, 5.0, 0.05, "px", "how far outside the ball the pixels see its edge")
     contour_us: int = tunable(3000, 500, 50_000, 100, "us", "how far back in time the outline's events are taken")
     acceleration_m_s2: float = tunable(15.0, 0.1, 1000.0, 1.0, "m/s^2", "Kalman: 1 sigma of the acceleration")
@@ -97,7 +98,7 @@ MOST_SURPRISE = 25.0
 # Scatter of an outline's centre and radius from tick to tick beyond the statistical one, on the samples.
 OUTLINE_STD_PX = 0.05
 # What no filtering takes away: the calibration of latency and outline, between shots of the samples.
-LATENCY_STD_US = 10.0
+LATENCY_STD_US = 12.0
 CALIBRATION_STD_PX = 0.05
 # A second ball takes the track over only when this much faster (a slower one rolls back), or while the first is
 # out of sight and not much slower (a ball that was hit).
@@ -172,7 +173,7 @@ def _search(parameters: TrackParameters, state: TrackState, packet: Packet, surf
         "starting",
         "no ball yet: a circle moves like a ball, but it must be seen once more",
         hough,
-        best.circle(parameters.outline_px),
+        _circle(parameters, best),
     )
 
 
@@ -185,7 +186,7 @@ def _follow(
     expected = ball.mean
     if _beyond(expected, camera.width_px, camera.height_px):
         return _end(parameters, state, packet, "the ball left the view")
-    expected[4] += parameters.outline_px
+    expected = _edge(parameters).outline(expected)
     spread = np.sqrt(np.diag(ball.covariance))
     span = max(2.0, 3.0 * spread[4])
     hough = hough_near(surface, expected[0], expected[1], expected[4] - span, expected[4] + span)
@@ -197,7 +198,7 @@ def _follow(
     measured = None
     if sighting is not None and sighting.ahead >= 0.3:
         if ball.update(*_observation(parameters, packet, sighting), MOST_SURPRISE):
-            measured = sighting.circle(parameters.outline_px)
+            measured = _circle(parameters, sighting)
             state.seen_us = packet.end_us
     if measured is None:
         bounced = measure(state.contour, packet.end_us, camera, expected, 0.5 * expected[4], FREE)
@@ -254,8 +255,7 @@ def _begin(
 ) -> TrackResult:
     """Start the filter at a sighting."""
     per_m = sighting.ring[4] / state.setting.ball_radius_m
-    mean = sighting.ring.copy()
-    mean[4] -= parameters.outline_px
+    mean = _edge(parameters).ball(sighting.ring)
     covariance = sighting.covariance.copy()
     covariance[OBSERVED, OBSERVED] += OUTLINE_STD_PX**2
     # The paper: high enough to converge fast. The fit bends by what the ball accelerates within its window.
@@ -265,7 +265,7 @@ def _begin(
     state.pending, state.rivals = None, []
     state.seen_us = packet.end_us
     state.shots = shot + 1
-    measured = sighting.circle(parameters.outline_px)
+    measured = _circle(parameters, sighting)
     return _result(parameters, packet, "tracking", shot, mean, _honest(state.ball), hough, measured)
 
 
@@ -281,8 +281,7 @@ def _observation(
 
     Outlines taken further back than one tick share events with the tick before and so count for less.
     """
-    observed = sighting.ring[OBSERVED]
-    observed[2] -= parameters.outline_px
+    observed = _edge(parameters).ball(sighting.ring)[OBSERVED]
     shared = max(1.0, parameters.contour_us / (packet.end_us - packet.start_us))
     noise = sighting.covariance[OBSERVED[:, None], OBSERVED]
     noise[[0, 1, 2], [0, 1, 2]] += OUTLINE_STD_PX**2
@@ -296,6 +295,16 @@ def _honest(ball: BallFilter) -> NDArray[np.float64]:
     covariance[:2, :2] += np.outer(late, late)
     covariance[OBSERVED, OBSERVED] += CALIBRATION_STD_PX**2
     return covariance
+
+
+def _edge(parameters: TrackParameters) -> Edge:
+    return Edge(parameters.outline_px, parameters.lag_px)
+
+
+def _circle(parameters: TrackParameters, sighting: Sighting) -> Circle:
+    """The ball's silhouette as sighted."""
+    x, y, _, _, radius = _edge(parameters).ball(sighting.ring).tolist()
+    return Circle(x, y, radius, sighting.score)
 
 
 def _moved(ring: NDArray[np.float64], by_us: int) -> NDArray[np.float64]:

@@ -44,6 +44,33 @@ class Limits:
     speed_max_radii_s: float
 
 
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """How the outline that the pixels report differs from the ball's.
+
+    It lies outline_px outside, because a pixel answers as soon as part of it sees the ball, and lag_px behind.
+    """
+
+    outline_px: float
+    lag_px: float
+
+    def outline(self, ball: Floats) -> Floats:
+        """The ring (5,) that a ball (5,) [x, y, vx, vy, radius] shows."""
+        return self._shifted(ball, 1.0)
+
+    def ball(self, ring: Floats) -> Floats:
+        """The ball (5,) behind a ring (5,)."""
+        return self._shifted(ring, -1.0)
+
+    def _shifted(self, ring: Floats, sign: float) -> Floats:
+        shifted = ring.copy()
+        shifted[4] += sign * self.outline_px
+        speed = math.hypot(ring[2], ring[3])
+        if speed > 0:
+            shifted[:2] -= sign * self.lag_px / speed * ring[2:4]
+        return shifted
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Sighting:
     """One measured outline at the end of a tick.
@@ -73,11 +100,10 @@ class Sighting:
     def speed_px_s(self) -> float:
         return math.hypot(self.ring[2], self.ring[3])
 
-    def circle(self, outline_px: float) -> Circle:
-        """The ball's silhouette: the outline less the width by which pixels see it too large."""
-        return Circle(
-            float(self.ring[0]), float(self.ring[1]), float(self.ring[4]) - outline_px, (self.ahead + self.behind) / 2
-        )
+    @property
+    def score(self) -> float:
+        """Share of the visible outline that has events."""
+        return (self.ahead + self.behind) / 2
 
     @property
     def trusted(self) -> bool:

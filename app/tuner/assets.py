@@ -1,0 +1,47 @@
+"""The embedded viewer's script and WebAssembly, from the rerun-notebook wheel, without importing it."""
+
+from __future__ import annotations
+
+import importlib.util
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from pipeline.errors import SpinscopeError
+
+STATIC = Path(__file__).parent / "static"
+CLASS = "\nvar WebViewer = class {"
+EXPORT = "\nexport { WebViewer };\n"
+
+
+def viewer_version() -> str:
+    """The version of the viewer; raises SpinscopeError when script and SDK are of different versions."""
+    try:
+        sdk, script = version("rerun-sdk"), version("rerun-notebook")
+    except PackageNotFoundError as error:
+        raise SpinscopeError(f"{error.name} is not installed: run `uv sync`") from None
+    if sdk != script:
+        raise SpinscopeError(f"rerun-sdk is {sdk}, rerun-notebook {script}: both must be the same, run `uv sync`")
+    return sdk
+
+
+def viewer_wasm() -> Path:
+    """The viewer's WebAssembly."""
+    return _folder() / "re_viewer_bg.wasm"
+
+
+def viewer_script() -> str:
+    """The viewer's script with its class made available; raises SpinscopeError when the class is not in it."""
+    try:
+        script = (_folder() / "widget.js").read_text(encoding="utf-8")
+    except OSError as error:
+        raise SpinscopeError(f"the viewer's script cannot be read ({error.strerror}): run `uv sync`") from None
+    if CLASS not in script:
+        raise SpinscopeError("the viewer's script holds no WebViewer: rerun-notebook must be 0.41.0, run `uv sync`")
+    return script + EXPORT
+
+
+def _folder() -> Path:
+    found = importlib.util.find_spec("rerun_notebook")
+    if found is None or not found.submodule_search_locations:
+        raise SpinscopeError("rerun-notebook is not installed: run `uv sync`")
+    return Path(found.submodule_search_locations[0]) / "static"

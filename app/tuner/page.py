@@ -1,0 +1,247 @@
+"""One open page: what it wants to see, the thread that makes it, and the pictures it has not fetched yet."""
+
+from __future__ import annotations
+
+import secrets
+import threading
+import time
+import traceback
+from collections import OrderedDict
+from dataclasses import dataclass, field
+from typing import Any
+
+from app.session import Session
+from app.viewer.run import Run
+from app.viewer.tuning import Drawings, compared, note_with_a, note_without_a, rrd_bytes
+from pipeline.chain import STAGES, Parameters, Tick
+from pipeline.errors import SpinscopeError
+from pipeline.shots import Shot, ShotLog
+
+from .bench import Bench, Clip
+from .measures import measures
+from .outbox import Outbox
+from .presets import differences
+
+REPORT_S = 0.05  # a page learns of a run's progress this often
+# The rest of a clip is worth waiting for when it takes no longer than an eye needs to see a change.
+REST_WORTH_WAITING_S = 0.25
+PICTURES_KEPT = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What a page asks for; `serial` counts its wishes, the highest is the newest."""
+
+    serial: int
+    parameters: Parameters
+    pinned: Parameters | None
+    window_us: tuple[int, int]
+    playhead_us: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Finished:
+    """All ticks of a clip with one setting."""
+
+    session: Session
+    ticks: list[Tick]
+    shots: list[Shot]
+    no_shot_reason: str | None
+
+    @property
+    def run(self) -> Run:
+        """As the viewer takes it."""
+        return Run.of(self.session, self.ticks, self.shots, self.no_shot_reason)
+
+
+class Superseded(Exception):  # noqa: N818  # no error: the page wants something newer
+    """A newer wish came in, or the page was closed."""
+
+
+@dataclass(slots=True, eq=False)
+class _Report:
+    """What the page's bar shows of a wish: seconds by stage, share done, what is being done."""
+
+    outbox: Outbox
+    serial: int
+    began: float = field(default_factory=time.perf_counter)
+    seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys([*STAGES, "drawing"], 0.0))
+    last: float = 0.0
+
+    def tell(self, state: str, share: float = 0.0, *, force: bool = False, **more: Any) -> None:
+        now = time.perf_counter()
+        if force or now - self.last >= REPORT_S:
+            self.last = now
+            milliseconds = {name: 1000 * seconds for name, seconds in self.seconds.items()}
+            total = 1000 * (now - self.began)
+            self.outbox.put(
+                "run", serial=self.serial, state=state, share=share, stages=milliseconds, total=total, **more
+            )
+
+
+class Page:
+    """A page's side on the server. Its thread runs the chain; the newest wish wins, between two ticks."""
+
+    def __init__(self, bench: Bench, drawings: Drawings) -> None:
+        self.id = secrets.token_urlsafe(12)
+        self.bench = bench
+        self.outbox = Outbox()
+        self.last_sign_of_life = time.monotonic()
+        self.listeners = 0
+        self.finished: Finished | None = None
+        self._drawings = drawings
+        self._pictures: OrderedDict[str, bytes] = OrderedDict()
+        self._wanted: Wanted | None = None
+        self._newest = -1
+        self._closed = False
+        self._changed = threading.Condition()
+        self._thread = threading.Thread(target=self._work, name=f"page {self.id}", daemon=True)
+        self._thread.start()
+
+    def ask(self, wanted: Wanted) -> bool:
+        """Take a wish; False when a newer one is already there."""
+        with self._changed:
+            if wanted.serial <= self._newest:
+                return False
+            self._newest, self._wanted = wanted.serial, wanted
+            self._changed.notify()
+            return True
+
+    def picture(self, recording_id: str) -> bytes | None:
+        """The bytes of a picture that is still there."""
+        return self._pictures.get(recording_id)
+
+    def close(self) -> None:
+        """End the page's thread and its connection."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify()
+        self.outbox.close()
+
+    def join(self, seconds: float) -> None:
+        """Wait for the thread to end."""
+        self._thread.join(seconds)
+
+    def _work(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._closed or self._wanted is not None)
+                if self._closed:
+                    return
+                wanted, self._wanted = self._wanted, None
+            assert wanted is not None
+            report = _Report(self.outbox, wanted.serial)
+            try:
+                self._fulfil(wanted, report)
+            except Superseded:
+                continue
+            except Exception as error:  # noqa: BLE001  # whatever a stage raises, the page goes on
+                report.tell("failed", force=True, error=fault(error))
+
+    def _fulfil(self, wanted: Wanted, report: _Report) -> None:
+        clip = self.bench.clip(*wanted.window_us)
+        a = None
+        if wanted.pinned is not None:
+            a = self._finish(clip, wanted.pinned, wanted, report, None)
+        b = self._finish(clip, wanted.parameters, wanted, report, wanted.playhead_us if a is None else None)
+        self.finished = b
+        self._show(wanted, clip, b, a, report)
+
+    def _finish(
+        self, clip: Clip, parameters: Parameters, wanted: Wanted, report: _Report, playhead_us: float | None
+    ) -> Finished:
+        """Run a clip to its end; when that takes long, first show it up to the playhead."""
+        session = clip.with_parameters(parameters)
+        ticks: list[Tick] = []
+        count = clip.session.chain.tick_count(parameters)
+        began, previewed = time.perf_counter(), playhead_us is None
+        for step in clip.run(parameters):
+            if self._is_old(wanted):
+                raise Superseded
+            ticks.append(step.tick)
+            for stage, seconds in step.seconds.items():
+                report.seconds[stage] += seconds
+            report.tell("computing", len(ticks) / count)
+            if not previewed and playhead_us is not None and step.tick.packet.end_us >= playhead_us:
+                previewed = True
+                rest_s = (time.perf_counter() - began) / len(ticks) * (count - len(ticks))
+                if rest_s > REST_WORTH_WAITING_S:
+                    self._show(wanted, clip, _finished(session, ticks), None, report, partial=True)
+        return _finished(session, ticks)
+
+    def _show(
+        self, wanted: Wanted, clip: Clip, b: Finished, a: Finished | None, report: _Report, *, partial: bool = False
+    ) -> None:
+        """Draw the run and tell the page where to fetch it."""
+        if self._is_old(wanted):
+            raise Superseded
+        report.tell("drawing", 1.0, force=True)
+        began = time.perf_counter()
+        chunks = self._drawings.chunks(b.run, lambda stage: clip.key(b.session.parameters, stage))
+        if a is None:
+            chunks = [*chunks, *note_without_a(b.run)]
+        else:
+            a_parameters = a.session.parameters
+            a_chunks = self._drawings.chunks(a.run, lambda stage: clip.key(a_parameters, stage))
+            chunks = [*chunks, *compared(a_chunks), *note_with_a(b.run, _difference_text(a, b))]
+        recording_id = f"{self.id}-{wanted.serial}{'-part' if partial else ''}"
+        picture = rrd_bytes(chunks, recording_id)
+        report.seconds["drawing"] += time.perf_counter() - began
+        if self._is_old(wanted):
+            raise Superseded
+        self._pictures[recording_id] = picture
+        while len(self._pictures) > PICTURES_KEPT:
+            self._pictures.popitem(last=False)
+        report.tell(
+            "partial" if partial else "done",
+            1.0,
+            force=True,
+            recording=recording_id,
+            bytes=len(picture),
+            start_us=b.run.start_us,
+            end_us=b.run.end_us,
+            first_sight_us=b.run.first_sight_us,
+            measures=None if partial else _measured(clip, b),
+            pinned_measures=None if a is None else _measured(clip, a),
+            differs=[] if a is None else differences(a.session.parameters, b.session.parameters),
+        )
+
+    def _is_old(self, wanted: Wanted) -> bool:
+        return self._closed or wanted.serial != self._newest
+
+
+def fault(error: Exception) -> str:
+    """One line for people: our own message, or which stage failed and how."""
+    if isinstance(error, SpinscopeError):
+        return str(error)
+    places = [str(frame.f_globals.get("__name__")) for frame, _ in traceback.walk_tb(error.__traceback__)]
+    stage = next((place.rsplit(".", 1)[1] for place in places if place.startswith("pipeline.stages.")), "the tuner")
+    return f"{stage} failed: {type(error).__name__}: {' '.join(str(error).split())[:300]}"
+
+
+def finish(clip: Clip, parameters: Parameters) -> Finished:
+    """A clip run to its end with these parameters, without anybody being told."""
+    return _finished(clip.with_parameters(parameters), [step.tick for step in clip.run(parameters)])
+
+
+def _finished(session: Session, ticks: list[Tick]) -> Finished:
+    log = ShotLog()
+    for tick in ticks:
+        log.add(tick)
+    log.close()
+    return Finished(session, list(ticks), log.shots, log.no_shot_reason)
+
+
+def _measured(clip: Clip, finished: Finished) -> dict[str, Any]:
+    made = measures(finished.session, finished.ticks, finished.shots, finished.no_shot_reason)
+    costs = clip.cost_of(finished.session.parameters)
+    return {**made, "stage_ms": {stage: 1000 * seconds for stage, seconds in costs.items()}}
+
+
+def _difference_text(a: Finished, b: Finished) -> str:
+    """What the Compare tab says of A and B; the page's own table says more."""
+    rows = differences(a.session.parameters, b.session.parameters)
+    if not rows:
+        return "## A and B are alike\n\nTurn a knob: that is B."
+    lines = ["| parameter | A | B |", "|---|---|---|"]
+    return "\n".join([*lines, *(f"| {name} | {first} | {second} |" for name, first, second in rows)])

@@ -1,0 +1,94 @@
+"""Presets for the page: the built-in ones, the user's TOML, and the command line that gives the same numbers."""
+
+from __future__ import annotations
+
+import shlex
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from app.session import PRESETS
+from pipeline.chain import Parameters
+from pipeline.errors import ParameterError
+
+from .controls import setup_of
+
+Values = dict[str, dict[str, Any]]
+
+
+def built_in(opened: Parameters) -> dict[str, Values]:
+    """The presets by name, each in the set-up of the opened recording; `opened` is what it was opened with."""
+    found = {}
+    for path in sorted(PRESETS.glob("*.toml")):
+        found[path.stem] = applied(path.read_text(encoding="utf-8"), opened).as_dict()
+    found["opened"] = opened.as_dict()
+    return found
+
+
+def applied(text: str, opened: Parameters) -> Parameters:
+    """The parameters of a TOML preset; what belongs to the set-up is kept unless the preset names it.
+
+    Raises ParameterError that says what is wrong with the preset.
+    """
+    try:
+        values = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ParameterError(f"the preset is no TOML: {error}") from None
+    return Parameters().with_values(setup_of(opened)).with_values(values)
+
+
+def as_toml(parameters: Parameters) -> str:
+    """A preset of all that differs from the defaults."""
+    lines = ["# Settings of Spinscope; what is not named here has its default."]
+    for group, values in _differing(parameters, Parameters()).items():
+        lines += ["", f"[{group}]"]
+        declared = parameters.group(group).tunables()
+        for name, value in values.items():
+            help_text = f"  # {declared[name].help}" if declared[name].help else ""
+            lines.append(f"{name} = {_toml(value)}{help_text}")
+    return "\n".join([*lines, ""])
+
+
+def command(path: Path, parameters: Parameters, window_us: tuple[int, int] | None) -> str:
+    """The command that gives the same numbers: `spinscope analyze ...`, ready for a shell."""
+    words = ["spinscope", "analyze", str(path)]
+    for group, values in _differing(parameters, Parameters()).items():
+        for name, value in values.items():
+            words += ["--set", f"{group}.{name}={_assignment(value)}"]
+    if window_us is not None:
+        words += ["--window", str(window_us[0]), str(window_us[1])]
+    return " ".join(shlex.quote(word) for word in words)
+
+
+def differences(parameters: Parameters, other: Parameters) -> list[tuple[str, Any, Any]]:
+    """(stage.field, value, other's value) of all that differs."""
+    found = []
+    theirs = other.as_dict()
+    for group, values in parameters.as_dict().items():
+        found += [(f"{group}.{k}", v, theirs[group][k]) for k, v in values.items() if v != theirs[group][k]]
+    return found
+
+
+def _differing(parameters: Parameters, other: Parameters) -> Values:
+    theirs, found = other.as_dict(), {}
+    for group, values in parameters.as_dict().items():
+        changed = {name: value for name, value in values.items() if value != theirs[group][name]}
+        if changed:
+            found[group] = changed
+    return found
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, list):
+        return f"[{', '.join(_toml(item) for item in value)}]"
+    return repr(value)
+
+
+def _assignment(value: Any) -> str:
+    if isinstance(value, list):
+        return ",".join(repr(item) for item in value)
+    return "none" if value is None else str(value)

@@ -1,0 +1,94 @@
+"""Everything that is open: the recordings of one folder, and the pages that look at them."""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+import time
+from collections import OrderedDict
+from pathlib import Path
+
+from app.session import Choices
+from app.viewer.tuning import Drawings
+from pipeline.errors import ParameterError, RecordingError
+
+from .bench import Bench
+from .page import Page
+
+BENCHES_KEPT = 2  # each holds its events: 20 s of a rally are 260 MB
+PAGES_MOST = 16
+ALONE_S = 20.0  # a page without its browser for so long is closed; a reload takes less
+SUFFIXES = (".h5", ".hdf5", ".raw", ".npz", ".aedat4", ".db3", ".bag")
+
+
+class Workshop:
+    """The recordings opened so far and the pages on them.
+
+    path : the recording that was asked for; others of its folder may be opened from the page
+    """
+
+    def __init__(self, path: Path, choices: Choices) -> None:
+        self.path = path.resolve()
+        self.folder = self.path.parent
+        self.drawings = Drawings()
+        self._choices = choices
+        self._benches: OrderedDict[Path, Bench] = OrderedDict()
+        self._pages: dict[str, Page] = {}
+        self._lock = threading.Lock()
+
+    def bench(self, name: str | None = None) -> Bench:
+        """The recording of that name in the folder, opened when it is not yet; raises SpinscopeError."""
+        path = self.path if name is None else self._inside(name)
+        with self._lock:
+            bench = self._benches.pop(path, None)
+            if bench is None:
+                # What was chosen for the first recording alone does not go for others.
+                own = path == self.path
+                choices = self._choices if own else dataclasses.replace(self._choices, window_us=None, fixed_ball=None)
+                bench = Bench.open(path, choices)
+            self._benches[path] = bench
+            while len(self._benches) > BENCHES_KEPT:
+                self._benches.popitem(last=False)
+            return bench
+
+    def recordings(self) -> list[str]:
+        """Names of the recordings in the folder."""
+        found = {path.name for path in self.folder.iterdir() if path.suffix.lower() in SUFFIXES and path.is_file()}
+        return sorted(found | {self.path.name})
+
+    def open_page(self, name: str | None) -> Page:
+        """A new page on a recording; raises SpinscopeError."""
+        bench = self.bench(name)
+        self.close_lonely_pages()
+        with self._lock:
+            if len(self._pages) >= PAGES_MOST:
+                raise ParameterError(f"{PAGES_MOST} pages are open: close one of them")
+            page = Page(bench, self.drawings)
+            self._pages[page.id] = page
+            return page
+
+    def page(self, page_id: str) -> Page | None:
+        """The page of that id, if it is open."""
+        return self._pages.get(page_id)
+
+    def close_lonely_pages(self) -> None:
+        """Close the pages that no browser has listened to for a while."""
+        now = time.monotonic()
+        for page in list(self._pages.values()):
+            if page.listeners == 0 and now - page.last_sign_of_life > ALONE_S:
+                self._pages.pop(page.id, None)
+                page.close()
+
+    def close(self) -> None:
+        """Close all pages and wait for their threads."""
+        pages = list(self._pages.values())
+        for page in pages:
+            page.close()
+        for page in pages:
+            page.join(2.0)
+
+    def _inside(self, name: str) -> Path:
+        path = (self.folder / name).resolve()
+        if path.parent != self.folder or not path.is_file():
+            raise RecordingError(f"there is no recording {name!r} in the opened folder: choose one of its files")
+        return path

@@ -1,0 +1,395 @@
+"""HDF5 and NPZ: layouts, types, filters, windows, order, damage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pipeline.errors import RecordingError
+from pipeline.events import EventBatch
+from pipeline.recordings import Recording, open_recording, write_npz, write_recording
+from tests.naive_recordings import ecf_block, naive_order
+
+N = 5000
+
+
+def some_columns(n: int = N, seed: int = 1) -> dict[str, Any]:
+    """Columns of events over 1 s on 640 x 480 pixels; the last corner is used."""
+    rng = np.random.default_rng(seed)
+    x, y = rng.integers(0, 640, n), rng.integers(0, 480, n)
+    x[n // 2], y[n // 2] = 639, 479
+    return {"t": np.sort(rng.integers(0, 1_000_000, n)), "x": x, "y": y, "p": rng.integers(0, 2, n)}
+
+
+def write_columns(path: Path, columns: dict[str, Any], group: str = "events", **options: Any) -> None:
+    with h5py.File(path, "w") as file:
+        for name, values in columns.items():
+            file.create_dataset(f"{group}/{name}", data=values, **options)
+
+
+def assert_columns(events: EventBatch, columns: dict[str, Any]) -> None:
+    np.testing.assert_array_equal(events.t_us, columns["t"])
+    np.testing.assert_array_equal(events.x_px, columns["x"])
+    np.testing.assert_array_equal(events.y_px, columns["y"])
+    np.testing.assert_array_equal(events.on, np.asarray(columns["p"]) == 1)
+
+
+def hdf5_filters() -> list[dict[str, Any]]:
+    import hdf5plugin
+
+    plain: list[dict[str, Any]] = [{}, {"compression": "gzip"}, {"compression": "lzf", "shuffle": True}]
+    return [*plain, dict(hdf5plugin.Blosc()), dict(hdf5plugin.Zstd()), dict(hdf5plugin.Blosc2())]
+
+
+@pytest.mark.parametrize("option", range(6))
+def test_columns_are_read_through_every_filter(tmp_path: Path, option: int) -> None:
+    columns = some_columns()
+    write_columns(tmp_path / "a.h5", columns, **hdf5_filters()[option])
+    recording = open_recording(tmp_path / "a.h5")
+    assert_columns(recording.read(), columns)
+    assert recording.format == "HDF5 columns" and recording.events == N
+    assert (recording.width_px, recording.height_px, recording.sensor_from) == (640, 480, "guess")
+    assert any("640 x 480" in warning and "--sensor" in warning for warning in recording.warnings)
+
+
+@pytest.mark.parametrize("place", ["CD/events", "events"])
+def test_prophesees_compound_layout_is_read_with_its_triggers(tmp_path: Path, place: str) -> None:
+    columns = some_columns()
+    records = np.zeros(N, [("x", "<u2"), ("y", "<u2"), ("p", "<i2"), ("t", "<i8")])
+    for name, values in columns.items():
+        records[name] = values
+    edges = np.array([(1, 100, 0), (0, 300, 6)], [("p", "<i2"), ("t", "<i8"), ("id", "<i2")])
+    with h5py.File(tmp_path / "a.hdf5", "w") as file:
+        file.create_dataset(place, data=records, chunks=(700,), compression="gzip")
+        file.create_dataset("EXT_TRIGGER/events", data=edges)
+        file.attrs["geometry"] = "1280x720"
+    recording = open_recording(tmp_path / "a.hdf5")
+    assert_columns(recording.read(), columns)
+    assert "compound" in recording.format and recording.sensor_from == "file"
+    assert (recording.width_px, recording.height_px) == (1280, 720)
+    assert recording.triggers.t_us.tolist() == [100, 300] and recording.triggers.id.tolist() == [0, 6]
+    assert recording.triggers.value.tolist() == [1, 0] and recording.warnings == []
+
+
+@pytest.mark.parametrize("way", [0, 1, 2])
+@pytest.mark.parametrize("dense", [True, False])
+def test_prophesees_ecf_compression_is_undone(tmp_path: Path, way: int, dense: bool) -> None:
+    rng = np.random.default_rng(way)
+    n, rows = 2500, 1000
+    t = np.sort(rng.integers(5_000_000, 5_000_400 if dense else 900_000_000, n))
+    x, y, p = np.sort(rng.integers(0, 1280, n)), np.sort(rng.integers(0, 720, n)), rng.integers(0, 2, n)
+    if dense:
+        y[100:900], p[100:900] = 7, 1
+        t[100:900] = t[100]
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        kind = np.dtype([("x", "<u2"), ("y", "<u2"), ("p", "<i2"), ("t", "<i8")])
+        plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        plist.set_chunk((rows,))
+        plist.set_filter(0x8ECF, h5py.h5z.FLAG_OPTIONAL, ())
+        group = file.create_group("CD")
+        space = h5py.h5s.create_simple((n,), (h5py.h5s.UNLIMITED,))
+        data = h5py.h5d.create(group.id, b"events", h5py.h5t.py_create(kind), space, plist)
+        for start in range(0, n, rows):
+            part = slice(start, min(start + rows, n))
+            data.write_direct_chunk((start,), ecf_block(t[part], x[part], y[part], p[part], way), 0)
+        file.attrs["geometry"] = "1280x720"
+    recording = open_recording(tmp_path / "a.h5")
+    columns = {"t": t, "x": x, "y": y, "p": p}
+    assert_columns(recording.read(), columns)
+    middle = recording.read(int(t[1200]), int(t[2100]))
+    assert_columns(
+        middle, {c: v[np.searchsorted(t, t[1200]) : np.searchsorted(t, t[2100])] for c, v in columns.items()}
+    )
+
+
+def test_damaged_ecf_blocks_are_refused_not_misread(tmp_path: Path) -> None:
+    from pipeline.recordings.ecf import DAMAGED, PAD_BYTES, _room, decode_ecf
+
+    c = some_columns(300)
+    rng = np.random.default_rng(0)
+    for way in (0, 1, 2):
+        block = ecf_block(c["t"], c["x"], c["y"], c["p"], way)
+        for size in range(0, len(block), 7):
+            data = np.frombuffer(block[:size] + bytes(PAD_BYTES), np.uint8)
+            assert decode_ecf(_room(300), data) == DAMAGED
+        for _ in range(300):
+            data = bytearray(block + bytes(PAD_BYTES))
+            data[int(rng.integers(0, len(block)))] ^= 1 << int(rng.integers(0, 8))
+            assert decode_ecf(_room(300), np.frombuffer(bytes(data), np.uint8)) <= 300
+
+
+@pytest.mark.parametrize(
+    "places", [("/", "width_height"), ("events", "width_height"), ("events", "geometry")]
+)
+def test_the_file_says_its_sensor_and_the_command_line_beats_it(
+    tmp_path: Path, places: tuple[str, str]
+) -> None:
+    path = tmp_path / "a.h5"
+    write_columns(path, some_columns())
+    with h5py.File(path, "a") as file:
+        attributes = file[places[0]].attrs
+        if places[1] == "geometry":
+            attributes["geometry"] = np.bytes_(b"800x600")
+        else:
+            attributes["width"], attributes["height"] = 800, np.array([600])
+        file["t_offset"] = 49_599_300_523
+    recording = open_recording(path)
+    assert (recording.width_px, recording.height_px, recording.sensor_from) == (800, 600, "file")
+    assert recording.t_offset_us == 49_599_300_523 and recording.read().t_us[0] < 10_000
+    asked = open_recording(path, sensor=(1280, 720))
+    assert (asked.width_px, asked.height_px, asked.sensor_from) == (1280, 720, "command line")
+
+
+def test_events_outside_the_files_sensor_are_dropped_and_outside_a_small_one_asked_for_refused(
+    tmp_path: Path,
+) -> None:
+    path, columns = tmp_path / "a.h5", some_columns()
+    write_columns(path, columns)
+    with h5py.File(path, "a") as file:
+        file.attrs["width"], file.attrs["height"] = 320, 480
+    recording = open_recording(path)
+    inside = columns["x"] < 320
+    assert_columns(recording.read(), {c: v[inside] for c, v in columns.items()})
+    assert recording.damage.outside_events == np.count_nonzero(~inside)
+    assert any("outside the sensor" in warning for warning in recording.warnings)
+    with pytest.raises(RecordingError, match=r"--sensor 300x200 is too small.*640x480 holds them.*a\.h5$"):
+        open_recording(path, sensor=(300, 200)).read()
+    # A sensor at least as large as the file's own is right: what lies outside it is damage.
+    assert open_recording(path, sensor=(320, 480)).damage.outside_events == np.count_nonzero(~inside)
+
+
+def test_attributes_are_kept_as_numbers_and_texts(tmp_path: Path) -> None:
+    write_columns(tmp_path / "a.h5", some_columns())
+    with h5py.File(tmp_path / "a.h5", "a") as file:
+        file.attrs["camera.focal_length_mm"] = np.float32(12.5)
+        file.attrs["camera.distortion"] = [0.1, 0.0, 0.0, 0.0, -0.25]
+        file.attrs["lens"] = "Tamron"
+        file.attrs["count"] = np.int64(3)
+        file.attrs["table"] = np.zeros((3, 3))
+    found = open_recording(tmp_path / "a.h5").attributes
+    expected = {
+        "camera.focal_length_mm": 12.5,
+        "camera.distortion": "0.1,0.0,0.0,0.0,-0.25",
+        "lens": "Tamron",
+    }
+    assert found == {**expected, "count": 3}
+
+
+CASES: dict[str, tuple[Callable[[dict[str, Any]], dict[str, Any]], str]] = {
+    "lengths": (lambda c: {**c, "x": c["x"][:-1]}, r"columns differ in length.*x \(4999,\)"),
+    "two axes": (lambda c: {k: v.reshape(-1, 2) for k, v in c.items()}, "columns differ in length"),
+    "text": (lambda c: {**c, "x": c["x"].astype("S4")}, "column x holds .*not numbers"),
+    "polarity": (
+        lambda c: {**c, "p": c["p"] + (np.arange(N) == 70) * 7},
+        r"p = [78] at event 70 is none of 1",
+    ),
+    "negative pixel": (
+        lambda c: {**c, "y": c["y"] - 2000 * (np.arange(N) == 9)},
+        "y = -.* at event 9 is negative",
+    ),
+    "half a pixel": (lambda c: {**c, "x": c["x"] + 0.5}, "x = .* at event 0 is no whole pixel"),
+    "no number": (lambda c: {**c, "t": np.where(np.arange(N) == 33, np.nan, c["t"])}, "t = nan at event 33"),
+    "huge time": (
+        lambda c: {**c, "t": c["t"].astype("u8") + (np.arange(N) == 5) * 2**63},
+        "at event 5 is no time",
+    ),
+    "backwards": (
+        lambda c: {**c, "t": np.roll(c["t"], N // 2)},
+        r"time goes backwards at event 2500: \d+ us, then",
+    ),
+    "no column": (lambda c: {k: v for k, v in c.items() if k != "p"}, "holds no events"),
+    "huge pixel": (lambda c: {**c, "x": c["x"] * 9}, r"more than the largest known sensor.*--sensor"),
+}
+
+
+@pytest.mark.parametrize("kind", ["h5", "npz"])
+@pytest.mark.parametrize("case", CASES)
+def test_what_cannot_be_events_is_refused_in_one_line(tmp_path: Path, case: str, kind: str) -> None:
+    change, message = CASES[case]
+    path = tmp_path / f"a.{kind}"
+    columns = change({name: values.astype(np.int64) for name, values in some_columns().items()})
+    if kind == "h5":
+        write_columns(path, columns)
+    else:
+        np.savez(path, **columns)
+    with pytest.raises(RecordingError, match=message) as caught:
+        open_recording(path).read()
+    assert "\n" not in str(caught.value) and str(caught.value).endswith(str(path))
+
+
+@given(st.lists(st.integers(0, 30_000), max_size=60), st.integers(1, 7))
+def test_small_disorder_is_sorted_as_by_the_twin(
+    tmp_path_factory: pytest.TempPathFactory, times: list[int], max_events: int
+) -> None:
+    path = tmp_path_factory.mktemp("order") / "a.npz"
+    n = len(times)
+    np.savez(path, t=np.array(times, np.int64), x=np.arange(n), y=np.zeros(n, int), p=np.ones(n, int))
+    recording = open_recording(path)
+    ordered, backward, late = naive_order([(t, k, 0, True) for k, t in enumerate(times)])
+    if late:
+        with pytest.raises(RecordingError, match="time goes backwards"):
+            recording.scan()
+        return
+    parts = list(recording.chunks(max_events=max_events))
+    assert all(1 <= len(part) <= max_events for part in parts)
+    found = EventBatch.concatenate(parts)
+    assert [(t, k, 0, True) for t, k in zip(found.t_us.tolist(), found.x_px.tolist(), strict=True)] == ordered
+    assert recording.damage.backward_steps == backward
+    assert bool(recording.damage.sentences()) == bool(backward)
+    for start, end in ((5000, 12_000), (0, 1), (29_000, 40_000)):
+        expected = [event[1] for event in ordered if start <= event[0] < end]
+        assert recording.read(start, end).x_px.tolist() == expected
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 1_000_100), st.integers(-10, 400_000), st.sampled_from(["h5", "npz"]))
+def test_a_window_is_the_events_of_it(
+    window_files: dict[str, Recording], start: int, span: int, kind: str
+) -> None:
+    recording = window_files[kind]
+    t = some_columns()["t"]
+    inside = (t >= start) & (t < start + span)
+    assert_columns(recording.read(start, start + span), {c: v[inside] for c, v in some_columns().items()})
+
+
+@pytest.fixture(scope="module")
+def window_files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Recording]:
+    folder = tmp_path_factory.mktemp("window")
+    write_columns(folder / "a.h5", some_columns(), chunks=(97,))
+    np.savez_compressed(folder / "a.npz", **some_columns())
+    return {kind: open_recording(folder / f"a.{kind}") for kind in ("h5", "npz")}
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("t", "x", "y", "p"),
+        ("timestamps", "x", "y", "polarity"),
+        ("event_t", "event_x", "event_y", "event_p"),
+    ],
+)
+def test_npz_columns_have_several_names(tmp_path: Path, names: tuple[str, ...]) -> None:
+    columns = some_columns()
+    np.savez(tmp_path / "a.npz", gt_x=np.zeros(3), **dict(zip(names, columns.values(), strict=True)))
+    recording = open_recording(tmp_path / "a.npz")
+    assert_columns(recording.read(), columns)
+    assert recording.format == "NPZ"
+
+
+def test_npz_may_hold_one_array_of_records(tmp_path: Path) -> None:
+    columns = some_columns()
+    records = np.zeros(N, [("t", "<i8"), ("x", "<i2"), ("y", "<i2"), ("p", "?")])
+    for name, values in columns.items():
+        records[name] = values
+    np.savez(tmp_path / "a.npz", events=records)
+    assert_columns(open_recording(tmp_path / "a.npz").read(), columns)
+
+
+@pytest.mark.parametrize("kind", ["h5", "npz"])
+def test_floating_times_are_seconds_with_fractions_and_microseconds_without(
+    tmp_path: Path, kind: str
+) -> None:
+    columns = some_columns()
+    for times, unit in ((columns["t"] * 1e-6, "seconds"), (columns["t"].astype(float), "microseconds")):
+        path = tmp_path / f"{unit}.{kind}"
+        if kind == "h5":
+            write_columns(path, {**columns, "t": times})
+        else:
+            np.savez(path, **{**columns, "t": times})
+        recording = open_recording(path)
+        assert_columns(recording.read(), columns)
+        assert any(f"taken as {unit}" in warning for warning in recording.warnings)
+
+
+def test_polarity_may_be_minus_one_or_truth_values(tmp_path: Path) -> None:
+    columns = some_columns()
+    for k, p in enumerate((columns["p"] * 2 - 1, columns["p"] == 1, (columns["p"] * 2 - 1).astype("i1"))):
+        np.savez(tmp_path / f"{k}.npz", **{**columns, "p": p})
+        assert_columns(open_recording(tmp_path / f"{k}.npz").read(), columns)
+
+
+def test_objects_in_npz_are_refused_without_opening_them(tmp_path: Path) -> None:
+    columns = some_columns()
+    np.savez(tmp_path / "a.npz", **{**columns, "t": columns["t"].astype(object)})
+    with pytest.raises(RecordingError, match="array t holds Python objects"):
+        open_recording(tmp_path / "a.npz")
+
+
+@pytest.mark.parametrize("kind", ["h5", "npz"])
+def test_bombs_are_refused(tmp_path: Path, kind: str) -> None:
+    """300 MB of zeros in 0.3 MB."""
+    path, n = tmp_path / f"bomb.{kind}", 38_000_000
+    if kind == "h5":
+        with h5py.File(path, "w") as file:
+            for name in "txyp":
+                data = file.create_dataset(
+                    f"events/{name}", (n,), "i8", chunks=(n // 4,), compression="gzip", compression_opts=1
+                )
+                block = np.zeros(n // 4, "i8") if name == "t" else None
+                for k in range(4):
+                    if block is not None:
+                        data[k * (n // 4) : (k + 1) * (n // 4)] = block
+    else:
+        import zipfile
+
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+            for name in "txyp":
+                with archive.open(f"{name}.npy", "w") as member:
+                    header = {"descr": "|u1", "fortran_order": False, "shape": (4 * n,)}
+                    np.lib.format.write_array_header_1_0(member, header)
+                    for _ in range(4):
+                        member.write(bytes(n))
+    with pytest.raises(RecordingError, match=r"would unpack|blocks of"):
+        open_recording(path)
+
+
+@pytest.mark.parametrize("kind", ["h5", "npz"])
+def test_flipped_bits_and_cuts_are_refused_or_read_in_order(tmp_path: Path, kind: str) -> None:
+    """600 damaged files: one line or events that keep the rules, never a traceback."""
+    events = EventBatch.checked(**_arguments(some_columns(400)), width_px=640, height_px=480)
+    path = tmp_path / f"a.{kind}"
+    if kind == "h5":
+        write_recording(path, events, width_px=640, height_px=480, attributes={"lens": "x"})
+    else:
+        write_npz(path, events, width_px=640, height_px=480)
+    whole = path.read_bytes()
+    rng = np.random.default_rng(5)
+    for k in range(600):
+        data = bytearray(whole)
+        if k % 6 == 0:
+            data = data[: int(rng.integers(1, len(data)))]
+        else:
+            for place in rng.integers(0, len(data), int(rng.integers(1, 8))):
+                data[place] ^= 1 << int(rng.integers(0, 8))
+        path.write_bytes(data)
+        try:
+            recording = open_recording(path)
+            found = recording.read()
+            recording.truth  # noqa: B018
+        except RecordingError as error:
+            assert "\n" not in str(error) and str(path) in str(error)
+            continue
+        assert np.all(found.t_us[1:] >= found.t_us[:-1])
+        if len(found):
+            assert found.x_px.max() < recording.width_px and found.y_px.max() < recording.height_px
+
+
+def _arguments(columns: dict[str, Any]) -> dict[str, Any]:
+    return {"t_us": columns["t"], "x_px": columns["x"], "y_px": columns["y"], "on": columns["p"]}
+
+
+def test_an_unfinished_file_is_refused(tmp_path: Path) -> None:
+    """Space for all events, but only some blocks written: HDF5 itself would read zeros."""
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for name in "txyp":
+            data = file.create_dataset(f"events/{name}", (1000,), "i4", chunks=(100,))
+            data[:300] = 1
+    with pytest.raises(RecordingError, match="only 3 of 10 blocks of /events/"):
+        open_recording(tmp_path / "a.h5")

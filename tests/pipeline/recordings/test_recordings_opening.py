@@ -1,0 +1,129 @@
+"""What can be wrong before the first event: paths, formats, rights."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.errors import RecordingError
+from pipeline.recordings import open_recording, write_npz, write_raw, write_recording
+from pipeline.recordings.sensor import KNOWN_SENSORS, smallest_known
+from tests.pipeline.recordings.test_recordings_raw import assert_same_events, moving_edge
+
+HEADS = {
+    "a.aedat4": (b"#!AER-DAT4.0\r\n", "AEDAT file is not read here"),
+    "a.bag": (b"#ROSBAG V2.0\n", "ROS bag file is not read here"),
+    "a.db3": (b"SQLite format 3\0", "ROS 2 bag"),
+    "a.npy": (b"\x93NUMPY\x01\x00", "single NumPy array"),
+    "a.h5.gz": (b"\x1f\x8b\x08\x00", "gzip-packed"),
+    "a.h5": (b"version https://git-lfs.github.com", "file named .h5 is no HDF5 file"),
+    "a.raw": (b"\x00\x01\x02\x03", "file named .raw is no Prophesee RAW with its header"),
+    "a.npz": (b"no zip at all", "file named .npz is no NPZ"),
+    "a.txt": (b"1 2 3 4\n", "format of the recording is unknown"),
+    "b.npz": (b"PK\x03\x04 and no more", "NPZ file is damaged or was cut"),
+    "b.h5": (b"\x89HDF\r\n\x1a\n and no more", "HDF5 file is damaged or was cut"),
+    "empty.h5": (b"", "is empty"),
+}
+
+
+@pytest.mark.parametrize("name", HEADS)
+def test_what_is_no_recording_is_named(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    path.write_bytes(HEADS[name][0])
+    with pytest.raises(RecordingError) as caught:
+        open_recording(path)
+    message = str(caught.value)
+    assert HEADS[name][1] in message and message.endswith(str(path)) and "\n" not in message
+
+
+def test_missing_files_folders_and_closed_doors_are_named(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"does not exist.*gone\.h5$"):
+        open_recording(tmp_path / "gone.h5")
+    with pytest.raises(RecordingError, match="is a folder, not a file"):
+        open_recording(tmp_path)
+    (tmp_path / "loop.h5").symlink_to(tmp_path / "loop.h5")
+    with pytest.raises(RecordingError, match=r"loop\.h5$"):
+        open_recording(tmp_path / "loop.h5")
+    os.mkfifo(tmp_path / "pipe.raw")
+    with pytest.raises(RecordingError, match="not an ordinary file"):
+        open_recording(tmp_path / "pipe.raw")
+    with pytest.raises(RecordingError):
+        open_recording("a\0b.h5")
+    with pytest.raises(RecordingError, match=r"x{300}\.h5$"):
+        open_recording(tmp_path / ("x" * 300 + ".h5"))
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
+def test_a_file_that_may_not_be_read_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    path.write_bytes(b"x")
+    path.chmod(0)
+    with pytest.raises(RecordingError, match="may not be read"):
+        open_recording(path)
+
+
+def test_the_content_decides_not_the_suffix(tmp_path: Path) -> None:
+    events = moving_edge(200)
+    write_recording(tmp_path / "a.raw", events, width_px=1280, height_px=720)
+    write_raw(tmp_path / "a.npz", events, width_px=1280, height_px=720)
+    write_npz(tmp_path / "a", events, width_px=1280, height_px=720)
+    for name, format in (("a.raw", "HDF5 columns"), ("a.npz", "EVT3 RAW"), ("a", "NPZ")):
+        recording = open_recording(tmp_path / name)
+        assert recording.format == format and recording.sensor_from == "file"
+        assert_same_events(recording.read(), events)
+
+
+def test_identity_is_of_the_content(tmp_path: Path) -> None:
+    for name, n in (("a.raw", 100), ("b.raw", 100), ("c.raw", 101)):
+        write_raw(tmp_path / name, moving_edge(n), width_px=1280, height_px=720)
+    a, b, c = (open_recording(tmp_path / name).identity() for name in ("a.raw", "b.raw", "c.raw"))
+    assert a == b != c
+
+
+def test_a_sensor_that_is_none_is_refused(tmp_path: Path) -> None:
+    write_npz(tmp_path / "a.npz", moving_edge(10))
+    for size in ((0, 720), (1280, -1), (100_000, 10)):
+        with pytest.raises(RecordingError, match="is not 1 to 65535 pixels"):
+            open_recording(tmp_path / "a.npz", sensor=size)
+
+
+def test_the_guess_is_the_smallest_known_sensor() -> None:
+    assert smallest_known(0, 0) == (304, 240)
+    assert smallest_known(305, 10) == (320, 320) if 320 * 320 < 346 * 260 else (346, 260)
+    assert smallest_known(1280, 720) == (1280, 720)
+    assert smallest_known(3000, 1) is None
+    assert all(smallest_known(*size) == size for size in KNOWN_SENSORS)
+
+
+def test_progress_rises_to_one(tmp_path: Path) -> None:
+    write_npz(tmp_path / "a.npz", moving_edge(1000), width_px=1280, height_px=720)
+    write_raw(tmp_path / "a.raw", moving_edge(1000), width_px=1280, height_px=720)
+    write_recording(tmp_path / "a.h5", moving_edge(1000), width_px=1280, height_px=720)
+    for kind in ("npz", "raw", "h5"):
+        shares: list[float] = []
+        for _ in open_recording(tmp_path / f"a.{kind}").chunks(max_events=100, on_progress=shares.append):
+            pass
+        assert shares == sorted(shares) and shares[-1] == 1.0
+
+
+def test_an_empty_recording_can_be_read(tmp_path: Path) -> None:
+    nothing = moving_edge(0)
+    write_npz(tmp_path / "a.npz", nothing)
+    write_raw(tmp_path / "a.raw", nothing, width_px=64, height_px=64)
+    write_recording(tmp_path / "a.h5", nothing, width_px=64, height_px=64)
+    for kind in ("npz", "raw", "h5"):
+        recording = open_recording(tmp_path / f"a.{kind}")
+        assert (
+            len(recording.read()) == 0 and len(recording.read(0, 100)) == 0 and len(recording.triggers) == 0
+        )
+
+
+def test_batches_do_not_change_when_reading_goes_on(tmp_path: Path) -> None:
+    write_raw(tmp_path / "a.raw", moving_edge(20_000), width_px=1280, height_px=720)
+    batches = list(open_recording(tmp_path / "a.raw").chunks(max_events=700))
+    assert_same_events(type(batches[0]).concatenate(batches), moving_edge(20_000))
+    assert not any(column.flags.writeable for b in batches for column in (b.t_us, b.x_px, b.y_px, b.on))
+    assert np.all([len(b) <= 700 for b in batches])

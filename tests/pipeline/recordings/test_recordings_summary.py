@@ -1,0 +1,78 @@
+"""The one-pass summary against plain sums over all events, and hot pixels against the truth."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pipeline.events import EventBatch
+from pipeline.recordings import open_recording, summary, write_npz, write_recording
+from tests.pipeline.recordings.test_recordings_raw import moving_edge
+
+
+@settings(max_examples=40)
+@given(st.lists(st.integers(0, 9000), max_size=80), st.integers(1, 9))
+def test_summary_is_what_plain_sums_say(
+    tmp_path_factory: pytest.TempPathFactory, times: list[int], batch: int
+) -> None:
+    path = tmp_path_factory.mktemp("summary") / "a.npz"
+    t = np.sort(np.array(times, np.int64))
+    n = t.size
+    rng = np.random.default_rng(n)
+    on = rng.integers(0, 2, n).astype(np.bool_)
+    pixels = rng.integers(0, 40, (2, n)).astype(np.uint16)
+    write_npz(path, EventBatch(t, pixels[0], pixels[1], on), width_px=64, height_px=48)
+    recording = open_recording(path)
+    whole = recording.chunks
+    recording.chunks = lambda **_: whole(max_events=batch)  # type: ignore[method-assign]
+    info = summary(recording)
+    assert info.events == n and (info.width_px, info.height_px) == (64, 48)
+    if not n:
+        assert info.first_us is None and info.on_share is None and info.duration_us == 0
+        return
+    assert (info.first_us, info.last_us, info.duration_us) == (t[0], t[-1], t[-1] - t[0])
+    assert info.on_share == on.sum() / n
+    assert info.peak_rate_hz == max(Counter((t // 1000).tolist()).values()) * 1000
+    assert info.mean_rate_hz == (None if t[0] == t[-1] else pytest.approx(n / (t[-1] - t[0]) * 1e6))
+    assert info.triggers == 0 and set(info.damage.values()) == {0} and info.warnings == []
+
+
+def test_summary_is_ready_for_json(tmp_path: Path) -> None:
+    write_recording(
+        tmp_path / "a.h5", moving_edge(900), width_px=1280, height_px=720, attributes={"lens": "x"}
+    )
+    found = json.loads(json.dumps(summary(open_recording(tmp_path / "a.h5")).as_dict()))
+    assert {"format", "width", "height", "events", "duration_us", "on_share", "triggers", "damage"} <= set(
+        found
+    )
+    assert found["events"] == 900 and found["width"] == 1280
+
+
+@pytest.mark.parametrize("name", ["flight_mixed.h5", "spinner_ball2_side.h5", "spinner_ball3_back.h5"])
+def test_hot_pixels_are_the_simulators(samples: Path, name: str) -> None:
+    """Of all events, the share that comes from hot pixels is right within a third, and the rest is not blamed."""
+    recording = open_recording(samples / name)
+    info = summary(recording)
+    events, truth = recording.read(), recording.truth
+    assert truth is not None
+    hot = truth.label == 4
+    pixels = np.unique(events.y_px[hot].astype(np.int64) * 1280 + events.x_px[hot])
+    assert 0.5 * pixels.size <= info.hot_pixels <= pixels.size
+    assert info.hot_share == pytest.approx(hot.mean(), rel=1 / 3)
+
+
+def test_a_line_that_keeps_firing_is_not_hot(tmp_path: Path) -> None:
+    """A slanted line of pixels with 50 events each, and one hot pixel away from it."""
+    line = np.repeat(np.arange(10, 50), 50)
+    x = np.concatenate([line, np.full(50, 5)]).astype(np.uint16)
+    y = np.concatenate([line, np.full(50, 40)]).astype(np.uint16)
+    t = np.arange(x.size, dtype=np.int64) * 100
+    order = np.random.default_rng(0).permutation(x.size)
+    write_npz(tmp_path / "a.npz", EventBatch(t, x[order], y[order], np.ones(x.size, np.bool_)))
+    assert summary(open_recording(tmp_path / "a.npz")).hot_pixels == 1
