@@ -147,7 +147,7 @@ def naive_order(events: list[Event]) -> tuple[list[Event], int, int]:
 
 
 def ecf_block(t: Ints, x: Ints, y: Ints, p: Ints, way: int) -> bytes:
-    """A block of Prophesee's ECF: way 2 packs y, x, p together, 1 packs x and p, 0 none; times must not fall."""
+    """A block of Prophesee's ECF: way 2 packs y, x, p together, 1 packs x and p, 0 none; times rise."""
     n = len(t)
     out = struct.pack("<IQ", n << 2 | way, int(t[0])) + _ecf_times([int(v) for v in t])
     events = [(int(a), int(b), int(c)) for a, b, c in zip(y, x, p, strict=True)] + [(0, 0, 0)] * (-n % 4)

@@ -38,7 +38,9 @@ class Guard:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        headers = {name.decode("latin-1").lower(): value.decode("latin-1") for name, value in scope["headers"]}
+        headers = {
+            name.decode("latin-1").lower(): value.decode("latin-1") for name, value in scope["headers"]
+        }
         refusal = _refusal(scope, headers)
         if refusal is not None:
             await _answer(send, *refusal)
@@ -59,7 +61,9 @@ def _refusal(scope: Scope, headers: dict[str, str]) -> tuple[int, str] | None:
     if origin is not None and origin != f"http://{host}":
         return 403, "requests from other origins are refused"
     site = headers.get("sec-fetch-site", "none")
-    is_visit = scope["method"] == "GET" and scope["path"] == "/" and headers.get("sec-fetch-mode") == "navigate"
+    is_visit = (
+        scope["method"] == "GET" and scope["path"] == "/" and headers.get("sec-fetch-mode") == "navigate"
+    )
     if site not in ("same-origin", "none") and not is_visit:
         return 403, "requests from other origins are refused"
     if scope["method"] == "POST":

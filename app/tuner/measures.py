@@ -18,7 +18,9 @@ from pipeline.shots import Shot
 Floats = NDArray[np.float64]
 
 
-def measures(session: Session, ticks: Sequence[Tick], shots: Sequence[Shot], no_shot_reason: str | None) -> dict[str, Any]:
+def measures(
+    session: Session, ticks: Sequence[Tick], shots: Sequence[Shot], no_shot_reason: str | None
+) -> dict[str, Any]:
     """The numbers of a run, ready for JSON; None where there is nothing to be said.
 
     tracked_share : share of the ticks in which a circle was measured
@@ -71,7 +73,11 @@ def _jitter_px(ticks: Sequence[Tick]) -> float | None:
 
 
 def _shot(session: Session, shot: Shot) -> dict[str, Any]:
-    velocity = None if session.parameters.track.ball == "fixed" else shot.velocity_m_s(session.camera, session.ball_radius_m)
+    velocity = (
+        None
+        if session.parameters.track.ball == "fixed"
+        else shot.velocity_m_s(session.camera, session.ball_radius_m)
+    )
     trusted = shot.estimates[shot.best] if shot.best is not None else None
     kind = None
     if trusted is not None and trusted.vector_rps is not None:

@@ -54,7 +54,7 @@ class Finished:
         return Run.of(self.session, self.ticks, self.shots, self.no_shot_reason)
 
 
-class Superseded(Exception):  # noqa: N818  # no error: the page wants something newer
+class Superseded(Exception):  # no error: the page wants something newer
     """A newer wish came in, or the page was closed."""
 
 
@@ -170,7 +170,14 @@ class Page:
         return _finished(session, ticks)
 
     def _show(
-        self, wanted: Wanted, clip: Clip, b: Finished, a: Finished | None, report: _Report, *, partial: bool = False
+        self,
+        wanted: Wanted,
+        clip: Clip,
+        b: Finished,
+        a: Finished | None,
+        report: _Report,
+        *,
+        partial: bool = False,
     ) -> None:
         """Draw the run and tell the page where to fetch it."""
         if self._is_old(wanted):
@@ -215,7 +222,9 @@ def fault(error: Exception) -> str:
     if isinstance(error, SpinscopeError):
         return str(error)
     places = [str(frame.f_globals.get("__name__")) for frame, _ in traceback.walk_tb(error.__traceback__)]
-    stage = next((place.rsplit(".", 1)[1] for place in places if place.startswith("pipeline.stages.")), "the tuner")
+    stage = next(
+        (place.rsplit(".", 1)[1] for place in places if place.startswith("pipeline.stages.")), "the tuner"
+    )
     return f"{stage} failed: {type(error).__name__}: {' '.join(str(error).split())[:300]}"
 
 

@@ -57,7 +57,9 @@ def application(workshop: Workshop) -> FastAPI:
 
     @app.get(f"/rerun/{version}/widget.js")
     async def widget() -> Response:
-        return Response(script, media_type="text/javascript", headers={"cache-control": "max-age=31536000, immutable"})
+        return Response(
+            script, media_type="text/javascript", headers={"cache-control": "max-age=31536000, immutable"}
+        )
 
     @app.get(f"/rerun/{version}/re_viewer_bg.wasm")
     async def wasm() -> FileResponse:
@@ -210,4 +212,6 @@ def _answer_errors(app: FastAPI) -> None:
 
 def _error(status: int, text: str) -> JSONResponse:
     line = " ".join(text.split())
-    return JSONResponse({"error": line if len(line) <= MESSAGE_MOST else f"{line[:MESSAGE_MOST]} ..."}, status)
+    return JSONResponse(
+        {"error": line if len(line) <= MESSAGE_MOST else f"{line[:MESSAGE_MOST]} ..."}, status
+    )

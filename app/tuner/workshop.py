@@ -44,7 +44,11 @@ class Workshop:
             if bench is None:
                 # What was chosen for the first recording alone does not go for others.
                 own = path == self.path
-                choices = self._choices if own else dataclasses.replace(self._choices, window_us=None, fixed_ball=None)
+                choices = (
+                    self._choices
+                    if own
+                    else dataclasses.replace(self._choices, window_us=None, fixed_ball=None)
+                )
                 bench = Bench.open(path, choices)
             self._benches[path] = bench
             while len(self._benches) > BENCHES_KEPT:
@@ -53,7 +57,9 @@ class Workshop:
 
     def recordings(self) -> list[str]:
         """Names of the recordings in the folder."""
-        found = {path.name for path in self.folder.iterdir() if path.suffix.lower() in SUFFIXES and path.is_file()}
+        found = {
+            path.name for path in self.folder.iterdir() if path.suffix.lower() in SUFFIXES and path.is_file()
+        }
         return sorted(found | {self.path.name})
 
     def open_page(self, name: str | None) -> Page:
@@ -90,5 +96,7 @@ class Workshop:
     def _inside(self, name: str) -> Path:
         path = (self.folder / name).resolve()
         if path.parent != self.folder or not path.is_file():
-            raise RecordingError(f"there is no recording {name!r} in the opened folder: choose one of its files")
+            raise RecordingError(
+                f"there is no recording {name!r} in the opened folder: choose one of its files"
+            )
         return path

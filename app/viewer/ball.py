@@ -40,7 +40,7 @@ class _Painted:
 def ball_chunks(run: Run) -> list[Chunk]:
     """Everything in space, and the logo held still."""
     chunks = [_mesh(run), *_motion(run), *_arrows(run), _ring(run), *_path(run), *_axes(run), *_painting(run)]
-    style = rr.LineStrips3D.from_fields(colors=[at.method_colour("normal_flow")], radii=[-1.5])
+    style = rr.LineStrips3D.from_fields(colors=[at.RING_COLOUR], radii=[-1.5])
     return [once(at.WORLD, rr.ViewCoordinates.RDF), once(at.SPIN_RING, style), *chunks]
 
 
@@ -58,6 +58,7 @@ def _mesh(run: Run) -> Chunk:
         at.MESH,
         rr.Mesh3D(
             vertex_positions=normals * run.ball_radius_m,
+            vertex_normals=normals,
             vertex_texcoords=np.stack([u.ravel(), v.ravel()], axis=1),
             triangle_indices=faces,
         ),
@@ -134,10 +135,11 @@ def _arrow(run: Run, name: str, vectors: list[Floats], thick: list[bool], colour
         vectors=axes * (magnitudes[known, None] * RPS_M),
         radii=run.ball_radius_m * np.where(np.array(thick)[known], 0.07, 0.025),
         labels=[f"{name} {magnitude:.1f} rps" for magnitude in magnitudes[known]],
+        show_labels=np.array(thick)[known],
     )
     entity = f"{at.SPIN_ARROWS}/{name}"
     return [
-        once(entity, rr.Arrows3D.from_fields(colors=[colour], show_labels=True)),
+        once(entity, rr.Arrows3D.from_fields(colors=[colour])),
         columns_at(entity, run.times_us, columns, [0, *known.astype(int)]),
     ]
 

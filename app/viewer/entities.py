@@ -64,6 +64,7 @@ KALMAN_COLOUR: Colour = (76, 217, 100)
 TRUTH_COLOUR: Colour = (214, 120, 255)
 MASK_COLOUR: Colour = (130, 140, 150)
 PATH_COLOUR: Colour = (76, 217, 100)
+RING_COLOUR: Colour = (255, 213, 79)
 BACKGROUND: Colour = (16, 16, 16)
 METHOD_COLOURS: dict[str, Colour] = {
     "triplet": (255, 167, 38),

@@ -52,7 +52,7 @@ def _all(run: Run) -> rrb.Container:
     return rrb.Vertical(
         rrb.Horizontal(_events(run), _surface(run), _close_up(run), _space(run), column_shares=[4, 4, 3, 3]),
         rrb.Horizontal(
-            rrb.Vertical(_status(), _state_tabs(run), row_shares=[2, 5]),
+            rrb.Vertical(_status(), _state_tabs(run), row_shares=[3, 5]),
             _logo_events(run),
             _flow(run),
             _still(),
@@ -261,7 +261,7 @@ def _ball(run: Run, name: str = "Ball: logo painted on, spin arrows") -> rrb.Vie
         background=at.BACKGROUND,
         line_grid=False,
         eye_controls=eye,
-        time_ranges=_so_far(),
+        overrides={at.PATH: _so_far()},
     )
 
 
@@ -280,7 +280,7 @@ def _space(run: Run, name: str = "Flight path, grid 0.1 m") -> rrb.View:
             visible=True, spacing=0.1, plane=rr.components.Plane3D(tuple(up), below), stroke_width=1.0
         ),
         eye_controls=_tilted(middle, 1.5 * size, run),
-        time_ranges=_so_far(),
+        overrides={at.PATH: _so_far()},
     )
 
 
@@ -296,8 +296,10 @@ def _tilted(target: Floats, distance_m: float, run: Run) -> rrb.EyeControls3D:
     )
 
 
-def _so_far() -> rrb.VisibleTimeRange:
+def _so_far() -> rrb.VisibleTimeRanges:
     """Everything up to the playhead: the path keeps its earlier pieces."""
-    return rrb.VisibleTimeRange(
-        at.TIMELINE, start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.cursor_relative()
+    return rrb.VisibleTimeRanges(
+        timeline=at.TIMELINE,
+        start=rrb.TimeRangeBoundary.infinite(),
+        end=rrb.TimeRangeBoundary.cursor_relative(),
     )

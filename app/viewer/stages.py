@@ -55,7 +55,7 @@ def filter_chunks(run: Run) -> list[Chunk]:
     context = [rr.AnnotationInfo(i, name, colour) for i, (name, colour) in enumerate(at.EVENT_CLASSES)]
     columns = rr.Points2D.columns(positions=np.concatenate(positions), class_ids=np.concatenate(classes))
     width, height = run.camera.width_px, run.camera.height_px
-    frame = rr.Boxes2D(array=[-0.5, -0.5, width, height], array_format="xywh", colors=[at.MASK_COLOUR], radii=[-0.5])
+    frame = rr.Boxes2D(mins=[[-0.5, -0.5]], sizes=[[width, height]], colors=[at.MASK_COLOUR], radii=[-0.5])
     return [
         once(at.FRAME, frame),
         once(at.EVENTS, rr.AnnotationContext(context), rr.Points2D.from_fields(radii=[-1.0])),

@@ -80,7 +80,10 @@ class Drawings:
 def compared(a: Sequence[Chunk]) -> list[Chunk]:
     """The chunks of run A beside those of run B: under the prefix /A, paler, and named "A: ..." in plots."""
     moved = [chunk.with_entity_path(A + chunk.entity_path) for chunk in a]
-    return [*moved, *(_pale(chunk) for chunk in moved if chunk.is_static and chunk.entity_path.startswith(f"{A}/plots"))]
+    return [
+        *moved,
+        *(_pale(chunk) for chunk in moved if chunk.is_static and chunk.entity_path.startswith(f"{A}/plots")),
+    ]
 
 
 def _pale(style: Chunk) -> Chunk:

@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 FEWEST = 8  # events for the line's two parameters, its drift, and enough left to judge it by
-NEIGHBOURS = 64  # at most, half of them before and half after
+NEIGHBOURS = 48  # at most, half of them before and half after
+ROUNDS = 3  # of a line's fit: one with equal weights, two with bisquare weights
+NO_LINE = 2.0
 
 
 @numba.njit(cache=True, nogil=True)
@@ -40,47 +42,70 @@ def turned_back(normals: Floats, t_us: NDArray[np.int64], common_us: int, spin_r
 
 
 @numba.njit(cache=True, nogil=True)
-def drifting_line(
-    u: Floats, v: Floats, t_s: Floats, width: float
-) -> tuple[float, float, float, float, float, float]:
-    """Line (nu, nv) . (u, v) = c + drift t through points, robustly: nu, nv, drift, 1/sum of t^2, rms, sharpness.
+def drifting_line(u: Floats, v: Floats, t_s: Floats, width: float) -> tuple[float, float, float, float, float]:
+    """Line (nu, nv) . (u, v) = c + drift t through points, robustly: nu, nv, drift, its variance and sharpness.
 
     Total least squares in (u, v): the normal is the direction in which the points spread least once their linear
-    dependence on t is taken out. Three rounds with bisquare weights of this width. Sharpness is the spread across the
-    line over the spread along it, squared; 2.0 where there is no line.
+    dependence on t is taken out. Once with equal weights, then ROUNDS - 1 times with bisquare weights of this width.
+    Sharpness is the squared spread across the line over that along it; NO_LINE where there is none.
     """
-    n = t_s.size
-    weights = np.ones(n)
-    nu, nv, drift, certainty, rms, sharpness = 1.0, 0.0, 0.0, 0.0, 0.0, 2.0
-    for round_ in range(4):
-        total, mu, mv, mt = 0.0, 0.0, 0.0, 0.0
-        for i in range(n):
-            total += weights[i]
-            mu, mv, mt = mu + weights[i] * u[i], mv + weights[i] * v[i], mt + weights[i] * t_s[i]
-        if total < 0.5 * FEWEST:
-            return nu, nv, 0.0, 0.0, 0.0, 2.0
-        mu, mv, mt = mu / total, mv / total, mt / total
-        uu, uv, vv, ut, vt, tt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for i in range(n):
-            du, dv, dt = u[i] - mu, v[i] - mv, t_s[i] - mt
-            uu, uv, vv = uu + weights[i] * du * du, uv + weights[i] * du * dv, vv + weights[i] * dv * dv
-            ut, vt, tt = ut + weights[i] * du * dt, vt + weights[i] * dv * dt, tt + weights[i] * dt * dt
+    nu, nv, c, drift, variance, sharpness = 0.0, 0.0, 0.0, 0.0, 0.0, NO_LINE
+    for round_ in range(ROUNDS):
+        w, wu, wv, wt, uu, uv, vv, ut, vt, tt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(t_s.size):
+            weight = 1.0
+            if round_ > 0:
+                off = (nu * u[i] + nv * v[i] - drift * t_s[i] - c) / width
+                if abs(off) >= 1.0:
+                    continue
+                weight = (1.0 - off * off) ** 2
+            a, b, d = weight * u[i], weight * v[i], weight * t_s[i]
+            w, wu, wv, wt = w + weight, wu + a, wv + b, wt + d
+            uu, uv, vv = uu + a * u[i], uv + a * v[i], vv + b * v[i]
+            ut, vt, tt = ut + a * t_s[i], vt + b * t_s[i], tt + d * t_s[i]
+        if w < 0.5 * FEWEST:
+            return nu, nv, 0.0, 0.0, NO_LINE
+        mu, mv, mt = wu / w, wv / w, wt / w
+        ut, vt, tt = ut - w * mu * mt, vt - w * mv * mt, tt - w * mt * mt
         if tt <= 0.0:
-            return nu, nv, 0.0, 0.0, 0.0, 2.0
-        uu, uv, vv = uu - ut * ut / tt, uv - ut * vt / tt, vv - vt * vt / tt
+            return nu, nv, 0.0, 0.0, NO_LINE
+        uu, uv, vv = uu - w * mu * mu - ut * ut / tt, uv - w * mu * mv - ut * vt / tt, vv - w * mv * mv - vt * vt / tt
         half, split = 0.5 * (uu + vv), np.sqrt(0.25 * (uu - vv) ** 2 + uv * uv)
-        across, along = max(half - split, 0.0), half + split
-        if along <= 0.0:
-            return nu, nv, 0.0, 0.0, 0.0, 2.0
+        if half + split <= 0.0:
+            return nu, nv, 0.0, 0.0, NO_LINE
         angle = 0.5 * np.arctan2(2.0 * uv, uu - vv) + 0.5 * np.pi
         nu, nv = np.cos(angle), np.sin(angle)
-        drift, certainty = (nu * ut + nv * vt) / tt, tt
-        rms, sharpness = np.sqrt(across / total), across / along
-        if round_ < 3:
-            for i in range(n):
-                off = (nu * (u[i] - mu) + nv * (v[i] - mv) - drift * (t_s[i] - mt)) / width
-                weights[i] = (1.0 - off * off) ** 2 if abs(off) < 1.0 else 0.0
-    return nu, nv, drift, 1.0 / certainty, rms, sharpness
+        drift = (nu * ut + nv * vt) / tt
+        c = nu * mu + nv * mv - drift * mt
+        across = max(half - split, 0.0)
+        variance, sharpness = across / w / tt, across / (half + split)
+    return nu, nv, drift, variance, sharpness
+
+
+@numba.njit(cache=True, nogil=True)
+def _gather(
+    near: Floats, turned: Floats, t_us: NDArray[np.int64], k: int, frame: Floats, reach: float, reach_us: float
+) -> int:
+    """Write (u, v, t in s) of event k and its neighbours into `near` (3, NEIGHBOURS); return how many there are.
+
+    frame (3, 3): e of event k and two directions that span the tangent plane. Half the neighbours at most come from
+    before k and the rest from after, nearest in time first.
+    """
+    size = 0
+    for direction in range(2):
+        step, room = (1, near.shape[1]) if direction else (-1, near.shape[1] // 2)
+        j = k + direction
+        while 0 <= j < t_us.size and size < room and abs(t_us[j] - t_us[k]) <= reach_us:
+            dx = turned[j, 0] - frame[0, 0]
+            dy = turned[j, 1] - frame[0, 1]
+            dz = turned[j, 2] - frame[0, 2]
+            if dx * dx + dy * dy + dz * dz <= reach * reach:
+                near[0, size] = frame[1, 0] * dx + frame[1, 1] * dy + frame[1, 2] * dz
+                near[1, size] = frame[2, 0] * dx + frame[2, 1] * dy + frame[2, 2] * dz
+                near[2, size] = (t_us[j] - t_us[k]) * 1e-6
+                size += 1
+            j += step
+    return size
 
 
 @numba.njit(cache=True, nogil=True)
@@ -94,56 +119,55 @@ def comoving_constraints(
     reach_us: float,
     width: float,
     sharpest: float,
-) -> tuple[NDArray[np.int64], Floats, Floats, Floats]:
+) -> tuple[NDArray[np.int64], Floats, Floats, Floats, NDArray[np.int64], int]:
     """Constraints rows . spin = speeds from every stride-th event whose neighbours make a line.
 
     normals (n, 3), reach and width are on the unit sphere (rad); reach_us is how far apart in time events of one line
     may be. Returned: rows (m,) of the events, constraint rows (m, 3), speeds (m,) in rad/s along the line's normal,
-    and their variances (m,) in (rad/s)^2. Lines less sharp than `sharpest` are left out.
+    their variances (m,) in (rad/s)^2, on how many events (m,) each stands, and how many events had neighbours enough.
+    Lines less sharp than `sharpest` are left out. First come the events of one polarity, then those of the other.
     """
     n = t_us.size
     common_us = t_us[n // 2] if n else 0
     turned = turned_back(normals, t_us, common_us, spin_rad_s)
-    events, rows = np.empty(n, np.int64), np.empty((n, 3))
-    speeds, variances = np.empty(n), np.empty(n)
-    u, v, t_s = np.empty(NEIGHBOURS), np.empty(NEIGHBOURS), np.empty(NEIGHBOURS)
-    lines = np.empty((n, 3))
-    reach2, count = reach * reach, 0
-    for k in range(stride // 2, n, stride):
-        ex, ey, ez = turned[k, 0], turned[k, 1], turned[k, 2]
-        # Two directions that span the tangent plane (Duff et al., JCGT 2017).
-        sign = 1.0 if ez >= 0.0 else -1.0
-        p = -1.0 / (sign + ez)
-        q = ex * ey * p
-        ux, uy, uz = 1.0 + sign * ex * ex * p, sign * q, -sign * ex
-        vx, vy, vz = q, sign + ey * ey * p, -ey
-        size = 0
-        for direction in range(2):
-            step, room = (1, NEIGHBOURS) if direction else (-1, NEIGHBOURS // 2)
-            j = k + direction
-            while 0 <= j < n and size < room and abs(t_us[j] - t_us[k]) <= reach_us:
-                dx, dy, dz = turned[j, 0] - ex, turned[j, 1] - ey, turned[j, 2] - ez
-                if on[j] == on[k] and dx * dx + dy * dy + dz * dz <= reach2:
-                    u[size], v[size] = ux * dx + uy * dy + uz * dz, vx * dx + vy * dy + vz * dz
-                    t_s[size] = (t_us[j] - t_us[k]) * 1e-6
-                    size += 1
-                j += step
-        if size < FEWEST:
-            continue
-        nu, nv, drift, inverse, rms, sharpness = drifting_line(u[:size], v[:size], t_s[:size], width)
-        if sharpness > sharpest or inverse == 0.0:
-            continue
-        # n . (missing x e) = drift, n in the tangent plane: missing . (e x n) = drift
-        nx, ny, nz = nu * ux + nv * vx, nu * uy + nv * vy, nu * uz + nv * vz
-        lines[count, 0], lines[count, 1], lines[count, 2] = ey * nz - ez * ny, ez * nx - ex * nz, ex * ny - ey * nx
-        events[count], speeds[count], variances[count] = k, drift, rms * rms * inverse
-        count += 1
+    events, lines = np.empty(n, np.int64), np.empty((n, 3))
+    speeds, variances, sizes = np.empty(n), np.empty(n), np.empty(n, np.int64)
+    near, frame = np.empty((3, NEIGHBOURS)), np.empty((3, 3))
+    count, tried = 0, 0
+    for polarity in range(2):
+        members = np.flatnonzero(on == (polarity == 1))
+        own, own_us = turned[members], t_us[members]
+        for k in range(stride // 2, members.size, stride):
+            ex, ey, ez = own[k, 0], own[k, 1], own[k, 2]
+            # Two directions that span the tangent plane (Duff et al., JCGT 2017).
+            sign = 1.0 if ez >= 0.0 else -1.0
+            p = -1.0 / (sign + ez)
+            q = ex * ey * p
+            frame[0, 0], frame[0, 1], frame[0, 2] = ex, ey, ez
+            frame[1, 0], frame[1, 1], frame[1, 2] = 1.0 + sign * ex * ex * p, sign * q, -sign * ex
+            frame[2, 0], frame[2, 1], frame[2, 2] = q, sign + ey * ey * p, -ey
+            size = _gather(near, own, own_us, k, frame, reach, reach_us)
+            if size < FEWEST:
+                continue
+            tried += 1
+            nu, nv, drift, variance, sharpness = drifting_line(near[0, :size], near[1, :size], near[2, :size], width)
+            if sharpness > sharpest:
+                continue
+            # n . (missing x e) = drift with n in the tangent plane: missing . (e x n) = drift
+            nx = nu * frame[1, 0] + nv * frame[2, 0]
+            ny = nu * frame[1, 1] + nv * frame[2, 1]
+            nz = nu * frame[1, 2] + nv * frame[2, 2]
+            lines[count, 0] = ey * nz - ez * ny
+            lines[count, 1] = ez * nx - ex * nz
+            lines[count, 2] = ex * ny - ey * nx
+            events[count], speeds[count], variances[count], sizes[count] = members[k], drift, variance, size
+            count += 1
     events = events[:count].copy()
     rows = turned_back(lines[:count], 2 * common_us - t_us[events], common_us, spin_rad_s)
     for i in range(count):
         for axis in range(3):
             speeds[i] += rows[i, axis] * spin_rad_s[axis]
-    return events, rows, speeds[:count].copy(), variances[:count].copy()
+    return events, rows, speeds[:count].copy(), variances[:count].copy(), sizes[:count].copy(), tried
 
 
 @numba.njit(cache=True, nogil=True)

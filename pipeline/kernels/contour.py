@@ -77,8 +77,8 @@ def fit_ring(
 
     start : (5,) ring to begin with; prior_std : (5,) 1 sigma by which the answer may leave it (large = freely,
         0 = not at all: zeros for the velocity give the fit of a circle at rest)
-    gate_px : Tukey's cut-off in the first round; it then follows 4.7 robust sigma, never below floor_px and never
-        growing again
+    gate_px : Tukey's cut-off in the first round; it then shrinks to 4.7 robust sigma, by a third a round at least
+        (so that the sharp outline wins over a band of late events inside it), down to floor_px
     Returns the ring, its covariance (5, 5) from the scatter of the residuals alone, that scatter (1 sigma, px)
     and the sum of the weights (about the number of events used).
     """
@@ -122,11 +122,9 @@ def fit_ring(
         ring += step * scale
         # Tukey's weights at 4.7 sigma leave 0.83 of the variance of Gaussian residuals: 0.91 of sigma.
         scatter = math.sqrt(squares / weight_sum) / 0.91
-        narrower = min(gate, max(4.7 * scatter, floor_px))
-        settled = np.max(np.abs(step)) < 1e-3 and narrower > 0.98 * gate
-        gate = narrower
-        if settled:
+        if gate <= floor_px and np.max(np.abs(step)) < 1e-3:
             break
+        gate = max(min(4.7 * scatter, 0.67 * gate), floor_px)
     covariance = np.linalg.inv(information) * (scatter * scatter)
     for j in range(5):
         for k in range(5):
@@ -185,6 +183,7 @@ def support(
     width_px: int,
     height_px: int,
     tolerance_px: float,
+    early_px: float,
     bins: int,
 ) -> Floats:
     """How well events support a moving outline: (8,) float64
@@ -192,6 +191,7 @@ def support(
     [events on the outline, share of ON among those ahead of the centre, the same behind it,
      share of the visible outline ahead that has events, the same behind it,
      share of the whole outline that is visible, events just outside (one to four tolerances beyond), events inside].
+    On the outline = within tolerance_px of it, and behind the centre up to early_px inside.
     The outline is cut into `bins` sectors; sectors that the motion passes at a grazing angle (|cos| < 0.25) yield
     few events and do not count. Shares of nothing are 0.
     """
@@ -202,12 +202,13 @@ def support(
         if error[i] > tolerance_px:
             outside += error[i] < 4.0 * tolerance_px
             continue
-        if error[i] < -tolerance_px:
-            inside += 1
-            continue
         dx = x_px[i] - (ring[0] + ring[2] * tau_s[i])
         dy = y_px[i] - (ring[1] + ring[3] * tau_s[i])
-        if dx * ring[2] + dy * ring[3] > 0.0:
+        is_ahead = dx * ring[2] + dy * ring[3] > 0.0
+        if error[i] < -(tolerance_px if is_ahead else max(tolerance_px, early_px)):
+            inside += 1
+            continue
+        if is_ahead:
             ahead += 1
             ahead_on += on[i]
         else:

@@ -106,12 +106,13 @@ def plane_flow(
     on: NDArray[np.bool_],
     first: int,
     last: int,
+    stride: int,
     reach_px: float,
     reach_us: float,
     scales_us: Floats,
     speed_max_px_s: float,
 ) -> tuple[NDArray[np.int64], Floats, Floats]:
-    """Rows (m,) of the events first..last-1 that have normal flow, its unit directions (m, 2) and speeds (m,) px/s.
+    """Rows (m,) of every stride-th event of first..last-1 that has normal flow, its unit directions (m, 2) and speeds (m,) px/s.
 
     The neighbours come from all events. A plane needs FEWEST points spread by SPREAD_PX; its residuals may not
     exceed a third of the last scale (twice that and a second edge is in the fit), and its speed lies in
@@ -121,7 +122,7 @@ def plane_flow(
     directions, speeds = np.empty((found.size, 2)), np.empty(found.size)
     x, y, t = np.empty(NEIGHBOURS), np.empty(NEIGHBOURS), np.empty(NEIGHBOURS)
     count = 0
-    for k in range(first, last):
+    for k in range(first + stride // 2, last, stride):
         size = near_in_time(rows, k, t_us, x_px, y_px, on, reach_px, reach_us)
         if size < FEWEST:
             continue

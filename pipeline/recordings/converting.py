@@ -25,9 +25,9 @@ def convert(
 ) -> None:
     """Write the recording `source` to `target`, as its suffix says: .h5, .hdf5, .npz, .raw (EVT3).
 
-    Events stream through in constant memory. HDF5 takes over attributes, triggers, t_offset and (unless events
-    had to be moved or dropped, so that labels do not fit) the truth; RAW attributes and triggers; NPZ the size
-    of the sensor. Raises RecordingError for what cannot be read or written.
+    Events stream through in constant memory. HDF5 takes over attributes, triggers, t_offset and (unless
+    events had to be moved or dropped, so that labels do not fit) the truth; RAW attributes and triggers; NPZ
+    the size of the sensor. Raises RecordingError for what cannot be read or written.
     """
     source, target = Path(source), Path(target)
     suffix = target.suffix.lower()

@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 from ..errors import RecordingError
 from ..results import Truth
 from .columns import ColumnTypes, named_columns, refuse_bomb, refuse_types
+from .hdf5_heap import refuse_endless_heap
 from .sensor import Sensor, geometry_or_none, stated_or_none
 from .source import MAX_DISORDER_US, Columns, Pass, Progress, Triggers, translated
 
 ECF_FILTER = 0x8ECF  # Prophesee's event compression, in no plugin package; decoded in `ecf.py`
+SNIFFED_ROWS = 4096  # times looked at, first and last, to tell seconds from microseconds
 COMPOUNDS = ("CD/events", "events")
 TRIGGERS = "EXT_TRIGGER/events"
 
@@ -32,12 +34,15 @@ class Hdf5Source:
         with translated(path, "HDF5"), h5py.File(path, "r") as file:
             self._layout = Layout.found(file, path)
             self.format = self._layout.format
+            if any(_has_texts(file[place]) for place in self._layout.attribute_places):
+                refuse_endless_heap(path)
             self.attributes = _attributes(file)
             self.stated = _stated_sensor(file, self._layout, self.warnings)
             self.t_offset_us = _t_offset_us(file)
             table = Table(file, self._layout, path)
             self.events: int | None = table.rows
-            first, last = table.times_of(0, 4096), table.times_of(max(table.rows - 4096, 0), table.rows)
+            first = table.times_of(0, min(SNIFFED_ROWS, table.rows))
+            last = table.times_of(max(table.rows - SNIFFED_ROWS, 0), table.rows)
         self._types = ColumnTypes(path, first.dtype, np.concatenate([first, last]))
         if self._types.warning:
             self.warnings.append(self._types.warning)
@@ -92,6 +97,11 @@ class Layout:
 
     def __init__(self, format: str, place: str, names: dict[str, str], compound: bool) -> None:
         self.format, self.place, self.names, self.compound = format, place, names, compound
+
+    @property
+    def attribute_places(self) -> list[str]:
+        """The root, the events and what they lie in."""
+        return list(dict.fromkeys(("/", self.place, self.place.rpartition("/")[0] or "/")))
 
     @classmethod
     def found(cls, file: h5py.File, path: Path) -> Layout:
@@ -219,8 +229,7 @@ def _attributes(file: h5py.File) -> dict[str, str | float]:
 
 
 def _stated_sensor(file: h5py.File, layout: Layout, warnings: list[str]) -> Sensor | None:
-    parent = layout.place.rpartition("/")[0]
-    for place in dict.fromkeys(("/", layout.place, parent or "/")):
+    for place in layout.attribute_places:
         attributes = file[place].attrs
         if "width" in attributes and "height" in attributes:
             return stated_or_none(_scalar(attributes["width"]), _scalar(attributes["height"]), warnings)
@@ -229,6 +238,12 @@ def _stated_sensor(file: h5py.File, layout: Layout, warnings: list[str]) -> Sens
             text = text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text)
             return geometry_or_none(text, warnings)
     return None
+
+
+def _has_texts(place: h5py.Group | h5py.Dataset) -> bool:
+    """Whether there are attributes of variable length, which HDF5 looks up in its heap."""
+    attributes = place.attrs
+    return any(h5py.check_dtype(vlen=attributes.get_id(name).dtype) is not None for name in attributes)
 
 
 def _scalar(value: object) -> object:

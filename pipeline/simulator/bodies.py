@@ -21,6 +21,7 @@ Spans = list[tuple[float, float]]
 
 PIXEL_VARIANCE_PX2 = 1 / 12  # of a square pixel's own area
 TEXTURE_SHARE = 0.6  # of the blur's sigma goes into the texture, the rest into samples around the pixel
+ARM_PIECE = 0.05  # of a swing's period: its speed is taken as constant
 LOOK_S = 1e-3  # a ball of 30 m/s moves 30 mm in this time, less than its width
 
 
@@ -131,13 +132,16 @@ class ArmBody:
         self.number = number
 
     def visible(self, camera: Camera, end_s: float) -> Spans:
-        """The whole time: the arm may come and go as it swings."""
-        return [(0.0, end_s)]
+        """The whole time, for the arm may come and go, in pieces in which its speed changes little."""
+        edges = np.linspace(0.0, end_s, max(math.ceil(end_s * self.arm.frequency_hz / ARM_PIECE), 1) + 1)
+        return list(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True))
 
     def speeds_px_s(self, camera: Camera, start_s: float, stop_s: float) -> tuple[float, float]:
         """The hand's highest speed, twice."""
         arm = self.arm
-        speed = arm.length_m * arm.swing_rad * 2 * math.pi * arm.frequency_hz
+        turn = 2 * math.pi * arm.frequency_hz
+        swing = np.abs(np.cos(turn * np.linspace(start_s, stop_s, 9) + arm.phase_rad)).max()
+        speed = arm.length_m * arm.swing_rad * turn * float(swing)
         near = min(arm.elbow_m[2], arm.elbow_m[2] - arm.length_m) - arm.radius_elbow_m
         speed *= camera.focal_px / max(near, 0.1)
         return speed, speed

@@ -41,7 +41,7 @@ POSE_COLUMNS = 13
 
 # Columns of what a body is like.
 KIND, OWNER, EVERY, SLOWER, RADIUS, ALBEDO, ALBEDO_2, HALF_EXTENT, TEXELS, CAP_COSINE, INK_X, INK_Y, SAMPLE = range(13)
-BODY_COLUMNS = 13  # SLOWER: so many looks pass while the outline moves as far as the surface in one
+BODY_COLUMNS = 13  # SLOWER: so many looks pass while a ball's outline moves as far as its surface in one
 
 LOOKS_A_PIXEL = 4  # at least, of any motion
 
@@ -192,15 +192,19 @@ def _ball_light(ink, body, pose, k, row, physics, ray_x, ray_y):
 
 @njit(cache=True, nogil=True)
 def _arm_light(body, pose, k, row, x, y):
-    """(cover, intensity, looks) of arm k at a pixel; see `_ball_light`."""
+    """(cover, intensity, looks, looks while it moves here) of arm k at a pixel; see `_ball_light`.
+
+    The nearer to the elbow, the slower the arm moves.
+    """
     ax, ay, ar = pose[row, k, 0], pose[row, k, 1], pose[row, k, 2]
     bx, by, br = pose[row, k, 3] - ax, pose[row, k, 4] - ay, pose[row, k, 5]
     share = ((x - ax) * bx + (y - ay) * by) / max(bx * bx + by * by, 1e-9)
     held = min(max(share, 0.0), 1.0)
+    base = 1.0 / min(max(held, 0.1), 1.0)
     distance = ar + held * (br - ar) - math.hypot(x - ax - held * bx, y - ay - held * by)
     sigma = pose[row, k, SIGMA]
     if distance <= -SURE_SIGMAS * sigma:
-        return 0.0, 0.0, 1.0 + (-distance - SURE_SIGMAS * sigma) * LOOKS_A_PIXEL
+        return 0.0, 0.0, base + (-distance - SURE_SIGMAS * sigma) * LOOKS_A_PIXEL, base
     cover = 1.0
     if distance < SURE_SIGMAS * sigma:
         cover = 0.5 * math.erfc(-distance / (sigma * 1.4142135623730951))
@@ -208,8 +212,8 @@ def _arm_light(body, pose, k, row, x, y):
     beyond = (share - 0.75) * math.sqrt(bx * bx + by * by)
     hand = 0.5 * math.erfc(-min(max(beyond / sigma, -5.0), 5.0) / 1.4142135623730951)
     spare = min(distance, abs(beyond)) - SURE_SIGMAS * sigma
-    looks = 1.0 + max(spare, 0.0) * LOOKS_A_PIXEL
-    return cover, body[k, ALBEDO] + hand * (body[k, ALBEDO_2] - body[k, ALBEDO]), looks
+    looks = base + max(spare, 0.0) * LOOKS_A_PIXEL
+    return cover, body[k, ALBEDO] + hand * (body[k, ALBEDO_2] - body[k, ALBEDO]), looks, base
 
 
 @njit(cache=True, nogil=True)
@@ -321,28 +325,32 @@ def _begin(state, role, listing, cursor, sensor, physics, p, intensity, plain_in
 
 @njit(cache=True, nogil=True)
 def _light(owner, background, box, kind, pose, ink, physics, row, x, y, ray_x, ray_y):
-    """(covered, looks, intensity, intensity without logos) at a pixel; writes the nearest body into owner."""
+    """(covered, looks, looks while it moves here, intensity, intensity without logos) at a pixel.
+
+    Writes the nearest body into owner.
+    """
     p = y * physics.width_px + x
     intensity = background[p]
     plain = intensity
-    covered, looks, bodies = False, 1.0, 0
+    covered, looks, base, bodies = False, 1.0, 1.0, 0
     for k in range(kind.shape[0]):
         if x < box[row, k, 0] or y < box[row, k, 1] or x >= box[row, k, 2] or y >= box[row, k, 3]:
             continue
         if kind[k, KIND] == BALL:
             cover, body, body_plain, ahead = _ball_light(ink, kind, pose, k, row, physics, ray_x, ray_y)
+            pace = kind[k, SLOWER]
         else:
-            cover, body, ahead = _arm_light(kind, pose, k, row, float(x), float(y))
+            cover, body, ahead, pace = _arm_light(kind, pose, k, row, float(x), float(y))
             body_plain = body
         bodies += 1
-        looks = ahead if bodies == 1 else 1.0
+        looks, base = (ahead, pace) if bodies == 1 else (1.0, 1.0)
         if cover > 0.0:
             covered = True
             intensity += cover * (body - intensity)
             plain += cover * (body_plain - plain)
             if cover > 0.02:
                 owner[p] = int(kind[k, OWNER])
-    return covered, looks, intensity, plain
+    return covered, looks, base, intensity, plain
 
 
 @njit(cache=True, nogil=True)
@@ -354,14 +362,14 @@ def _look(pixels, view, bodies, physics, row, k, since_us, now_us, gain, fresh):
     events = (cursor, pixels.event_us, pixels.event_word)
     sensor = (view.threshold_on, view.threshold_off, view.normals)
     background, ray_x, ray_y = view.background, view.ray_x, view.ray_y
-    floor, every, slower = physics.floor, int(kind[k, EVERY]), kind[k, SLOWER]
+    floor, every = physics.floor, int(kind[k, EVERY])
     steady = physics.flicker_depth == 0.0
     for y in range(box[row, k, 1], box[row, k, 3]):
         for x in range(box[row, k, 0], box[row, k, 2]):
             p = y * physics.width_px + x
             if looked[p] == row or (resting[p] >= row and rest_body[p] == k):
                 continue
-            covered, looks, intensity, plain = _light(
+            covered, looks, base, intensity, plain = _light(
                 owner, background, box, kind, pose, ink, physics, row, x, y, ray_x[p], ray_y[p]
             )
             looked[p] = row
@@ -376,8 +384,8 @@ def _look(pixels, view, bodies, physics, row, k, since_us, now_us, gain, fresh):
                     before = background[p] * gain + floor
                     _begin(state, role, listing, cursor, sensor, physics, p, before, before, since_us)
                 _advance(state, events, sensor, physics, p, owner[p], intensity, plain, now_us)
-                if looks > slower and not _settled(state, p):  # its events want their times right
-                    looks = slower
+                if looks > base and not _settled(state, p):  # its events want their times right
+                    looks = base
             if steady and looks >= 2.0:
                 resting[p] = row + every * (int(looks) - 1)
                 rest_body[p] = k

@@ -28,6 +28,7 @@ SLICES_A_ROTATION = 10  # section 3.3
 # robust fit starts with as wide a scale and ends with the time it takes the equator to move 1.5 px.
 PLANE_REACH = 0.6
 PLANE_SCALES = (0.6, 0.3, 0.15, 0.15)
+PLANES_PER_MS = 20  # at most; a dense logo has 200 events/ms whose planes share nearly all of their neighbours
 # Triplets: neighbours are at least a pixel away from each other, pixels are known to half a pixel, and jitter makes
 # the two intervals differ by a fifth; twelve neighbours bound the work and more of them change nothing.
 TRIPLET_NEAR_PX, TRIPLET_MISMATCH_PX, TRIPLET_MISMATCH_SHARE, TRIPLET_NEIGHBOURS = 0.7, 0.5, 0.2, 12
@@ -249,18 +250,20 @@ def _planes(
     events, reach_us = state.events[~state.events.of_outline], PLANE_REACH * t_acc_us
     until_us = max(end_us - reach_us, state.planes_until_us)
     first, last = (int(row) for row in np.searchsorted(events.t_us, [state.planes_until_us, until_us]))
+    most = max(PLANES_PER_MS * (until_us - state.planes_until_us) * 1e-3, 1.0)
+    stride = max(1, math.ceil((last - first) / most))
     state.planes_until_us = until_us
     scales_us, ball_px_s = np.array(PLANE_SCALES) * t_acc_us, track.mean[2:4]
     ball_speed_px_s = float(np.linalg.norm(ball_px_s))
     rows, directions, speeds = plane_flow(
-        events.t_us, events.x_px, events.y_px, events.on, first, last, parameters.reach_px, reach_us, scales_us,
-        bound_px_s,
+        events.t_us, events.x_px, events.y_px, events.on, first, last, stride, parameters.reach_px, reach_us,
+        scales_us, bound_px_s,
     )  # fmt: skip
     if ball_speed_px_s == 0.0:
         return events[rows], directions, speeds, np.zeros(rows.size, np.bool_)
     image_rows, along, absolute = plane_flow(
         events.t_us, events.x_px + events.centre_x_px, events.y_px + events.centre_y_px, events.on, first, last,
-        parameters.reach_px, reach_us, scales_us, bound_px_s + ball_speed_px_s,
+        stride, parameters.reach_px, reach_us, scales_us, bound_px_s + ball_speed_px_s,
     )  # fmt: skip
     relative = absolute - along @ ball_px_s
     sense = np.where(relative < 0, -1.0, 1.0)

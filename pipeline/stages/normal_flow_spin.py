@@ -30,7 +30,7 @@ FEWEST_EVENTS, FEWEST_PLANES, FEWEST_LINES = 30, 12, 20
 DEEP_PX, FEWEST_DEEP = 2.0, 20
 # Events, lines and planes looked at in one tick. Neighbours overlap some twentyfold, so more cost time and say
 # nothing new.
-EVENTS, LINES, PLANES, TRIES = 6000, 500, 400, 200
+EVENTS, LINES, PLANES, TRIES = 6000, 300, 400, 200
 PLANE_SHARE = 0.25  # speeds of planes are good to about a quarter
 # How far (rad) the ball may turn within the neighbourhood of an event: little while the guess may be wrong by a
 # quarter, which blurs lines by a quarter of the way turned; then far enough to see a line drift.
@@ -41,7 +41,7 @@ REACH_PX, WIDTH_PX, SHARPEST = 3.0, 1.2, 0.35
 # Tracks are not known better than this, and neither is the speed of strokes that are curved and blurred.
 POSITION_FLOOR_PX, SPEED_FLOOR = 0.2, 0.03
 # By how much all speeds may be off together, differently over the ball: what blur, latency and curvature do.
-BIAS = 0.04
+BIAS = 0.05
 # A line counts for a start if it drifts less than this while the fastest of the starts turns FIRST_TURNS[-1].
 STANDS_PX = 0.5
 # Residuals in predicted standard deviations. Below GOOD the last tick's answer needs no second thought; above DOUBT
@@ -54,7 +54,10 @@ SEED = 1
 
 @dataclass(frozen=True, slots=True)
 class _Fit:
-    """A spin (rad/s) with the constraints behind it; `share` of the events looked at carry it."""
+    """A spin (rad/s) with the constraints behind it; `share` of the events looked at carry it.
+
+    overlap : in how many of the constraints the same event takes part
+    """
 
     spin: Floats
     events: NDArray[np.int64]
@@ -64,6 +67,7 @@ class _Fit:
     matrix: Floats
     scale: float
     share: float
+    overlap: float
 
 
 class NormalFlowSpin:
@@ -166,7 +170,7 @@ class NormalFlowSpin:
         """Share of the events that lie on a line which stands still for so long if the ball turns like this."""
         radius_px = self._track()[0]
         (t_us, normals, on), stride, looked_at = self._looked_at()
-        _, rows, speeds, _ = comoving_constraints(
+        _, rows, speeds, _, _, _ = comoving_constraints(
             t_us, normals, on, spin, stride, REACH_PX / radius_px, turn_s * 1e6, WIDTH_PX / radius_px, SHARPEST
         )
         return float(np.sum(np.abs(speeds - rows @ spin) * turn_s * radius_px < STANDS_PX)) / looked_at
@@ -194,7 +198,7 @@ class NormalFlowSpin:
             speed = float(np.linalg.norm(spin))
             if not 1.0 < speed < 1.3 * TAU * self.setting.max_spin_rps:
                 return None
-            events, rows, speeds, variances = comoving_constraints(
+            events, rows, speeds, variances, sizes, tried = comoving_constraints(
                 t_us, normals, on, spin, stride, REACH_PX / radius_px, min(turn / speed * 1e6, LONGEST_US),
                 WIDTH_PX / radius_px, SHARPEST,
             )  # fmt: skip
@@ -204,8 +208,9 @@ class NormalFlowSpin:
             variances += (speed * position_px / radius_px / facing) ** 2 + (velocity_px_s / radius_px) ** 2
             stds = np.sqrt(variances + (SPEED_FLOOR * speed) ** 2)
             spin, weights, matrix, scale = robust_spin(rows, speeds, stds, spin, 10)
-            share = float(np.sum(weights * stds**2)) / looked_at
-            fit = _Fit(spin, events * self._thinning(), rows, speeds, weights, matrix, scale, share)
+            share = float(np.sum(weights * stds**2)) / looked_at; self.agree=float(np.sum(weights * stds**2)) / tried; self.lineshare=len(events)/tried
+            overlap = max(float(sizes.mean()) / stride, 1.0)
+            fit = _Fit(spin, events * self._thinning(), rows, speeds, weights, matrix, scale, share, overlap)
         return fit
 
     def _thinning(self) -> int:
@@ -264,5 +269,6 @@ class NormalFlowSpin:
         moved = gain @ response
         place = moved @ np.diag([position_px**2, position_px**2, radius_std_px**2]) @ moved.T
         bent = gain @ (fit.speeds[:, None] * self.normals[fit.events])
-        total: Floats = scatter * max(fit.scale, 1.0) ** 2 + place + BIAS**2 * bent @ bent.T
+        shared = inverse * fit.overlap * max(fit.scale, 1.0) ** 2
+        total: Floats = scatter + shared + place + BIAS**2 * bent @ bent.T
         return total

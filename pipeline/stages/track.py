@@ -103,6 +103,8 @@ CALIBRATION_STD_PX = 0.05
 # A second ball takes the track over only when this much faster (a slower one rolls back), or while the first is
 # out of sight and not much slower (a ball that was hit).
 RIVAL_SPEED, RIVAL_SPEED_UNSEEN = 1.5, 0.7
+# Beside a track that is seen, other balls are looked for this often: soon enough to find one within 10 ms.
+LOOK_US = 10_000
 # A slower ball is not looked at again for so long; by then it may have left its straight path by half a radius.
 RIVAL_US = 25_000
 # Circles of the full-frame vote looked at in one tick, without a track and beside one.
@@ -119,6 +121,7 @@ class TrackState:
     ball: BallFilter | None = None
     pending: Sighting | None = None
     rivals: list[tuple[int, Sighting]] = field(default_factory=list)
+    looked_us: int = 0
     seen_us: int = 0
     shots: int = 0
 
@@ -205,18 +208,37 @@ def _follow(
         if bounced is not None and bounced.trusted and abs(bounced.ring[4] / expected[4] - 1) < 0.1:
             return _begin(parameters, state, packet, bounced, hough, state.shots - 1)
     now = ball.mean
-    least = (RIVAL_SPEED if measured else RIVAL_SPEED_UNSEEN) * math.hypot(now[2], now[3])
-    state.rivals = [(since, one) for since, one in state.rivals if packet.end_us - since < RIVAL_US]
-    known = [_moved(one.ring, packet.end_us - since) for since, one in state.rivals]
-    events = _clear_of(state.contour, packet.end_us, [now, *known] if measured else known)
-    _, found = _look(parameters, state, packet, surface, events, MOST_RIVALS)
-    if found and found[0][0].trusted and found[0][0].speed_px_s > least:
-        return _begin(parameters, state, packet, *found[0], state.shots)
-    state.rivals += [(packet.end_us, one) for one, _ in found]
+    if measured is None or packet.end_us - state.looked_us >= LOOK_US:
+        least = (RIVAL_SPEED if measured else RIVAL_SPEED_UNSEEN) * math.hypot(now[2], now[3])
+        other = _other_ball(parameters, state, packet, surface, now if measured else None)
+        if other is not None and other[0].speed_px_s > least:
+            return _begin(parameters, state, packet, *other, state.shots)
     if measured is None and packet.end_us - state.seen_us > parameters.coast_us:
         return _end(parameters, state, packet, f"the ball was not seen for {parameters.coast_us / 1000:g} ms")
     status: Status = "tracking" if measured else "coasting"
     return _result(parameters, packet, status, state.shots - 1, now, _honest(ball), hough, measured)
+
+
+def _other_ball(
+    parameters: TrackParameters,
+    state: TrackState,
+    packet: Packet,
+    surface: SurfaceResult,
+    tracked: NDArray[np.float64] | None,
+) -> tuple[Sighting, Circle] | None:
+    """The fastest trusted ball besides the tracked one and those looked at lately."""
+    state.looked_us = packet.end_us
+    state.rivals = [(since, one) for since, one in state.rivals if packet.end_us - since < RIVAL_US]
+    rings = [_moved(one.ring, packet.end_us - since) for since, one in state.rivals]
+    if tracked is not None:
+        rings.append(tracked)
+    events = state.contour
+    for ring in rings:
+        margin = 0.3 * ring[4] + 2.0  # room for trails, and for errors of the older ones
+        events = events[kernels.clear_of(ring, events.t_us, events.x_px, events.y_px, packet.end_us, margin)]
+    _, found = _look(parameters, state, packet, surface, events, MOST_RIVALS)
+    state.rivals += [(packet.end_us, one) for one, _ in found]
+    return found[0] if found and found[0][0].trusted else None
 
 
 def _look(
@@ -312,14 +334,6 @@ def _moved(ring: NDArray[np.float64], by_us: int) -> NDArray[np.float64]:
     later = ring.copy()
     later[:2] += ring[2:4] * by_us * 1e-6
     return later
-
-
-def _clear_of(events: EventBatch, end_us: int, rings: list[NDArray[np.float64]]) -> EventBatch:
-    """The events outside these moving rings (as of end_us), with a margin for trails and errors."""
-    for ring in rings:
-        margin = 0.3 * ring[4] + 2.0
-        events = events[kernels.clear_of(ring, events.t_us, events.x_px, events.y_px, end_us, margin)]
-    return events
 
 
 def _agree(before: Sighting, now: Sighting, tick_us: int) -> bool:

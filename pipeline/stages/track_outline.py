@@ -25,6 +25,8 @@ MOST_EVENTS = 300
 # An event this near the fitted outline supports it: four times the scatter seen on clean outlines (0.1-0.15 px),
 # and room for the early events behind.
 ON_OUTLINE_PX = 1.2
+# Behind, the ball's shading fires up to a fifth of the radius before the edge comes.
+EARLY_SHARE = 0.2
 SECTORS = 32
 # A ring's scatter above this is no outline but a band of events.
 MOST_SCATTER_PX = 0.5
@@ -155,7 +157,7 @@ def measure(
     if chosen.size < 12:
         return None
     ring, covariance, scatter, weight = kernels.fit_ring(
-        expected, prior_std, oval, *_columns(events, chosen, end_us), gate_px, 0.5, 8
+        expected, prior_std, oval, *_columns(events, chosen, end_us), gate_px, 0.6, 9
     )
     if not (np.all(np.isfinite(ring)) and ring[4] > 1.0 and weight >= 8.0 and scatter <= MOST_SCATTER_PX):
         return None
@@ -172,7 +174,7 @@ def _judged(
     oval: Floats,
 ) -> Sighting:
     around = kernels.near_outline(
-        ring, events.t_us, events.x_px, events.y_px, end_us, 4 * ON_OUTLINE_PX, 400, False
+        ring, events.t_us, events.x_px, events.y_px, end_us, max(4 * ON_OUTLINE_PX, EARLY_SHARE * ring[4]), 400, False
     )
     found, ahead_on, behind_on, ahead, behind, visible, outside, _ = kernels.support(
         ring,
@@ -182,6 +184,7 @@ def _judged(
         camera.width_px,
         camera.height_px,
         ON_OUTLINE_PX,
+        EARLY_SHARE * ring[4],
         SECTORS,
     ).tolist()
     return Sighting(
@@ -224,7 +227,7 @@ def sight(events: EventBatch, end_us: int, camera: Camera, circle: Circle, limit
         ring[3] += (row - m) * velocity_step
     free = np.full(5, 1e9)
     first = measure(recent, end_us, camera, ring, 1.5 * gate, free)
-    if first is None:
+    if first is None or first.ahead < 0.3:
         return None
     found = measure(events, end_us, camera, first.ring, 3.0, free)
     if found is None:

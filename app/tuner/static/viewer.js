@@ -22,6 +22,7 @@ export class Viewer extends EventTarget {
       width: "100%",
       height: "100%",
       hide_welcome_screen: true,
+      notebook: true,
       allow_fullscreen: false,
       theme: "dark",
       manifest_url: null,

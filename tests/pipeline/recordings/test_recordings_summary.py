@@ -56,7 +56,7 @@ def test_summary_is_ready_for_json(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["flight_mixed.h5", "spinner_ball2_side.h5", "spinner_ball3_back.h5"])
 def test_hot_pixels_are_the_simulators(samples: Path, name: str) -> None:
-    """Of all events, the share that comes from hot pixels is right within a third, and the rest is not blamed."""
+    """The share of events from hot pixels is right within a third, and no other pixels are blamed."""
     recording = open_recording(samples / name)
     info = summary(recording)
     events, truth = recording.read(), recording.truth

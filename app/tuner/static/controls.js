@@ -1,0 +1,175 @@
+// Sliders, number boxes, switches and choices, made from the parameters' declarations.
+
+import { element, notice } from "./elements.js";
+
+const STEPS = 1000; // positions of a slider over its whole range
+
+// Where a value lies on a slider (0..1), and back.
+const SCALES = {
+  linear: [(v, low, high) => (v - low) / (high - low), (p, low, high) => low + p * (high - low)],
+  logarithmic: [
+    (v, low, high) => Math.log(v / low) / Math.log(high / low),
+    (p, low, high) => low * Math.pow(high / low, p),
+  ],
+  cubic: [(v, low, high) => Math.cbrt((v - low) / (high - low)), (p, low, high) => low + p ** 3 * (high - low)],
+};
+
+export class Controls {
+  constructor(parent, sections, settings) {
+    this.settings = settings;
+    this.controls = new Map();
+    this.sections = [];
+    for (const section of sections) parent.append(this.#section(section));
+    settings.addEventListener("change", () => this.refresh());
+    this.refresh();
+  }
+
+  refresh() {
+    for (const control of this.controls.values()) control.refresh();
+    for (const { mark, names } of this.sections) {
+      const count = names.filter((name) => this.differs(name)).length;
+      mark.textContent = count ? `${count} changed` : "";
+    }
+  }
+
+  differs(name) {
+    return JSON.stringify(this.settings.get(name)) !== JSON.stringify(this.settings.presetValue(name));
+  }
+
+  #section({ title, controls }) {
+    const mark = element("span.mark");
+    const body = element("div.body");
+    const setup = ["Camera", "Ball"].includes(title);
+    const made = element("details.section", { open: !setup }, element("summary", {}, title, mark), body);
+    made.dataset.title = title;
+    for (const description of controls) {
+      const control = new Control(description, this);
+      this.controls.set(description.name, control);
+      body.append(control.row);
+    }
+    this.sections.push({ mark, names: controls.map(({ name }) => name) });
+    return made;
+  }
+}
+
+class Control {
+  constructor(description, controls) {
+    Object.assign(this, description, { controls, settings: controls.settings });
+    const range = this.allowed ? `\nAllowed: ${this.allowed}.` : "";
+    const start = `\nDefault: ${this.#text(this.default) || "none"}${this.unit ? ` ${this.unit}` : ""}.`;
+    this.title = `${this.name}\n${this.help}.${range}${start}`;
+    this.reset = element("button.reset", {
+      title: "Back to the preset's value",
+      onclick: () => this.#put(this.settings.presetValue(this.name)),
+    }, "↺");
+    const id = `p-${this.name}`;
+    const label = element("label", { htmlFor: id }, this.label);
+    this.row = element("div.control", { title: this.title }, label, ...this.#inputs(id), this.reset);
+    this.row.dataset.name = this.name;
+  }
+
+  refresh() {
+    const value = this.settings.get(this.name);
+    this.row.classList.toggle("differs", this.controls.differs(this.name));
+    if (this.kind === "switch") this.box.checked = value;
+    else if (document.activeElement !== this.box || this.kind === "choice") this.box.value = this.#text(value);
+    if (this.slider && !this.dragging) {
+      const known = value ?? this.low;
+      this.slider.value = Math.round(STEPS * SCALES[this.scale][0](known, this.low, this.high));
+      this.slider.classList.toggle("unset", value === null);
+    }
+    if (this.slider) this.slider.setAttribute("aria-valuetext", `${this.#text(value)} ${this.unit}`);
+  }
+
+  #inputs(id) {
+    const label = `${this.name}${this.unit ? ` in ${this.unit}` : ""}`;
+    if (this.kind === "switch") {
+      this.box = element("input", { type: "checkbox", id, onchange: () => this.#put(this.box.checked) });
+      return [element("span.wide", {}, this.box)];
+    }
+    if (this.kind === "choice") {
+      const options = this.choices.map((choice) => element("option", { value: choice }, choice));
+      this.box = element("select.wide", { id, onchange: () => this.#put(this.box.value) }, ...options);
+      return [this.box];
+    }
+    const typed = { type: "text", inputMode: "decimal", autocomplete: "off", spellcheck: false };
+    this.box = element("input.number", { ...typed, id, placeholder: "auto", "aria-label": label });
+    this.box.addEventListener("change", () => this.#typed());
+    this.box.addEventListener("keydown", (event) => this.#keys(event));
+    this.box.addEventListener("blur", () => this.refresh());
+    const unit = element("span.unit", {}, this.unit);
+    if (this.scale === "none") {
+      this.box.classList.add("long");
+      return [this.box, unit];
+    }
+    this.slider = element("input", { type: "range", min: 0, max: STEPS, step: 1, "aria-label": label });
+    this.slider.addEventListener("input", () => this.#dragged());
+    this.slider.addEventListener("change", () => this.#released());
+    this.slider.addEventListener("keydown", (event) => this.#keys(event));
+    return [this.slider, this.box, unit];
+  }
+
+  #dragged() {
+    this.dragging = true;
+    const value = this.#rounded(SCALES[this.scale][1](this.slider.value / STEPS, this.low, this.high));
+    this.box.value = this.#text(value);
+    this.settings.set(this.name, value, false);
+  }
+
+  #released() {
+    this.dragging = false;
+    this.settings.settle();
+  }
+
+  #typed() {
+    const text = this.box.value.trim().replace(",", this.kind === "numbers" ? "," : ".");
+    if (this.optional && ["", "auto", "none"].includes(text)) return this.#put(null);
+    const numbers = text.split(/[\s,]+/).map(Number);
+    const value = this.kind === "numbers" ? numbers : numbers[0];
+    const wrong = numbers.some((n) => !Number.isFinite(n) || n < (this.low ?? -Infinity) || n > (this.high ?? Infinity));
+    const whole = this.kind !== "whole number" || Number.isInteger(value);
+    if (text === "" || wrong || !whole || (this.kind !== "numbers" && numbers.length > 1)) {
+      notice(`${this.name} = ${text || "nothing"} is not possible: ${this.allowed}${whole ? "" : ", whole"}`);
+      this.box.blur();
+      return this.refresh();
+    }
+    return this.#put(value);
+  }
+
+  // Arrows go by the parameter's step, Page keys by ten of them, Home and End to the ends.
+  #keys(event) {
+    const steps = { ArrowUp: 1, ArrowDown: -1, PageUp: 10, PageDown: -10, ArrowRight: 1, ArrowLeft: -1 };
+    const inBox = event.target === this.box;
+    if (inBox && ["ArrowLeft", "ArrowRight", "Home", "End"].includes(event.key)) return;
+    if (this.kind === "numbers" || event.ctrlKey || event.metaKey || event.altKey) return;
+    let value = null;
+    if (event.key in steps) value = (this.settings.get(this.name) ?? this.low) + steps[event.key] * this.step;
+    else if (event.key === "Home") value = this.low;
+    else if (event.key === "End") value = this.high;
+    if (value === null) return;
+    event.preventDefault();
+    value = Math.min(Math.max(value, this.low ?? -Infinity), this.high ?? Infinity);
+    value = Number(value.toPrecision(12));
+    if (inBox) this.box.value = this.#text(value);
+    this.#put(value);
+  }
+
+  #put(value) {
+    this.settings.set(this.name, value);
+    if (this.box.type === "text") this.box.value = this.#text(value);
+  }
+
+  // A dragged value: a multiple of the step, or where that would be too coarse three digits.
+  #rounded(value) {
+    const step = this.step ?? 1;
+    let rounded = Math.round(value / step) * step;
+    if (Math.abs(value) < 5 * step && this.kind !== "whole number") rounded = Number(value.toPrecision(2));
+    if (this.kind === "whole number") rounded = Math.round(Math.abs(value) < 5 * step ? value : rounded);
+    return Math.min(Math.max(Number(rounded.toPrecision(12)), this.low), this.high);
+  }
+
+  #text(value) {
+    if (value === null || value === undefined) return "";
+    return Array.isArray(value) ? value.join(", ") : String(value);
+  }
+}

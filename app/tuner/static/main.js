@@ -1,0 +1,156 @@
+// The page: opens it on the server and wires settings, controls, viewer and tools together.
+
+import { Bar } from "./bar.js";
+import { Controls } from "./controls.js";
+import { byId, element, notice } from "./elements.js";
+import { linkOf, wantedByLink } from "./link.js";
+import { Overview } from "./overview.js";
+import { Results } from "./results.js";
+import { Runner } from "./runner.js";
+import { bytes, Connection, Refused } from "./server.js";
+import { Settings } from "./settings.js";
+import { Viewer } from "./viewer.js";
+
+const connection = new Connection();
+const settings = new Settings();
+const viewer = new Viewer();
+const app = { connection, settings, viewer };
+
+async function start() {
+  const link = wantedByLink();
+  let opening;
+  try {
+    opening = await connection.open(link.recording);
+  } catch (error) {
+    notice(error instanceof Refused ? error.message : "The server does not answer: is `spinscope tune` still running?", "error", 0);
+    return;
+  }
+  app.opening = opening;
+  const { recording, presets } = opening;
+  const preset = { name: "opened", values: presets.opened };
+  const { opened } = presets;
+  settings.start({
+    parameters: link.parameters(opened),
+    pinned: link.pinnedBy(opened),
+    clip: link.clip ?? recording.clip_us,
+    preset,
+  });
+  describe(opening);
+  app.bar = new Bar(byId("bar"), opening.stages);
+  app.overview = new Overview(byId("overview"), recording);
+  app.results = new Results(byId("side"));
+  new Controls(byId("controls"), opening.sections, settings);
+  app.runner = new Runner(connection, settings, () => viewer.playhead_us());
+  listen(link);
+  await viewer.start(opening.viewer, byId("viewer"));
+  app.runner.want(true);
+}
+
+function describe({ recording, recordings, presets }) {
+  document.title = `${recording.name} · Spinscope`;
+  const names = recordings.map((name) => element("option", { value: name, selected: name === recording.name }, name));
+  byId("recording").replaceChildren(...names);
+  byId("recording").onchange = (event) => {
+    location.hash = new URLSearchParams({ recording: event.target.value }).toString();
+    location.reload();
+  };
+  const seconds = (recording.end_us - recording.start_us) / 1e6;
+  const length = seconds < 1 ? `${(1000 * seconds).toFixed(0)} ms` : `${seconds.toFixed(1)} s`;
+  const size = `${recording.width_px} x ${recording.height_px}`;
+  byId("about").textContent = `${recording.events.toLocaleString("en")} events, ${length}, ${size}`;
+  for (const warning of recording.warnings) notice(warning, "warning", 20);
+  byId("preset").replaceChildren(...Object.keys(presets).map((name) => element("option", { value: name }, name)));
+  byId("preset").value = "opened";
+}
+
+function listen(link) {
+  let first = true;
+  let latest = null;
+  settings.addEventListener("change", ({ detail }) => {
+    app.runner.want(detail.settled);
+    if (detail.settled) rememberLater();
+    buttons();
+  });
+  connection.addEventListener("run", async ({ detail }) => {
+    if (detail.serial !== app.runner.serial) return;
+    app.bar.show(detail);
+    if (detail.error) notice(detail.error);
+    if (detail.state === "done") app.results.show(detail);
+    if (detail.measures && !app.opening.recording.is_long) showShots(detail.measures);
+    if (!detail.recording) return;
+    latest = detail.recording;
+    try {
+      const picture = await bytes(connection.path(`pictures/${detail.recording}`));
+      if (latest !== detail.recording) return;
+      if (first) await viewer.layout(await bytes(connection.path(`layout?tab=${link.tab ?? "all"}`)));
+      await viewer.show(picture, detail.recording, (first && link.time) || detail.first_sight_us);
+      first = false;
+      document.body.dataset.shown = detail.serial;
+    } catch (error) {
+      if (!(error instanceof Refused) || error.status !== 404) throw error;
+    }
+  });
+  connection.addEventListener("lost", () => {
+    app.bar.say("The server does not answer; trying again ...");
+    document.body.classList.add("lost");
+  });
+  connection.addEventListener("back", () => {
+    document.body.classList.remove("lost");
+    notice("The server is back.", "info", 3);
+    app.runner.want(true);
+  });
+  byId("undo").onclick = () => settings.undo();
+  byId("redo").onclick = () => settings.redo();
+  byId("pin").onclick = () => settings.pin();
+  byId("swap").onclick = () => settings.swap();
+  byId("keep").onclick = () => settings.unpin(false);
+  byId("discard").onclick = () => settings.unpin(true);
+  byId("preset").onchange = (event) => settings.takePreset(event.target.value, app.opening.presets[event.target.value]);
+  app.overview.addEventListener("seek", ({ detail }) => viewer.seek(detail));
+  app.overview.addEventListener("choose", ({ detail }) => chooseClip(...detail));
+  app.overview.addEventListener("shot", ({ detail }) => chooseClip(detail[0] - 20_000, detail[1] + 20_000));
+  document.addEventListener("keydown", shortcuts);
+  setInterval(async () => app.overview.move(await viewer.playhead_us()), 200);
+  buttons();
+}
+
+function showShots(measures) {
+  app.overview.show(settings.clip, measures.shots.map(({ start_us, end_us }) => [start_us, end_us]));
+}
+
+function chooseClip(from, to) {
+  const { start_us, end_us, longest_us } = app.opening.recording;
+  const start = Math.max(start_us, Math.round(from));
+  settings.takeClip(start, Math.min(end_us, Math.round(to), start + longest_us));
+  app.overview.show(settings.clip, app.overview.shots);
+  viewer.seek(start);
+}
+
+function buttons() {
+  byId("undo").disabled = !settings.canUndo;
+  byId("redo").disabled = !settings.canRedo;
+  const pinned = settings.pinned !== null;
+  for (const id of ["swap", "keep", "discard"]) byId(id).hidden = !pinned;
+  byId("pin").textContent = pinned ? "Pin B as A" : "Pin as A";
+}
+
+function shortcuts(event) {
+  const typing = event.target.matches?.("input[type=text], textarea");
+  if (!(event.ctrlKey || event.metaKey) || typing) return;
+  const key = event.key.toLowerCase();
+  if (key === "z" && !event.shiftKey) settings.undo();
+  else if ((key === "z" && event.shiftKey) || key === "y") settings.redo();
+  else return;
+  event.preventDefault();
+}
+
+// The address always says what is seen: a reload, or the link in another browser, comes back to it.
+let later = null;
+function rememberLater() {
+  clearTimeout(later);
+  later = setTimeout(async () => history.replaceState(null, "", await linkOf(app)), 300);
+}
+
+window.addEventListener("pagehide", () => connection.close());
+window.spinscope = app;
+start();

@@ -1,0 +1,109 @@
+// The strip above the viewer: event rate of the whole recording, its shots, the clip that is worked on, the playhead.
+
+import { drawing, element } from "./elements.js";
+
+const WIDTH = 1200;
+const HEIGHT = 44;
+
+export class Overview extends EventTarget {
+  constructor(parent, recording) {
+    super();
+    this.recording = recording;
+    this.shots = [];
+    this.clip = recording.clip_us;
+    this.svg = drawing("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "none" });
+    this.chosen = drawing("rect", { class: "chosen", y: 0, height: HEIGHT });
+    this.bands = drawing("g");
+    this.drag = drawing("rect", { class: "drag", y: 0, height: HEIGHT, width: 0 });
+    this.playhead = drawing("line", { class: "playhead", y1: 0, y2: HEIGHT });
+    this.svg.append(this.chosen, this.#curve(), this.bands, this.drag, this.playhead);
+    this.words = element("span.words");
+    parent.replaceChildren(this.svg, this.words);
+    this.#dragging();
+    this.show(this.clip, []);
+  }
+
+  show(clip, shots, words = "") {
+    this.clip = clip;
+    this.shots = shots;
+    this.chosen.setAttribute("x", this.#x(clip[0]));
+    this.chosen.setAttribute("width", Math.max(this.#x(clip[1]) - this.#x(clip[0]), 1));
+    this.bands.replaceChildren(...shots.map((shot, index) => this.#band(shot, index)));
+    const { start_us, end_us } = this.recording;
+    const times = `${(start_us / 1000).toFixed(0)} to ${(end_us / 1000).toFixed(0)} ms`;
+    this.words.textContent = [times, words].filter(Boolean).join(" · ");
+  }
+
+  move(time_us) {
+    const x = this.#x(time_us ?? this.recording.start_us);
+    this.playhead.setAttribute("x1", x);
+    this.playhead.setAttribute("x2", x);
+  }
+
+  #x(time_us) {
+    const { start_us, end_us } = this.recording;
+    return (WIDTH * (time_us - start_us)) / (end_us - start_us);
+  }
+
+  #time(event) {
+    const box = this.svg.getBoundingClientRect();
+    const { start_us, end_us } = this.recording;
+    const share = Math.min(Math.max((event.clientX - box.left) / box.width, 0), 1);
+    return Math.round(start_us + share * (end_us - start_us));
+  }
+
+  #curve() {
+    const { counts } = this.recording.rate;
+    const most = Math.max(...counts, 1);
+    const step = WIDTH / counts.length;
+    let path = `M0 ${HEIGHT}`;
+    counts.forEach((count, i) => {
+      const y = (HEIGHT - 4 - (HEIGHT - 8) * (count / most)).toFixed(1);
+      path += `L${(i * step).toFixed(1)} ${y}L${((i + 1) * step).toFixed(1)} ${y}`;
+    });
+    return drawing("path", { class: "rate", d: `${path}L${WIDTH} ${HEIGHT}Z` });
+  }
+
+  #band([start, end], index) {
+    const band = drawing("rect", {
+      class: "shot",
+      x: this.#x(start),
+      width: Math.max(this.#x(end) - this.#x(start), 3),
+      y: HEIGHT - 7,
+      height: 7,
+    });
+    const length = ((end - start) / 1000).toFixed(0);
+    band.append(drawing("title", {}, `Shot ${index + 1}: ${(start / 1000).toFixed(1)} ms, ${length} ms long. Click to work on it.`));
+    return band;
+  }
+
+  // A click on a shot chooses it, a click elsewhere moves the playhead, a drag chooses a part.
+  #dragging() {
+    let from = null;
+    this.svg.addEventListener("pointerdown", (event) => {
+      from = this.#time(event);
+      this.svg.setPointerCapture(event.pointerId);
+    });
+    this.svg.addEventListener("pointermove", (event) => {
+      if (from === null) return;
+      const [a, b] = [from, this.#time(event)].sort((p, q) => p - q);
+      this.drag.setAttribute("x", this.#x(a));
+      this.drag.setAttribute("width", this.#x(b) - this.#x(a));
+    });
+    this.svg.addEventListener("pointerup", (event) => {
+      if (from === null) return;
+      const [a, b] = [from, this.#time(event)].sort((p, q) => p - q);
+      from = null;
+      this.drag.setAttribute("width", 0);
+      const wide = this.#x(b) - this.#x(a) > 8;
+      const shot = this.shots.find(([start, end]) => start <= b && b < end);
+      if (wide) this.#tell("choose", [a, b]);
+      else if (shot && this.recording.is_long) this.#tell("shot", shot);
+      else this.#tell("seek", b);
+    });
+  }
+
+  #tell(name, detail) {
+    this.dispatchEvent(new CustomEvent(name, { detail }));
+  }
+}
