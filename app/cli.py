@@ -13,6 +13,7 @@ import click
 from pipeline.errors import SpinscopeError
 
 from .session import DEFAULT_SAMPLE, Choices, Session
+from .simulate import KINDS, SimulateParameters
 from .terminal import ProgressBar, announce_compilation, note, print_reports
 
 METHODS = ("triplet", "normal_flow", "all")
@@ -61,12 +62,36 @@ class FixedBall(click.ParamType):
 def _choices(command: Callable[..., None]) -> Callable[..., None]:
     """The options that analyze and view share; the command gets them as one `choices`."""
     options = (
-        click.option("--preset", metavar="NAME|FILE.toml", help="Settings to start from: default, paper, or a TOML file."),
-        click.option("--set", "assignments", multiple=True, metavar="STAGE.FIELD=VALUE", help="Change one setting; repeatable, like --set logo.pad_px=3."),
-        click.option("--window", type=int, nargs=2, metavar="START_US END_US", help="Use only the events of [START, END), file time in us."),
-        click.option("--fixed-ball", type=FixedBall(), help="The ball stays in place (ball spinner): its circle, or auto to find it."),
-        click.option("--sensor", type=SensorSize(), help="Size of the sensor in pixels, where the file does not say it."),
-    )  # fmt: skip
+        click.option(
+            "--preset",
+            metavar="NAME|FILE.toml",
+            help="Settings to start from: default, paper, or a TOML file.",
+        ),
+        click.option(
+            "--set",
+            "assignments",
+            multiple=True,
+            metavar="STAGE.FIELD=VALUE",
+            help="Change one setting; repeatable, like --set logo.pad_px=3.",
+        ),
+        click.option(
+            "--window",
+            type=int,
+            nargs=2,
+            metavar="START_US END_US",
+            help="Use only the events of [START, END), file time in us.",
+        ),
+        click.option(
+            "--fixed-ball",
+            type=FixedBall(),
+            help="The ball stays in place (ball spinner): its circle, or auto to find it.",
+        ),
+        click.option(
+            "--sensor",
+            type=SensorSize(),
+            help="Size of the sensor in pixels, where the file does not say it.",
+        ),
+    )
 
     def with_choices(
         preset: str | None,
@@ -87,6 +112,20 @@ def _choices(command: Callable[..., None]) -> Callable[..., None]:
     for option in reversed(options):
         decorated = option(decorated)
     return decorated
+
+
+def _tunables(command: Callable[..., None]) -> Callable[..., None]:
+    """One option for each parameter of a simulated scene, from its declaration."""
+    types: dict[str, Any] = {"number": float, "whole number": int}
+    for name, declared in reversed(SimulateParameters.tunables().items()):
+        flag = "--" + name.replace("_", "-")
+        help = f"{declared.help} [{declared.allowed}]"
+        if declared.kind == "switch":
+            command = click.option(flag, is_flag=True, help=declared.help)(command)
+        else:
+            kind = click.Choice(declared.choices) if declared.choices else types[declared.kind]
+            command = click.option(flag, type=kind, default=None, help=help)(command)
+    return command
 
 
 @click.group(
@@ -195,6 +234,74 @@ def convert(source: Path, target: Path, sensor: tuple[int, int] | None) -> None:
 
     with ProgressBar() as bar:
         converted(source, target, sensor=sensor, on_progress=lambda share: bar(share, "converting"))
+
+
+@cli.command()
+@click.argument("recording", type=RECORDING, default=DEFAULT_SAMPLE)
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    help="Port of the page; another free one is taken when it is busy.",
+)
+@click.option("--no-browser", is_flag=True, help="Only print the address.")
+@_choices
+def tune(recording: Path, port: int | None, no_browser: bool, choices: Choices) -> None:
+    """Open a page with sliders beside the viewer: turn a knob, see the same instant change."""
+    from .tuner import serve
+
+    serve(recording, choices, port, open_browser=not no_browser)
+
+
+@cli.command()
+@click.argument("kind", type=click.Choice(KINDS))
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    required=True,
+    metavar="FILE",
+    help="Recording to write: .h5 (with truth and scene), .raw (EVT3) or .npz.",
+)
+@click.option(
+    "--spin-rps",
+    type=float,
+    nargs=3,
+    metavar="X Y Z",
+    help="Exact spin in the camera frame, rps, instead of --spin and --magnitude-rps.",
+)
+@click.option(
+    "--logo",
+    default="andro",
+    show_default=True,
+    metavar="NAME|PNG",
+    help="Logo on the ball: a name, or a picture of your own.",
+)
+@click.option(
+    "--biases",
+    type=click.Path(path_type=Path),
+    metavar="FILE.bias",
+    help="Biases of the sensor; the paper's by default.",
+)
+@_tunables
+def simulate(
+    kind: str,
+    out: Path,
+    spin_rps: tuple[float, float, float] | None,
+    logo: str,
+    biases: Path | None,
+    **options: Any,
+) -> None:
+    """Simulate a ball spinner, a flight or a rally, with exact truth: same seed and options, same events."""
+    from .simulate import simulate_to_file
+
+    with ProgressBar() as bar:
+        written = simulate_to_file(
+            kind, out, spin_rps=spin_rps, logo=logo, biases_path=biases, on_progress=bar, **options
+        )
+    for warning in written.warnings:
+        note(f"warning: {warning}")
+    note(
+        f"wrote {written.path}: {written.events:,} events, {written.logo_events:,} of the logo, in {written.duration_us / 1000:.1f} ms"
+    )
 
 
 def _view(recording: Path, save: Path | None, native: bool, layout: str, choices: Choices) -> None:

@@ -11,10 +11,14 @@ from pipeline.recordings import RecordingInfo, open_recording, summary
 
 from .session import Progress
 
+SHOWN = 60  # characters of an attribute; a simulation's scene is a page long
+
 
 def information(path: Path, sensor_px: tuple[int, int] | None, on_progress: Progress) -> RecordingInfo:
     """One pass over the recording; raises RecordingError."""
-    recording = open_recording(path, sensor=sensor_px, on_progress=lambda share: on_progress(share, "reading"))
+    recording = open_recording(
+        path, sensor=sensor_px, on_progress=lambda share: on_progress(share, "reading")
+    )
     return summary(recording, on_progress=lambda share: on_progress(share, "reading"))
 
 
@@ -29,13 +33,15 @@ def print_information(info: RecordingInfo) -> None:
         "duration": f"{info.duration_us / 1e6:.6f} s",
         "ON share": "" if info.on_share is None else f"{100 * info.on_share:.1f} %",
         "event rate": "" if info.mean_rate_hz is None else f"{info.mean_rate_hz / 1e6:.3f} Mev/s on average",
-        "peak rate": "" if info.peak_rate_hz is None else f"{info.peak_rate_hz / 1e6:.3f} Mev/s in the fullest millisecond",
+        "peak rate": ""
+        if info.peak_rate_hz is None
+        else f"{info.peak_rate_hz / 1e6:.3f} Mev/s in the fullest millisecond",
         "hot pixels": f"{info.hot_pixels:,} with {100 * info.hot_share:.1f} % of the events",
         "triggers": f"{info.triggers:,}",
         "t_offset": "" if info.t_offset_us is None else f"{info.t_offset_us:,} us (not added)",
         "damage": damage or "none",
-        **{f"attribute {name}": str(value) for name, value in info.attributes.items()},
-    }  # fmt: skip
+        **{f"attribute {name}": _shortened(str(value)) for name, value in info.attributes.items()},
+    }
     table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
     for name, value in rows.items():
         if value:
@@ -45,3 +51,7 @@ def print_information(info: RecordingInfo) -> None:
     console.print(table)
     for warning in info.warnings:
         console.print(f"warning: {warning}", style="yellow", highlight=False, soft_wrap=True)
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= SHOWN else text[: SHOWN - 4] + " ..."

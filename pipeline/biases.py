@@ -1,8 +1,8 @@
 """The five biases of Prophesee's IMX636 (EVK4), what they mean in physical units, and `.bias` files.
 
-The biases are offsets from the factory setting (0). The maker publishes their direction and their range, not what
-they are in per cent, hertz or microseconds. `CURVES` is therefore a model: monotone, in one place, marked as not
-calibrated, to be replaced by one's own measurements (`physical(biases, curves=...)`).
+The biases are offsets from the factory setting (0). The maker publishes their direction and their range, not
+what they are in per cent, hertz or microseconds. `CURVES` is therefore a model: monotone, in one place,
+marked as not calibrated, to be replaced by one's own measurements (`physical(biases, curves=...)`).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .parameters import ParameterGroup, tunable
 
 @dataclass(frozen=True, kw_only=True)
 class BiasParameters(ParameterGroup):
-    """Bias offsets in `.bias` units; ranges are the maker's for the IMX636, defaults the paper's (supplement)."""
+    """Offsets in `.bias` units; ranges are the maker's for the IMX636, defaults the paper's (supplement)."""
 
     diff_on: int = tunable(40, -85, 140, 1, "", "contrast threshold of ON events; higher = fewer events")
     diff_off: int = tunable(40, -35, 190, 1, "", "contrast threshold of OFF events; higher = fewer events")
@@ -37,7 +37,8 @@ FACTORY = BiasParameters(diff_on=0, diff_off=0, fo=0, hpf=0, refr=0)
 class Curve:
     """A physical quantity against one bias: straight lines between points, in the logarithm of the quantity.
 
-    points : (bias value, quantity > 0), bias rising over the whole range, quantity monotone; one may be 0 at an end
+    points : (bias value, quantity > 0), bias rising over the whole range, quantity monotone; one may be 0 at
+        an end
     source : where the points come from
     calibrated : True when they were measured
     """
@@ -77,9 +78,9 @@ CURVES: Mapping[str, Curve] = MappingProxyType(
         "cutoff_hz": Curve(
             "fo",
             "Hz",
-            ((-35, 400.0), (-20, 1200.0), (0, 4000.0), (25, 6000.0), (55, 8000.0)),
-            _MODEL + "the supplement: only values below 0 change the event rate; at 55 a white pixel answers in some "
-            "20 us, at -35 late events of the edge lie all over the ball",
+            ((-35, 20.0), (-20, 40.0), (-10, 400.0), (0, 3000.0), (55, 8000.0)),
+            _MODEL + "the supplement: only values below 0 change the ball's event rate, there late events of the "
+            "edge lie inside the ball; the lowest setting is in use against lamps that flicker with 100 Hz",
         ),
         "highpass_hz": Curve(
             "hpf",
@@ -112,7 +113,10 @@ CURVES: Mapping[str, Curve] = MappingProxyType(
             _MODEL + "a lower cut-off lets less noise through; flat above 0 (supplement)",
         ),
         "noise_highpass_factor": Curve(
-            "hpf", "1", ((0, 1.0), (60, 0.4), (120, 0.1)), _MODEL + "a high-pass takes slow noise and leak away"
+            "hpf",
+            "1",
+            ((0, 1.0), (60, 0.4), (120, 0.1)),
+            _MODEL + "a high-pass takes slow noise and leak away",
         ),
         "noise_refractory_factor": Curve(
             "refr",
@@ -126,7 +130,10 @@ CURVES: Mapping[str, Curve] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class PixelPhysics:
-    """What the biases make of a pixel, in physical units; `noise_on` and `noise_off` are factors, 1 = paper's biases."""
+    """What the biases make of a pixel, in physical units.
+
+    noise_on, noise_off : factors on the noise rate, 1 at the paper's biases
+    """
 
     threshold_on: float
     threshold_off: float
@@ -156,8 +163,8 @@ def physical(biases: BiasParameters, curves: Mapping[str, Curve] = CURVES) -> Pi
 def read_biases(path: Path | str) -> BiasParameters:
     """Read a `.bias` file: one `value % bias_name` a line, empty lines allowed; a missing bias counts as 0.
 
-    Raises RecordingError when the file cannot be read or a line is of another form, ParameterError when a bias is
-    unknown or out of range.
+    Raises RecordingError when the file cannot be read or a line is of another form, ParameterError when a
+    bias is unknown or out of range.
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
@@ -171,8 +178,8 @@ def read_biases(path: Path | str) -> BiasParameters:
         try:
             value = int(left)
         except ValueError:
-            value = None  # type: ignore[assignment]
-        if not percent or value is None:
+            percent = ""
+        if not percent:
             raise RecordingError(f"line {number} is {line.strip()!r}, not `value % bias_name`: {path}")
         field = name.strip().removeprefix("bias_")
         if field not in values:

@@ -26,7 +26,7 @@ PAINT = np.array([32, 42, 80])
 WHITE = np.array([238, 236, 228])
 DISC = np.array([38, 43, 51])
 RPS_M = 0.0006  # an arrow's length: 50 rps reach 30 mm beyond the ball
-RING_RADII = 1.18  # of the ring that shows which way the ball turns
+RING_RADII, RING_POINTS = 1.18, 51  # of the ring that shows which way the ball turns
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,8 @@ class _Painted:
 
 def ball_chunks(run: Run) -> list[Chunk]:
     """Everything in space, and the logo held still."""
-    chunks = [_mesh(run), *_motion(run), *_arrows(run), _ring(run), *_path(run), *_axes(run), *_painting(run)]
-    style = rr.LineStrips3D.from_fields(colors=[at.RING_COLOUR], radii=[-1.5])
-    return [once(at.WORLD, rr.ViewCoordinates.RDF), once(at.SPIN_RING, style), *chunks]
+    chunks = [_mesh(run), *_motion(run), *_arrows(run), *_ring(run), *_path(run), *_axes(run), *_painting(run)]
+    return [once(at.WORLD, rr.ViewCoordinates.RDF), *chunks]
 
 
 def _mesh(run: Run) -> Chunk:
@@ -112,20 +111,20 @@ def _vector(estimate: SpinEstimate | None) -> Floats:
 
 
 def _arrows(run: Run) -> list[Chunk]:
-    """One arrow a method out of the ball's surface along its axis, the trusted one thick; the truth thin."""
+    """A thin arrow a method, out of the ball's surface along its axis, and the truth's; the shown one thick."""
     chunks: list[Chunk] = []
     for method in run.methods:
         vectors = [_vector(tick.spin.estimates[method]) for tick in run.ticks]
-        trusted = [tick.spin.best == method for tick in run.ticks]
-        chunks += _arrow(run, method, vectors, trusted, at.method_colour(method))
+        chunks += _arrow(run, f"{at.SPIN_ARROWS}/{method}", vectors, at.method_colour(method), 0.025)
     if run.truth is not None:
         t_us = np.array([tick.track.t_us for tick in run.ticks])
         spins = np.nan_to_num(run.true_values(t_us, run.truth.spin_rps)) * run.has_ball[:, None]
-        chunks += _arrow(run, "truth", list(spins), [False] * len(run.ticks), at.TRUTH_COLOUR)
-    return chunks
+        chunks += _arrow(run, f"{at.SPIN_ARROWS}/truth", list(spins), at.TRUTH_COLOUR, 0.02)
+    shown = [_vector(shown_estimate(tick)[0]) for tick in run.ticks]
+    return [*chunks, *_arrow(run, at.SPIN_SHOWN, shown, at.RING_COLOUR, 0.06)]
 
 
-def _arrow(run: Run, name: str, vectors: list[Floats], thick: list[bool], colour: at.Colour) -> list[Chunk]:
+def _arrow(run: Run, entity: str, vectors: list[Floats], colour: at.Colour, thickness: float) -> list[Chunk]:
     spins = np.array(vectors).reshape(-1, 3)
     magnitudes = np.linalg.norm(spins, axis=1)
     known = magnitudes > 0
@@ -133,40 +132,42 @@ def _arrow(run: Run, name: str, vectors: list[Floats], thick: list[bool], colour
     columns = rr.Arrows3D.columns(
         origins=axes * run.ball_radius_m,
         vectors=axes * (magnitudes[known, None] * RPS_M),
-        radii=run.ball_radius_m * np.where(np.array(thick)[known], 0.07, 0.025),
-        labels=[f"{name} {magnitude:.1f} rps" for magnitude in magnitudes[known]],
-        show_labels=np.array(thick)[known],
+        labels=[f"{magnitude:.1f} rps" for magnitude in magnitudes[known]],
     )
-    entity = f"{at.SPIN_ARROWS}/{name}"
-    return [
-        once(entity, rr.Arrows3D.from_fields(colors=[colour])),
-        columns_at(entity, run.times_us, columns, [0, *known.astype(int)]),
-    ]
+    style = rr.Arrows3D.from_fields(
+        colors=[colour], radii=[thickness * run.ball_radius_m], show_labels=entity == at.SPIN_SHOWN
+    )
+    return [once(entity, style), columns_at(entity, run.times_us, columns, [0, *known.astype(int)])]
 
 
-def _ring(run: Run) -> Chunk:
-    """Three quarters of a circle around the shown axis with a tip: which way the ball turns."""
+def _ring(run: Run) -> list[Chunk]:
+    """Most of a circle around the shown axis, ending in an arrow: which way the ball turns."""
     strips, lengths = [], [0]
     for tick in run.ticks:
         spin = _vector(shown_estimate(tick)[0]) if tick.track.has_ball else np.zeros(3)
         magnitude = float(np.linalg.norm(spin))
         lengths.append(int(magnitude > 0))
         if magnitude > 0:
-            strips.append(_turning_arrow(spin / magnitude) * run.ball_radius_m)
-    return columns_at(at.SPIN_RING, run.times_us, rr.LineStrips3D.columns(strips=strips), lengths)
+            strips.append(_around(spin / magnitude) * run.ball_radius_m)
+    tips = np.array(strips).reshape(-1, RING_POINTS, 3)[:, -3:]
+    arrows = rr.Arrows3D.columns(origins=tips[:, 0], vectors=tips[:, 2] - tips[:, 0])
+    radius = 0.025 * run.ball_radius_m
+    return [
+        once(at.SPIN_RING, rr.LineStrips3D.from_fields(colors=[at.RING_COLOUR], radii=[radius])),
+        columns_at(at.SPIN_RING, run.times_us, rr.LineStrips3D.columns(strips=strips), lengths),
+        once(at.RING_TIP, rr.Arrows3D.from_fields(colors=[at.RING_COLOUR], radii=[2.5 * radius])),
+        columns_at(at.RING_TIP, run.times_us, arrows, lengths),
+    ]
 
 
-def _turning_arrow(axis: Floats) -> Floats:
-    """(n, 3) a line around the axis by the right-hand rule, ending in a barbed tip; ball radii."""
-    side = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+def _around(axis: Floats) -> Floats:
+    """(RING_POINTS, 3) a line around the axis by the right-hand rule, beginning on the far side; ball radii."""
+    start = np.array([0.0, 0.0, 1.0]) if abs(axis[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    side = start - (start @ axis) * axis
     side /= np.linalg.norm(side)
-    other = np.cross(axis, side)
-    angle = np.radians(np.arange(0, 271, 6))
-    ring = RING_RADII * (np.cos(angle)[:, None] * side + np.sin(angle)[:, None] * other)
-    tip, back = ring[-1], np.radians(270 - 12)
-    behind = RING_RADII * (np.cos(back) * side + np.sin(back) * other)
-    barbs = [behind + 0.12 * axis, tip, behind - 0.12 * axis]
-    return np.vstack([ring, barbs])
+    angle = np.radians(np.linspace(20, 320, RING_POINTS))
+    ring: Floats = np.cos(angle)[:, None] * side + np.sin(angle)[:, None] * np.cross(axis, side)
+    return RING_RADII * ring
 
 
 def _path(run: Run) -> list[Chunk]:
@@ -272,15 +273,16 @@ def _densest(run: Run, shot: int) -> Floats:
 
 
 def _full(counts: Floats) -> float:
-    """The count that is shown in full colour: what a tenth of the marked places exceed."""
+    """The count that is shown in full colour: what a twentieth of the marked places exceed."""
     marked = counts[counts > 0]
-    return float(np.quantile(marked, 0.9)) if marked.size else 0.0
+    return float(np.quantile(marked, 0.95)) if marked.size else 0.0
 
 
 def _texture(painted: _Painted, sampler: Sampler) -> NDArray[np.uint8]:
     counts = sampler(density(painted.normals))
     strength = tone(counts, _full(counts))[..., None]
-    return (WHITE + strength * (PAINT - WHITE)).astype(np.uint8)
+    texture: NDArray[np.uint8] = (WHITE + strength * (PAINT - WHITE)).astype(np.uint8)
+    return texture
 
 
 @dataclass(frozen=True)

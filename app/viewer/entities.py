@@ -48,7 +48,9 @@ BALL = "/world/ball"
 BODY = "/world/ball/body"
 MESH = "/world/ball/body/mesh"
 SPIN_ARROWS = "/world/ball/spin"
+SPIN_SHOWN = "/world/ball/shown"
 SPIN_RING = "/world/ball/ring"
+RING_TIP = "/world/ball/ring/tip"
 
 # Words.
 SUMMARY = "/summary"

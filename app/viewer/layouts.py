@@ -15,6 +15,7 @@ from .summary import CARD_PX
 
 Floats = NDArray[np.float64]
 
+HEADROOM = 0.5  # of a plot's range, for its legend
 SLOW_MOTION = 0.01  # a flight of 100 ms plays for 10 s
 NAMES = {
     "all": "All stages",
@@ -58,21 +59,26 @@ def _all(run: Run) -> rrb.Container:
             _still(),
             column_shares=[4, 3, 3, 4],
         ),
-        rrb.Horizontal(_rate(legend=False), _magnitude(run, legend=False), _ball(run), _summary(), column_shares=[4, 4, 3, 5]),
+        rrb.Horizontal(
+            _rate(run, legend=False), _magnitude(run, legend=False), _ball(run), _summary(), column_shares=[4, 4, 3, 5]
+        ),
         row_shares=[4, 4, 5],
         name=NAMES["all"],
     )
 
 
 def _tracker(run: Run) -> rrb.Container:
+    colours = "Surface: Hough yellow, refined orange, Kalman green"
+    if run.truth is not None:
+        colours += ", truth violet"
     return rrb.Horizontal(
         rrb.Vertical(
-            _surface(run), rrb.Horizontal(_close_up(run), _events(run), column_shares=[2, 3]), row_shares=[3, 2]
+            _surface(run, colours),
+            rrb.Horizontal(_close_up(run), _events(run), column_shares=[2, 3]),
+            row_shares=[3, 2],
         ),
-        rrb.Vertical(
-            _status(), *(_state_plot(run, name) for name in at.QUANTITIES), row_shares=[1.2, 2, 2, 2, 2, 2]
-        ),
-        rrb.Vertical(*(_residual(run, name) for name in ("x", "y", "radius")), _event_count()),
+        rrb.Vertical(_status(), *(_state_plot(run, name) for name in at.QUANTITIES), row_shares=[1.2, 2, 2, 2, 2, 2]),
+        rrb.Vertical(*(_residual(run, name) for name in ("x", "y", "radius")), _event_count(run)),
         column_shares=[5, 4, 3],
         name=NAMES["tracker"],
     )
@@ -82,7 +88,7 @@ def _logo(run: Run) -> rrb.Container:
     return rrb.Horizontal(
         rrb.Vertical(_logo_events(run), _close_up(run)),
         rrb.Vertical(_flow(run), _still()),
-        rrb.Vertical(_rate(), _rhythm(), _magnitude(run)),
+        rrb.Vertical(_rate(run), _rhythm(run), _magnitude(run)),
         column_shares=[3, 4, 4],
         name=NAMES["logo"],
     )
@@ -103,7 +109,7 @@ def _spin(run: Run) -> rrb.Container:
 
 def _coach(run: Run) -> rrb.Container:
     return rrb.Horizontal(
-        _ball(run, "Ball and spin"),
+        _ball(run, "Ball and spin", [at.SPIN_SHOWN]),
         rrb.Vertical(_card(), _space(run, "Flight"), row_shares=[3, 2]),
         column_shares=[3, 2],
         name=NAMES["coach"],
@@ -134,8 +140,8 @@ def _events(run: Run) -> rrb.View:
     return _image_view(run, "Raw events: ON red, OFF blue", [at.FRAME, at.EVENTS])
 
 
-def _surface(run: Run) -> rrb.View:
-    return _image_view(run, "Surface: Hough yellow, Kalman green", [at.FRAME, at.SURFACE, *CIRCLES])
+def _surface(run: Run, name: str = "Surface: Hough yellow, Kalman green") -> rrb.View:
+    return _image_view(run, name, [at.FRAME, at.SURFACE, *CIRCLES])
 
 
 def _close_up(run: Run) -> rrb.View:
@@ -148,9 +154,13 @@ def _logo_events(run: Run) -> rrb.View:
 
 
 def _flow(run: Run) -> rrb.View:
-    view = _ball_view(run, "Flow: colour = direction", [at.FLOW, at.LOGO_OUTLINE, at.FLOW_WHEEL], 1.25)
+    view = _ball_view(
+        run, f"Flow: full colour = {run.fast_flow_px_s:,.0f} px/s", [at.FLOW, at.LOGO_OUTLINE, at.FLOW_WHEEL], 1.25
+    )
     radius = run.largest_radius_px
-    view.properties["VisualBounds2D"] = rrb.VisualBounds2D(x_range=[-1.2 * radius, 2.3 * radius], y_range=[-1.2 * radius, 1.2 * radius])
+    view.properties["VisualBounds2D"] = rrb.VisualBounds2D(
+        x_range=[-1.2 * radius, 2.3 * radius], y_range=[-1.2 * radius, 1.2 * radius]
+    )
     return view
 
 
@@ -160,8 +170,11 @@ def _still() -> rrb.View:
 
 
 def _plot(
-    origin: str, name: str, y_range: tuple[float, float] | None = None, legend: bool = True
+    origin: str, name: str, y_range: tuple[float, float] | None = None, legend: bool = False
 ) -> rrb.TimeSeriesView:
+    """A plot over the time in view; with a legend the range grows upwards to make room for it."""
+    if legend and y_range is not None:
+        y_range = (y_range[0], y_range[1] + HEADROOM * (y_range[1] - y_range[0]))
     return rrb.TimeSeriesView(
         origin=origin,
         name=name,
@@ -172,12 +185,10 @@ def _plot(
 
 
 def _status() -> rrb.View:
-    return rrb.StateTimelineView(
-        origin=at.STATUS, name="Tracker", time_view=rrb.TimeAxis(link="LinkToGlobal")
-    )
+    return rrb.StateTimelineView(origin=at.STATUS, name="Tracker", time_view=rrb.TimeAxis(link="LinkToGlobal"))
 
 
-def _state_plot(run: Run, name: str, legend: bool = True) -> rrb.View:
+def _state_plot(run: Run, name: str) -> rrb.View:
     column = at.QUANTITIES.index(name)
     titles = {"x": "x", "y": "y", "vx": "Velocity x", "vy": "Velocity y", "radius": "Radius"}
     deviation = np.sqrt(run.variances[:, column])
@@ -186,11 +197,11 @@ def _state_plot(run: Run, name: str, legend: bool = True) -> rrb.View:
         for kind in ("hough", "measured"):
             circles = [getattr(tick.track, kind) for tick in run.ticks if tick.track.has_ball]
             values.append(np.array([getattr(c, f"{name}_px") for c in circles if c is not None]))
-    return _plot(f"{at.PLOT}/{name}", f"{titles[name]} [{at.UNITS[column]}]", _range(np.concatenate(values)), legend)
+    return _plot(f"{at.PLOT}/{name}", f"{titles[name]} [{at.UNITS[column]}]", _range(np.concatenate(values)))
 
 
 def _state_tabs(run: Run) -> rrb.Container:
-    return rrb.Tabs(*(_state_plot(run, name, legend=False) for name in at.QUANTITIES), active_tab=0)
+    return rrb.Tabs(*(_state_plot(run, name) for name in at.QUANTITIES), active_tab=0)
 
 
 def _residual(run: Run, name: str) -> rrb.View:
@@ -202,34 +213,40 @@ def _residual(run: Run, name: str) -> rrb.View:
     )
 
 
-def _event_count() -> rrb.View:
-    return _plot(at.EVENT_COUNT, "Event rate, whole sensor [Mev/s]")
+def _event_count(run: Run) -> rrb.View:
+    rates = [len(t.packet.events) / (t.packet.end_us - t.packet.start_us) for t in run.ticks]
+    return _plot(at.EVENT_COUNT, "Event rate [Mev/s]", _range(np.array([0.0, *rates])), legend=True)
 
 
-def _rate(legend: bool = True) -> rrb.View:
-    return _plot(at.RATE, "Logo's event rate [kev/s]", legend=legend)
+def _rate(run: Run, legend: bool = True) -> rrb.View:
+    rates = [0.0, *(tick.rate.rate_hz.max(initial=0.0) / 1e3 for tick in run.ticks)]
+    return _plot(at.RATE, "Logo's event rate [kev/s]", _range(np.array(rates)), legend)
 
 
-def _rhythm() -> rrb.View:
-    return _plot(at.RHYTHM, "Rhythm of the rate [kev/s] and its falling zero crossings")
+def _rhythm(run: Run) -> rrb.View:
+    rates = [tick.rate.smooth_hz / 1e3 for tick in run.ticks]
+    name = "Rhythm of the rate [kev/s] and its falling zero crossings"
+    return _plot(at.RHYTHM, name, _range(np.concatenate(rates)), legend=True)
 
 
 def _magnitude(run: Run, legend: bool = True) -> rrb.View:
     values = [e.magnitude_rps for tick in run.ticks for e in tick.spin.estimates.values()]
     values += [tick.rate.spin_rps for tick in run.ticks]
     known = np.array([value for value in values if value is not None])
-    top = 1.3 * float(np.quantile(known, 0.95)) if known.size else 100.0
+    top = 1.2 * float(np.quantile(known, 0.95)) if known.size else 100.0
     if run.truth is not None:
-        top = max(top, 1.3 * float(np.linalg.norm(run.truth.spin_rps, axis=1).max()))
+        top = max(top, 1.2 * float(np.linalg.norm(run.truth.spin_rps, axis=1).max()))
     return _plot(at.SPIN_MAGNITUDE, "Spin [rps], ± 1σ", (0.0, top), legend)
 
 
 def _parts(run: Run) -> rrb.View:
-    return _plot(at.SPIN_PARTS, "Trusted spin vector, camera frame [rps]")
+    trusted = [t.spin.estimates[t.spin.best].vector_rps for t in run.ticks if t.spin.best is not None]
+    y_range = _range(np.concatenate([np.zeros(1), *(vector for vector in trusted if vector is not None)]))
+    return _plot(at.SPIN_PARTS, "Trusted spin vector, camera frame [rps]", y_range, legend=True)
 
 
 def _axis_error() -> rrb.View:
-    return _plot(at.AXIS_ERROR, "Angle between axis and truth [°]", (0.0, 45.0))
+    return _plot(at.AXIS_ERROR, "Angle between axis and truth [°]", (0.0, 40.0), legend=True)
 
 
 def _summary() -> rrb.View:
@@ -251,12 +268,13 @@ def _range(values: Floats) -> tuple[float, float] | None:
     return low - spare, high + spare
 
 
-def _ball(run: Run, name: str = "Ball: logo painted on, spin arrows") -> rrb.View:
-    """The ball from close by, from above the line of sight; moving along with it."""
+def _ball(run: Run, name: str = "Ball, logo painted on", arrows: list[str] | None = None) -> rrb.View:
+    """The ball from close by, from above the line of sight; moving along with it. Without `arrows`: all of them."""
+    shown = arrows or [at.SPIN_SHOWN, f"{at.SPIN_ARROWS}/**"]
     eye = _tilted(np.zeros(3), 5.5 * run.ball_radius_m, run)
     return rrb.Spatial3DView(
         origin=at.BALL,
-        contents=[f"{at.BALL}/**", at.PATH],
+        contents=[at.BALL, at.MESH, f"{at.SPIN_RING}/**", *shown, at.PATH],
         name=name,
         background=at.BACKGROUND,
         line_grid=False,
@@ -273,13 +291,13 @@ def _space(run: Run, name: str = "Flight path, grid 0.1 m") -> rrb.View:
     below = min(float(low @ up), float(high @ up)) - 2 * run.ball_radius_m
     return rrb.Spatial3DView(
         origin=at.WORLD,
-        contents=[f"{at.WORLD}/**"],
+        contents=[f"{at.WORLD}/**", f"- {at.SPIN_ARROWS}/**"],
         name=name,
         background=at.BACKGROUND,
         line_grid=rrb.LineGrid3D(
             visible=True, spacing=0.1, plane=rr.components.Plane3D(tuple(up), below), stroke_width=1.0
         ),
-        eye_controls=_tilted(middle, 1.5 * size, run),
+        eye_controls=_tilted(middle, 1.3 * size, run),
         overrides={at.PATH: _so_far()},
     )
 

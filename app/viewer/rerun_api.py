@@ -10,18 +10,16 @@ import sys
 import uuid
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pyarrow as pa
 import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
-from rerun.chunk import Chunk
+from rerun.chunk import Chunk as Chunk  # for the stages
 
 from .entities import APPLICATION, TIMELINE, Colour
-
-__all__ = ["Chunk", "band", "columns_at", "file_with", "line", "points", "once", "states", "time_column"]
 
 
 class _NoPandas:
@@ -38,11 +36,11 @@ def _leave_pandas_out() -> None:
 
     It looks for pandas once, at its first array, and remembers what it found.
     """
-    sys.meta_path.insert(0, _NoPandas)  # type: ignore[arg-type]  # has what is called of a finder
+    sys.meta_path.insert(0, _NoPandas)
     try:
         pa.array(np.zeros(1))
     finally:
-        sys.meta_path.remove(_NoPandas)  # type: ignore[arg-type]
+        sys.meta_path.remove(_NoPandas)
 
 
 _leave_pandas_out()
@@ -99,7 +97,7 @@ def points(
     values: NDArray[np.float64],
     name: str,
     colour: Colour,
-    marker: str = "circle",
+    marker: Literal["circle", "down"] = "circle",
     size: float = 3.0,
 ) -> list[Chunk]:
     """Dots in a plot; NaN leaves one out."""
@@ -117,9 +115,7 @@ def band(
     colour: Colour,
 ) -> list[Chunk]:
     """A line in a plot with a translucent band of +-1 sigma; NaN makes a gap."""
-    style = rr.Measurements.from_fields(
-        names=name, units=unit, colors=[colour], widths=1.5, aggregation_policy="Off"
-    )
+    style = rr.Measurements.from_fields(names=name, units=unit, colors=[colour], widths=1.5, aggregation_policy="Off")
     columns = rr.Measurements.columns(values=values, variances=variances)
     return [columns_at(entity, t_us, columns), once(entity, style)]
 
@@ -147,6 +143,21 @@ def file_with(chunks: Iterable[Chunk], blueprint: rrb.Blueprint, path: Path, nam
         rr.send_chunks(list(chunks), recording=recording)
     finally:
         recording.disconnect()
+
+
+def place_playhead(host: str, port: int, t_us: int) -> bool:
+    """Put the playhead of a running viewer there, paused; False while it has not read the recording yet."""
+    from rerun.experimental import ViewerClient
+
+    try:
+        viewer = ViewerClient.connect(f"rerun+http://{host}:{port}/proxy")
+        state = viewer.get_state()
+        if not state.recordings or state.loading:
+            return False
+        viewer.set_time(TIMELINE, duration=np.timedelta64(t_us * 1000, "ns"), play_state="paused")
+    except (RuntimeError, OSError, ValueError):
+        return False
+    return True
 
 
 def playhead_request(t_us: int) -> bytes:
@@ -178,7 +189,7 @@ def _varint(value: int) -> bytes:
 
 def program() -> str:
     """Path of Rerun's own program, which comes with its package."""
-    import rerun_cli
+    import rerun_cli  # type: ignore[import-untyped]
 
     name = "rerun.exe" if sys.platform == "win32" else "rerun"
     return str(Path(rerun_cli.__file__).with_name(name))

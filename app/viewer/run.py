@@ -43,9 +43,7 @@ class Run:
     warnings: Sequence[str]
 
     @classmethod
-    def of(
-        cls, session: Session, ticks: Sequence[Tick], shots: Sequence[Shot], no_shot_reason: str | None
-    ) -> Run:
+    def of(cls, session: Session, ticks: Sequence[Tick], shots: Sequence[Shot], no_shot_reason: str | None) -> Run:
         """The run of a session."""
         return cls(
             name=session.recording.path.name,
@@ -109,6 +107,13 @@ class Run:
     def largest_radius_px(self) -> float:
         """Radius of the largest ball seen, 20 px when none was."""
         return float(np.nanmax(self.means[:, 4])) if self.has_ball.any() else 20.0
+
+    @cached_property
+    def fast_flow_px_s(self) -> float:
+        """A speed that one in fifty of the flow's events exceed: full colour in its picture."""
+        flows = [np.hypot(tick.flow.vx_px_s, tick.flow.vy_px_s) for tick in self.ticks]
+        speeds = np.concatenate([np.empty(0), *flows])
+        return float(np.quantile(speeds, 0.98)) if speeds.size else 1.0
 
     def centre_m(self, mean: Floats) -> Floats:
         """(n, 3) centres of the ball, camera frame, from Kalman states (n, 5) or (5,)."""

@@ -110,5 +110,5 @@ def disc_directions(middle: Floats) -> tuple[Floats, NDArray[np.bool_]]:
 
 
 def tone(counts: Floats, full: float) -> Floats:
-    """Counts as 0..1, `full` and more as 1; the square root lifts thin strokes."""
-    return np.sqrt(np.clip(counts / full, 0, 1)) if full > 0 else np.zeros_like(counts)
+    """Counts as 0..1: nothing below a tenth of `full`, which is noise, and all of the colour from `full` on."""
+    return np.clip((counts / full - 0.1) / 0.9, 0, 1) if full > 0 else np.zeros_like(counts)

@@ -30,7 +30,7 @@ SLOWEST_M_S = 0.2
 
 def summary_chunks(run: Run) -> list[Chunk]:
     """The summary and the card at the start and at the end of every tick."""
-    texts, cards = [_opening(run)], [_card(("–", "–", "no ball yet"), ("spin", "speed", run.no_shot_reason or ""))]
+    texts, cards = [_opening(run)], [_card(("–", "–", "No ball yet"), ("spin", "speed", run.no_shot_reason or ""))]
     finals = {shot.end_us: shot for shot in run.shots}
     result: list[str] = []
     card = cards[0]
@@ -101,7 +101,8 @@ def _headline(run: Run, tick: Tick, velocity: Vector | None, said: str) -> list[
         kind = kind_of_spin(estimate.vector_rps, velocity, run.camera.up)
         doubt = "" if trusted else " (no method is trusted)"
         lines += [f"## {estimate.magnitude_rps:.1f} rps · {kind.name}{doubt}", ""]
-        lines += [f"{kind.sentence}. **{rpm(estimate.magnitude_rps or 0):.0f} rpm**, {speed_words(velocity)}; {said}.", ""]  # fmt: skip
+        turns = f"**{rpm(estimate.magnitude_rps or 0):.0f} rpm**"
+        lines += [f"{kind.sentence}. {turns}, {speed_words(velocity)}; {said}.", ""]
     else:
         reasons = {e.reason for e in tick.spin.estimates.values() if e.reason}
         lines += ["## Spin not known", "", f"{speed_words(velocity)}; {said}. {'; '.join(sorted(reasons))}", ""]
@@ -150,16 +151,16 @@ def _tick_card(run: Run, tick: Tick, velocity: Vector | None) -> bytes:
     """Spin, speed and kind, each in big letters with its small print."""
     estimate, trusted = shown_estimate(tick)
     speed = None if velocity is None else float(np.linalg.norm(velocity))
-    speed_big = "in place" if run.fixed else "–" if speed is None else f"{km_h(speed):.0f} km/h"
+    speed_big = "In place" if run.fixed else "–" if speed is None else f"{km_h(speed):.0f} km/h"
     speed_small = "" if speed is None else f"{speed:.1f} m/s"
     if estimate is None or estimate.vector_rps is None or not trusted:
-        return _card(("–", speed_big, "spin not known"), ("", speed_small, "yet, or too little to trust"))
+        return _card(("–", speed_big, "Spin not known"), ("", speed_small, "yet, or too little to trust"))
     kind = kind_of_spin(estimate.vector_rps, velocity, run.camera.up)
     magnitude, std = estimate.magnitude_rps or 0.0, estimate.magnitude_std_rps
     margin = "" if std is None else f" ± {rpm(std):.0f}"
     rest = kind.sentence.removeprefix(kind.name).strip(" ,")
     return _card(
-        (f"{magnitude:.0f} rps", speed_big, kind.name),
+        (f"{magnitude:.0f} rps", speed_big, kind.name.capitalize()),
         (f"{rpm(magnitude):.0f}{margin} rpm", speed_small, rest),
     )
 
@@ -172,15 +173,21 @@ def _card(big: tuple[str, str, str], small: tuple[str, str, str]) -> bytes:
     for block, (first, second) in enumerate(zip(big, small, strict=True)):
         left, top = 36, 30 + block * CARD_PX // 3
         size = _fitting(draw, first, BIG_PX)
-        draw.text((left, top), first, TEXT, font=ImageFont.load_default(size))
-        font = ImageFont.load_default(_fitting(draw, second, SMALL_PX))
+        draw.text((left, top), first, TEXT, font=_font(size))
+        font = _font(_fitting(draw, second, SMALL_PX))
         draw.text((left + 4, top + 1.2 * size), second, FAINT, font=font)
     file = io.BytesIO()
     picture.save(file, "PNG")
     return file.getvalue()
 
 
+@lru_cache
+def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    """Pillow's own font: the same letters on every machine."""
+    return ImageFont.load_default(size)
+
+
 def _fitting(draw: ImageDraw.ImageDraw, text: str, size: int) -> int:
     """The size in which the text fits on the card, this one at most."""
-    width = draw.textlength(text, font=ImageFont.load_default(size))
+    width = draw.textlength(text, font=_font(size))
     return min(size, int(size * (CARD_PX - 60) / max(width, 1)))

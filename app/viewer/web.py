@@ -23,6 +23,7 @@ from pathlib import Path
 
 from pipeline.errors import SpinscopeError
 
+from ..terminal import note
 from .recorded import write_rrd
 from .rerun_api import playhead_request, program, quiet_environment
 from .run import Run
@@ -31,9 +32,7 @@ HOST = "127.0.0.1"
 PREFERRED_PORT = 9090
 PAGE = Path(__file__).parent / "page"
 START_S = 20.0  # patience with Rerun's program: 0.2 s warm, several seconds from a cold disk
-POLICY = (
-    "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; img-src 'self' data: blob:; worker-src 'self' blob:"
-)
+POLICY = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; img-src 'self' data: blob:; worker-src 'self' blob:"
 TYPES = {
     ".html": "text/html; charset=utf-8",
     ".css": "text/css",
@@ -46,12 +45,18 @@ def show_web(run: Run, layout: str) -> None:
     """Serve the run until Ctrl-C, open a browser if there is one, and say in one line where it is."""
     with served(run, layout) as (server, address):
         opened = _open_browser(address)
-        hint = "" if opened else "; no browser opened here, `--save FILE.rrd` writes a file to open elsewhere"
-        print(f"the viewer is at {address}{hint}; Ctrl-C stops it", file=sys.stderr, flush=True)
+        port = server.server_address[1]
+        hint = (
+            ""
+            if opened
+            else f" (no browser here: `ssh -L {port}:{HOST}:{port} THIS_MACHINE` brings it to yours, "
+            "`--save FILE.rrd` writes a file instead)"
+        )
+        note(f"the viewer is at {address}{hint}; Ctrl-C stops it")
         try:
             server.serve_forever(poll_interval=0.2)
         except KeyboardInterrupt:
-            print("", file=sys.stderr)
+            note("")
 
 
 @contextmanager
@@ -112,7 +117,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
 
 def _rerun_files() -> dict[str, bytes]:
     """The web viewer's script and program, out of Rerun's own, which serves them for a moment."""
-    web_port, other_port = _free_ports(2)
+    web_port, other_port = free_ports(2)
     command = [program(), "--serve-web", "--bind", HOST, "--port", str(other_port), "--web-viewer-port", str(web_port)]
     process = subprocess.Popen(
         command,
@@ -145,7 +150,7 @@ def _fetched(url: str, process: subprocess.Popen[bytes]) -> bytes:
     )
 
 
-def _free_ports(count: int) -> list[int]:
+def free_ports(count: int) -> list[int]:
     """Ports that nobody listens on at the moment."""
     sockets = [socket.create_server((HOST, 0)) for _ in range(count)]
     ports = [one.getsockname()[1] for one in sockets]

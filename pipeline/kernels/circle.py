@@ -62,7 +62,7 @@ def peak(votes: Votes, radius0_px: int) -> tuple[float, int, int, int]:
 def bright_pixels(
     image: NDArray[np.uint8], least: int, most_pixels: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Columns and rows (m,) int64 of the pixels of at least this value, thinned evenly to about most_pixels."""
+    """Columns and rows (m,) int64 of the pixels of at least this value, thinned evenly to most_pixels."""
     count = 0
     for y in range(image.shape[0]):
         for x in range(image.shape[1]):
@@ -90,8 +90,9 @@ def active_cells(
     least: int,
     cell_px: int,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Cells of cell_px x cell_px pixels in which one of these pixels is at least `least` in values (h, w) uint8.
+    """Cells of cell_px x cell_px pixels in which one of these pixels is at least `least` in `values`.
 
+    values : (height, width) uint8, a surface
     Returns columns and rows (m,) int64 of the cells, rising by row, then column. Cells without an active
     neighbour among their eight are left out: what remains of the noise is isolated.
     """
@@ -125,7 +126,7 @@ def active_cells(
 
 @njit(cache=True, nogil=True)
 def refined(votes: Votes, a: int, b: int, k: int) -> tuple[float, float, float]:
-    """(a, b, k) of a peak to sub-pixel: the votes' centre of mass in the 3 x 3 x 3 around it, clipped to the votes."""
+    """(a, b, k) of a peak to sub-pixel: the centre of mass of the squared votes in the 3 x 3 x 3 around it."""
     height, width, radii = votes.shape
     total, sum_a, sum_b, sum_k = 0.0, 0.0, 0.0, 0.0
     for j in range(max(0, b - 1), min(height, b + 2)):

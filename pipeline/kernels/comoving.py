@@ -119,13 +119,13 @@ def comoving_constraints(
     reach_us: float,
     width: float,
     sharpest: float,
-) -> tuple[NDArray[np.int64], Floats, Floats, Floats, NDArray[np.int64], int]:
+) -> tuple[NDArray[np.int64], Floats, Floats, Floats, NDArray[np.int64]]:
     """Constraints rows . spin = speeds from every stride-th event whose neighbours make a line.
 
     normals (n, 3), reach and width are on the unit sphere (rad); reach_us is how far apart in time events of one line
     may be. Returned: rows (m,) of the events, constraint rows (m, 3), speeds (m,) in rad/s along the line's normal,
-    their variances (m,) in (rad/s)^2, on how many events (m,) each stands, and how many events had neighbours enough.
-    Lines less sharp than `sharpest` are left out. First come the events of one polarity, then those of the other.
+    their variances (m,) in (rad/s)^2, and on how many events (m,) each stands. Lines less sharp than `sharpest` are
+    left out. First come the events of one polarity, then those of the other.
     """
     n = t_us.size
     common_us = t_us[n // 2] if n else 0
@@ -133,7 +133,7 @@ def comoving_constraints(
     events, lines = np.empty(n, np.int64), np.empty((n, 3))
     speeds, variances, sizes = np.empty(n), np.empty(n), np.empty(n, np.int64)
     near, frame = np.empty((3, NEIGHBOURS)), np.empty((3, 3))
-    count, tried = 0, 0
+    count = 0
     for polarity in range(2):
         members = np.flatnonzero(on == (polarity == 1))
         own, own_us = turned[members], t_us[members]
@@ -149,7 +149,6 @@ def comoving_constraints(
             size = _gather(near, own, own_us, k, frame, reach, reach_us)
             if size < FEWEST:
                 continue
-            tried += 1
             nu, nv, drift, variance, sharpness = drifting_line(near[0, :size], near[1, :size], near[2, :size], width)
             if sharpness > sharpest:
                 continue
@@ -167,13 +166,11 @@ def comoving_constraints(
     for i in range(count):
         for axis in range(3):
             speeds[i] += rows[i, axis] * spin_rad_s[axis]
-    return events, rows, speeds[:count].copy(), variances[:count].copy(), sizes[:count].copy(), tried
+    return events, rows, speeds[:count].copy(), variances[:count].copy(), sizes[:count].copy()
 
 
 @numba.njit(cache=True, nogil=True)
-def position_response(
-    normals: Floats, sights: Floats, rows: Floats, spin_rad_s: Floats, radius_px: float
-) -> Floats:
+def position_response(normals: Floats, sights: Floats, rows: Floats, spin_rad_s: Floats, radius_px: float) -> Floats:
     """(n, 3) by how much speeds - rows . spin changes (rad/s) per px of error in the ball's x, y and radius.
 
     rows (n, 3) are e x n as from comoving_constraints, normals (n, 3) the e, sights (n, 3) unit vectors to the

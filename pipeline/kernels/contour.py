@@ -1,9 +1,9 @@
 """The outline of a moving ball in the events: a circle that moves at constant velocity, fitted to sub-pixel.
 
-A `ring` is (5,) float64 [x_px, y_px, vx_px_s, vy_px_s, radius_px] at a reference time. `oval` (2,) float64 is the
-outline's known departure from a circle: at the angle phi (image frame) it lies radius * (1 + oval[0] cos 2phi +
-oval[1] sin 2phi) from the centre; a sphere seen off the optical axis is such an ellipse. Event times are tau_s,
-seconds after the reference time (mostly negative).
+A `ring` is (5,) float64 [x_px, y_px, vx_px_s, vy_px_s, radius_px] at a reference time. `oval` (2,) float64 is
+the outline's known departure from a circle: at the angle phi (image frame) it lies
+radius * (1 + oval[0] cos 2phi + oval[1] sin 2phi) from the centre; a sphere seen off the optical axis is such an
+ellipse. Event times are tau_s, seconds after the reference time (mostly negative).
 """
 
 from __future__ import annotations
@@ -75,12 +75,13 @@ def fit_ring(
 ) -> tuple[Floats, Floats, float, float]:
     """Robust fit of a moving circle to events: Gauss-Newton steps with Tukey's biweight.
 
-    start : (5,) ring to begin with; prior_std : (5,) 1 sigma by which the answer may leave it (large = freely,
-        0 = not at all: zeros for the velocity give the fit of a circle at rest)
-    gate_px : Tukey's cut-off in the first round; it then shrinks to 4.7 robust sigma, by a third a round at least
-        (so that the sharp outline wins over a band of late events inside it), down to floor_px
-    Returns the ring, its covariance (5, 5) from the scatter of the residuals alone, that scatter (1 sigma, px)
-    and the sum of the weights (about the number of events used).
+    start : (5,) ring to begin with
+    prior_std : (5,) 1 sigma by which the answer may leave it (large = freely, 0 = not at all: zeros for the
+        velocity give the fit of a circle at rest)
+    gate_px : Tukey's cut-off in the first round; it then shrinks to 4.7 robust sigma, by a third a round at
+        least (so that the sharp outline wins over a band of late events inside it), down to floor_px
+    Returns the ring, its covariance (5, 5) from the scatter of the residuals alone, that scatter (1 sigma,
+    px) and the sum of the weights (about the number of events used).
     """
     ring = start.copy()
     information = np.zeros((5, 5))
@@ -125,10 +126,11 @@ def fit_ring(
         if gate <= floor_px and np.max(np.abs(step)) < 1e-3:
             break
         gate = max(min(4.7 * scatter, 0.67 * gate), floor_px)
-    covariance = np.linalg.inv(information) * (scatter * scatter)
+    inverse = np.linalg.inv(information)
+    covariance = np.empty((5, 5))
     for j in range(5):
         for k in range(5):
-            covariance[j, k] *= scale[j] * scale[k]
+            covariance[j, k] = inverse[j, k] * scatter * scatter * scale[j] * scale[k]
     return ring, covariance, scatter, weight_sum
 
 
@@ -145,10 +147,12 @@ def vote_velocity(
 ) -> None:
     """Hough vote for the velocity of a ring (5,) float64 around the one it has; adds into votes.
 
-    votes : (2 m + 1, 2 m + 1) float64; votes[m + j, m + i] is for the ring's velocity plus (i, j) * step_px_s,
-        within the disc of radius m. An event counts by its nearness to the outline moved to its time, plus where
-        the outline moves outwards and its polarity is ON or inwards and OFF, minus for the opposite: |votes| is
-        the support of a ball brighter (or, where negative, darker) than its background that moves so.
+    votes : (2 m + 1, 2 m + 1) float64; votes[m + j, m + i] is for the ring's velocity plus
+        (i, j) * step_px_s, within the disc of radius m
+
+    An event counts by its nearness to the outline moved to its time, plus where the outline moves outwards and
+    its polarity is ON or inwards and OFF, minus for the opposite: |votes| is the support of a ball brighter (or,
+    where negative, darker) than its background that moves so.
     """
     m = votes.shape[0] // 2
     inner = max(ring[4] - gate_px, 0.0) ** 2
@@ -189,11 +193,11 @@ def support(
     """How well events support a moving outline: (8,) float64
 
     [events on the outline, share of ON among those ahead of the centre, the same behind it,
-     share of the visible outline ahead that has events, the same behind it,
-     share of the whole outline that is visible, events just outside (one to four tolerances beyond), events inside].
+     share of the visible outline ahead that has events, the same behind it, share of the whole outline that is
+     visible, events just outside (one to four tolerances beyond), events inside].
     On the outline = within tolerance_px of it, and behind the centre up to early_px inside.
-    The outline is cut into `bins` sectors; sectors that the motion passes at a grazing angle (|cos| < 0.25) yield
-    few events and do not count. Shares of nothing are 0.
+    The outline is cut into `bins` sectors; sectors that the motion passes at a grazing angle (|cos| < 0.25)
+    yield few events and do not count. Shares of nothing are 0.
     """
     counts = np.zeros(bins, np.int64)
     ahead_on, ahead, behind_on, behind, outside, inside = 0, 0, 0, 0, 0, 0

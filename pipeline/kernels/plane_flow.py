@@ -112,7 +112,7 @@ def plane_flow(
     scales_us: Floats,
     speed_max_px_s: float,
 ) -> tuple[NDArray[np.int64], Floats, Floats]:
-    """Rows (m,) of every stride-th event of first..last-1 that has normal flow, its unit directions (m, 2) and speeds (m,) px/s.
+    """Normal flow of every stride-th event of first..last-1: rows (m,) that have it, unit directions (m, 2), px/s (m,).
 
     The neighbours come from all events. A plane needs FEWEST points spread by SPREAD_PX; its residuals may not
     exceed a third of the last scale (twice that and a second edge is in the fit), and its speed lies in

@@ -96,9 +96,7 @@ def surface_velocity(points_m: Floats, normals: Floats, vx_px_s: Floats, vy_px_s
 
 
 @numba.njit(cache=True, nogil=True)
-def spin_rows(
-    points_m: Floats, normals: Floats, directions: Floats, focal_px: float, ball_radius_m: float
-) -> Floats:
+def spin_rows(points_m: Floats, normals: Floats, directions: Floats, focal_px: float, ball_radius_m: float) -> Floats:
     """Rows (n, 3) a with a . spin = image velocity along `directions` (n, 2), in px/s for a spin in rad/s.
 
     d . J (spin x R e) = spin . (R e x J^T d).

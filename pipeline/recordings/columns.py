@@ -58,9 +58,7 @@ class ColumnTypes:
             unit = "seconds (they have fractions)" if self._seconds else "microseconds (they are whole)"
             self.warning = f"times are floating-point numbers without a unit: taken as {unit}"
 
-    def columns(
-        self, first_row: int, t: NDArray[Any], x: NDArray[Any], y: NDArray[Any], p: NDArray[Any]
-    ) -> Columns:
+    def columns(self, first_row: int, t: NDArray[Any], x: NDArray[Any], y: NDArray[Any], p: NDArray[Any]) -> Columns:
         """One block; raises RecordingError naming the first event that cannot be one."""
         if not (t.size == x.size == y.size == p.size):
             raise RecordingError(
@@ -76,7 +74,8 @@ class ColumnTypes:
 
     def _times(self, t: NDArray[Any], first_row: int) -> NDArray[np.int64]:
         if t.dtype.kind == "f":
-            t = t.astype(np.float64) * (1e6 if self._seconds else 1.0)
+            with np.errstate(over="ignore"):  # refused below
+                t = t.astype(np.float64) * (1e6 if self._seconds else 1.0)
             self._refuse(~(np.abs(t) < LAST_US), "t", t, first_row, "is no time")  # NaN too
             return np.rint(t).astype(np.int64)
         if t.dtype.itemsize == 8 and t.size and (int(t.min()) <= -LAST_US or int(t.max()) >= LAST_US):
@@ -107,9 +106,7 @@ class ColumnTypes:
     def _refuse(self, wrong: NDArray[np.bool_], name: str, column: NDArray[Any], row: int, why: str) -> None:
         if wrong.any():
             at = int(np.argmax(wrong))
-            raise RecordingError(
-                f"{name} = {column[at]} at event {row + at} {why}: repair the column: {self.path}"
-            )
+            raise RecordingError(f"{name} = {column[at]} at event {row + at} {why}: repair the column: {self.path}")
 
 
 def refuse_types(path: Path, types: dict[str, np.dtype[Any]]) -> None:

@@ -34,9 +34,7 @@ def convert(
     write = _WRITERS.get(suffix)
     if write is None:
         known = ", ".join(_WRITERS)
-        raise RecordingError(
-            f"suffix {suffix!r} is no format that can be written: use one of {known}: {target}"
-        )
+        raise RecordingError(f"suffix {suffix!r} is no format that can be written: use one of {known}: {target}")
     recording = open_recording(source, sensor=sensor)
     if target.exists() and os.path.samefile(source, target):
         raise RecordingError(f"a recording cannot be converted onto itself: give another name: {target}")

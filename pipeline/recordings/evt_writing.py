@@ -106,9 +106,7 @@ def encode_evt2(
             now_us = edges.t_us[edge]
             at = _raise_high(out, at, now_us >> evt2.LOW_BITS, evt2.HIGH_MASK, EVT2_STEP, head)
             low = (now_us & evt2.LOW_MASK) << 22
-            out.words[at] = (
-                (evt2.TRIGGER << 28) | low | ((int(edges.id[edge]) & 0x1F) << 8) | int(edges.value[edge])
-            )
+            out.words[at] = (evt2.TRIGGER << 28) | low | ((int(edges.id[edge]) & 0x1F) << 8) | int(edges.value[edge])
             at += 1
             edge += 1
         if i == t_us.size:

@@ -15,7 +15,7 @@ from ..results import Truth
 from .columns import ColumnTypes, named_columns, refuse_bomb, refuse_types
 from .hdf5_heap import refuse_endless_heap
 from .sensor import Sensor, geometry_or_none, stated_or_none
-from .source import MAX_DISORDER_US, Columns, Pass, Progress, Triggers, translated
+from .source import MAX_DISORDER_US, Columns, Pass, Triggers, translated
 
 ECF_FILTER = 0x8ECF  # Prophesee's event compression, in no plugin package; decoded in `ecf.py`
 SNIFFED_ROWS = 4096  # times looked at, first and last, to tell seconds from microseconds
@@ -54,6 +54,7 @@ class Hdf5Source:
             if TRIGGERS in file:
                 reading.triggers.append(_triggers(file[TRIGGERS]))
             first = 0 if reading.start_us is None else self._row_before(table, reading.start_us)
+            reading.first_row = first
             for row in range(first, table.rows, reading.max_events):
                 upto = min(row + reading.max_events, table.rows)
                 block = self._types.columns(row, *table.rows_of(row, upto))
@@ -62,14 +63,6 @@ class Hdf5Source:
                 # No event that follows one 10 ms behind the end can lie before it (see TimeOrder).
                 if reading.end_us is not None and int(block.t_us[-1]) >= reading.end_us + MAX_DISORDER_US:
                     return
-
-    def extent_px(self, on_progress: Progress | None) -> tuple[int, int]:
-        """One more than the largest x and y of all events."""
-        width = height = 0
-        reading = Pass(on_progress=on_progress)
-        for block in self.columns(reading):
-            width, height = max(width, int(block.x.max()) + 1), max(height, int(block.y.max()) + 1)
-        return width, height
 
     def truth(self) -> Truth | None:
         """The group /truth, None without it."""
@@ -131,15 +124,11 @@ class Table:
     def __init__(self, file: h5py.File, layout: Layout, path: Path) -> None:
         self._path, self._layout = path, layout
         place = file[layout.place]
-        self._sets = (
-            {layout.place: place} if layout.compound else {c: place[n] for c, n in layout.names.items()}
-        )
+        self._sets = {layout.place: place} if layout.compound else {c: place[n] for c, n in layout.names.items()}
         shapes = {name: data.shape for name, data in self._sets.items()}
         if len(set(shapes.values())) > 1 or any(len(shape) != 1 for shape in shapes.values()):
             listed = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
-            raise RecordingError(
-                f"event columns differ in length ({listed}): export the recording again: {path}"
-            )
+            raise RecordingError(f"event columns differ in length ({listed}): export the recording again: {path}")
         self.rows = int(next(iter(shapes.values()))[0])
         if layout.compound:
             refuse_types(path, {c: place.dtype[n] for c, n in layout.names.items()})
@@ -216,12 +205,7 @@ def _attributes(file: h5py.File) -> dict[str, str | float]:
             value = value.decode("utf-8", "replace")
         if isinstance(value, np.generic):
             value = value.item()
-        if (
-            isinstance(value, np.ndarray)
-            and value.ndim == 1
-            and value.size <= 16
-            and value.dtype.kind in "iuf"
-        ):
+        if isinstance(value, np.ndarray) and value.ndim == 1 and value.size <= 16 and value.dtype.kind in "iuf":
             value = ",".join(str(item) for item in value.tolist())
         if isinstance(value, (str, float, int)):
             found[name] = value
@@ -259,9 +243,7 @@ def _t_offset_us(file: h5py.File) -> int | None:
 
 def _triggers(data: h5py.Dataset) -> Triggers:
     records = data[:]
-    return Triggers(
-        records["t"].astype(np.int64), (records["p"] == 1).astype(np.uint8), records["id"].astype(np.uint8)
-    )
+    return Triggers(records["t"].astype(np.int64), (records["p"] == 1).astype(np.uint8), records["id"].astype(np.uint8))
 
 
 def _truth(group: h5py.Group, events: int, path: Path) -> Truth:
@@ -269,9 +251,7 @@ def _truth(group: h5py.Group, events: int, path: Path) -> Truth:
     vectors = {name: group[name][:] for name in ("position_m", "velocity_m_s", "spin_rps")}
     label = group["label"][:]
     rows = columns["t_us"].size
-    if any(c.shape != (rows,) for c in columns.values()) or any(
-        v.shape != (rows, 3) for v in vectors.values()
-    ):
+    if any(c.shape != (rows,) for c in columns.values()) or any(v.shape != (rows, 3) for v in vectors.values()):
         raise RecordingError(f"/truth has columns of different lengths: simulate the recording again: {path}")
     if label.shape != (events,):
         raise RecordingError(

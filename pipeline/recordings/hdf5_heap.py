@@ -1,8 +1,8 @@
 """A check that HDF5 leaves out: texts in a damaged heap can send the library round for ever.
 
-Texts of attributes lie in "global heap collections" (HDF5 file format, III.E): a head of 16 bytes, then objects
-that each start with 16 bytes, index 0 being the free space. The library steps from object to object by their
-sizes; a free space of size 0 does not end.
+Texts of attributes lie in "global heap collections" (HDF5 file format, III.E): a head of 16 bytes, then
+objects that each start with 16 bytes, index 0 being the free space. The library steps from object to object
+by their sizes; a free space of size 0 does not end.
 """
 
 from __future__ import annotations

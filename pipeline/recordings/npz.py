@@ -16,7 +16,7 @@ from ..errors import RecordingError
 from ..results import Truth
 from .columns import ColumnTypes, named_columns, refuse_bomb, refuse_types
 from .sensor import Sensor, stated_or_none
-from .source import MAX_DISORDER_US, Columns, Pass, Progress, translated
+from .source import MAX_DISORDER_US, Columns, Pass, translated
 
 SNIFFED_ROWS = 1 << 16  # times looked at to tell seconds from microseconds
 
@@ -69,13 +69,6 @@ class NpzSource:
                 reading.report(upto, rows)
                 if reading.end_us is not None and int(block.t_us[-1]) >= reading.end_us + MAX_DISORDER_US:
                     return
-
-    def extent_px(self, on_progress: Progress | None) -> tuple[int, int]:
-        """One more than the largest x and y of all events."""
-        width = height = 0
-        for block in self.columns(Pass(on_progress=on_progress)):
-            width, height = max(width, int(block.x.max()) + 1), max(height, int(block.y.max()) + 1)
-        return width, height
 
     def truth(self) -> Truth | None:
         """NPZ files hold none."""

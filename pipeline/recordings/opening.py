@@ -9,7 +9,7 @@ from .recording import Recording
 from .sensor import stated_sensor
 from .source import Progress, Source
 
-READABLE = "HDF5 (.h5, .hdf5), Prophesee RAW (.raw) and NPZ (.npz)"
+READABLE = "HDF5 (.h5, .hdf5), Prophesee RAW (.raw) and DAT (.dat), NPZ (.npz)"
 HEAD_BYTES = 16
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 OTHER_FORMATS = {
@@ -59,9 +59,7 @@ def _head(path: Path) -> bytes:
         raise RecordingError(f"recording may not be read: ask for the right to read it: {path}") from error
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or str(error)
-        raise RecordingError(
-            f"recording cannot be opened ({why}): check the name and the disk: {path!s}"
-        ) from error
+        raise RecordingError(f"recording cannot be opened ({why}): check the name and the disk: {path!s}") from error
     if not head:
         raise RecordingError(f"recording is empty (0 bytes): record or copy it again: {path}")
     return head
@@ -77,6 +75,10 @@ def _source(path: Path, head: bytes) -> Source:
         from .npz import NpzSource
 
         return NpzSource(path)
+    if head.startswith(b"% Data file"):
+        from .dat import DatSource
+
+        return DatSource(path)
     if head.startswith(b"% "):
         from .raw import RawSource
 
@@ -85,9 +87,7 @@ def _source(path: Path, head: bytes) -> Source:
         if head.startswith(magic):
             raise RecordingError(f"{name} file is not read here: convert it to one of {READABLE}: {path}")
     suffix = path.suffix.lower()
-    expected = {".h5": "HDF5", ".hdf5": "HDF5", ".npz": "NPZ", ".raw": "Prophesee RAW with its header"}.get(
-        suffix
-    )
+    expected = {".h5": "HDF5", ".hdf5": "HDF5", ".npz": "NPZ", ".raw": "Prophesee RAW with its header"}.get(suffix)
     if expected is not None:
         raise RecordingError(
             f"file named {suffix} is no {expected} file (it starts with {head[:8].hex(' ')}): "

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import RecordingError
-from .source import MAX_DISORDER_US, Columns, Damage
+from .source import MAX_DISORDER_US, Columns, Pass
 
 
 class TimeOrder:
@@ -18,10 +18,12 @@ class TimeOrder:
     (RecordingError) where order is law, and dropped and counted otherwise: what was handed on stays as it is.
     """
 
-    def __init__(self, path: Path, damage: Damage, order_is_law: bool) -> None:
-        self._path, self._damage, self._law = path, damage, order_is_law
-        self._row = 0  # of the next event in the file
-        self._held: Columns | None = None  # in order
+    def __init__(self, path: Path, reading: Pass, order_is_law: bool) -> None:
+        self._path, self._reading, self._law = path, reading, order_is_law
+        self._events = 0  # pushed so far
+        self._held: list[Columns] = []
+        self._held_in_order = True
+        self._first_us = 2**63 - 1  # of those held
         self._latest_us = -(2**63)  # of all events so far
         self._before_us = -(2**63)  # of the event just before, in file order
 
@@ -34,21 +36,29 @@ class TimeOrder:
         in_order = not backward and int(t_us[0]) >= self._latest_us
         if not in_order:
             new = self._without_late(new)
-        self._damage.backward_steps += backward
+        self._reading.damage.backward_steps += backward
         self._before_us = int(t_us[-1])
         self._latest_us = int(t_us[-1]) if in_order else max(self._latest_us, int(t_us.max()))
-        self._row += t_us.size
-        known = new if self._held is None else self._held.then(new)
-        if not in_order:
-            known = known[np.argsort(known.t_us, kind="stable")]
+        self._events += t_us.size
+        if len(new):
+            self._held.append(new)
+            self._held_in_order &= in_order
+            self._first_us = min(self._first_us, int(new.t_us.min()))
+        if self._first_us > self._latest_us - MAX_DISORDER_US:
+            return None
+        known = self._sorted()
         sure = int(np.searchsorted(known.t_us, self._latest_us - MAX_DISORDER_US, side="right"))
-        self._held = known[sure:]
+        self._held, self._held_in_order = [known[sure:]], True
+        self._first_us = int(known.t_us[sure]) if sure < len(known) else 2**63 - 1
         return known[:sure]
 
     def finish(self) -> Columns | None:
         """What was held back."""
-        held, self._held = self._held, None
-        return held
+        return self._sorted() if self._held else None
+
+    def _sorted(self) -> Columns:
+        known = Columns.joined(self._held)
+        return known if self._held_in_order else known[np.argsort(known.t_us, kind="stable")]
 
     def _without_late(self, new: Columns) -> Columns:
         latest_us = np.maximum(np.maximum.accumulate(new.t_us), self._latest_us)
@@ -58,9 +68,9 @@ class TimeOrder:
         if self._law:
             at = int(np.argmax(late))
             raise RecordingError(
-                f"time goes backwards at event {self._row + at}: {latest_us[at]} us, then {new.t_us[at]} us "
-                f"(up to {MAX_DISORDER_US} us is put in order): sort the recording by time or split it "
-                f"there: {self._path}"
+                f"time goes backwards at event {self._reading.first_row + self._events + at}: {latest_us[at]} us, "
+                f"then {new.t_us[at]} us (up to {MAX_DISORDER_US} us is put in order): sort the recording by time "
+                f"or split it there: {self._path}"
             )
-        self._damage.late_events += int(np.count_nonzero(late))
+        self._reading.damage.late_events += int(np.count_nonzero(late))
         return new[~late]

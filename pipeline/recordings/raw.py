@@ -14,7 +14,7 @@ from .evt2 import decode_evt2
 from .evt3 import decode_evt3
 from .evt_time import BAD_WORDS, EVENTS, OUTSIDE, TIME_JUMPS, TRIGGERS, UNTIMED, Decoded, fresh_state
 from .sensor import SENSOR_OF_SYSTEM_ID, Sensor, geometry_or_none, stated_or_none
-from .source import Columns, Pass, Progress, Triggers, translated
+from .source import Columns, Pass, Triggers, translated
 
 READ_BYTES = 4 << 20
 HEADER_BYTES = 64 << 10  # longer headers are none
@@ -56,13 +56,6 @@ class RawSource:
                 reading.report(file.tell(), size)
             yield from decoder.feed(b"", final=True)
 
-    def extent_px(self, on_progress: Progress | None) -> tuple[int, int]:
-        """One more than the largest x and y of all events."""
-        width = height = 0
-        for block in self.columns(Pass(on_progress=on_progress)):
-            width, height = max(width, int(block.x.max()) + 1), max(height, int(block.y.max()) + 1)
-        return width, height
-
     def truth(self) -> Truth | None:
         """RAW files hold none."""
         return None
@@ -72,9 +65,7 @@ class RawSource:
         if endianness in ("legacy", "little"):
             return endianness == "legacy"
         if endianness:
-            raise RecordingError(
-                f"EVT2.1 with endianness {endianness} is not read: little and legacy are: {self.path}"
-            )
+            raise RecordingError(f"EVT2.1 with endianness {endianness} is not read: little and legacy are: {self.path}")
         halves = np.frombuffer(data[: len(data) // 8 * 8], "<u4").reshape(-1, 2)
         steady = []
         for head in (halves[:, 0], halves[:, 1]):
@@ -83,9 +74,7 @@ class RawSource:
             steady.append(int(np.count_nonzero((steps > 0) & (steps <= STEADY_STEPS))))
         legacy = steady[0] >= steady[1]
         order = "legacy" if legacy else "little"
-        self.warnings.append(
-            f"the EVT2.1 header states no endianness: taken as {order}, in which time is steady"
-        )
+        self.warnings.append(f"the EVT2.1 header states no endianness: taken as {order}, in which time is steady")
         return legacy
 
 

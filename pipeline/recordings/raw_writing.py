@@ -27,9 +27,7 @@ OWN_KEYS = ("format", "evt", "geometry", "width", "height", "end")
 class RawWriter:
     """A RAW file that grows batch by batch; see `write_raw` in `writing.py`."""
 
-    def __init__(
-        self, file: IO[bytes], checked: CheckedEvents, format: str, triggers: Triggers, path: Path
-    ) -> None:
+    def __init__(self, file: IO[bytes], checked: CheckedEvents, format: str, triggers: Triggers, path: Path) -> None:
         self._file, self._checked, self._format, self._path = file, checked, format, path
         self._state = np.full(3, -1, np.int64)
         self._edges, self._edge = triggers, 0
@@ -47,9 +45,7 @@ class RawWriter:
     ) -> Iterator[RawWriter]:
         """A writer; the file is complete and in place when the context ends without an error."""
         if format not in VERSION:
-            raise RecordingError(
-                f"RAW format {format!r} cannot be written, {' and '.join(VERSION)} can: {path}"
-            )
+            raise RecordingError(f"RAW format {format!r} cannot be written, {' and '.join(VERSION)} can: {path}")
         if width_px > MAX_COORDINATE + 1 or height_px > MAX_COORDINATE + 1:
             raise RecordingError(
                 f"{format} holds pixels up to {MAX_COORDINATE}, the sensor has {width_px} x {height_px}: "
@@ -58,7 +54,10 @@ class RawWriter:
         checked = CheckedEvents(path, width_px, height_px)
         with complete_file(path) as part, open(part, "xb") as file:
             file.write(header(width_px, height_px, format, attributes))
-            writer = cls(file, checked, format, triggers or Triggers.joined([]), Path(path))
+            edges = triggers or Triggers.joined([])
+            order = np.argsort(edges.t_us, kind="stable")
+            edges = Triggers(edges.t_us[order], edges.value[order], edges.id[order])
+            writer = cls(file, checked, format, edges, Path(path))
             yield writer
             writer.finish()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
@@ -18,6 +19,15 @@ from .source import CHUNK_EVENTS, Columns, Damage, Pass, Progress, Source, Trigg
 
 HASH_ALL_BYTES = 64 << 20
 HASH_BLOCK_BYTES = 1 << 20
+EVENT_BYTES = 13  # 8 + 2 + 2 + 1
+
+
+def _memory_bytes() -> int:
+    """Memory of the machine; 8 GB where the system does not say."""
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return 8 << 30
 
 
 class Recording:
@@ -28,14 +38,12 @@ class Recording:
     sensor_from : who says so: "file", "command line", "system_ID 49" or "guess"
     attributes : root attributes or header lines of the file; `camera.focal_length_mm` and the like among them
     t_offset_us : DSEC's offset of the file's time; reported, never added
-    events : number of events when the file says so before it is read, None for RAW
+    events : number of events in the file when it says so before it is read, None for RAW
 
     The file is opened anew for every pass and closed after it: nothing has to be closed.
     """
 
-    def __init__(
-        self, source: Source, asked: Sensor | None = None, on_progress: Progress | None = None
-    ) -> None:
+    def __init__(self, source: Source, asked: Sensor | None = None, on_progress: Progress | None = None) -> None:
         self._source = source
         self._asked = asked
         self._sensor_warnings: list[str] = []
@@ -68,7 +76,10 @@ class Recording:
 
     @cached_property
     def truth(self) -> Truth | None:
-        """The simulator's truth, None where the file has none; raises RecordingError when it is damaged."""
+        """The simulator's truth, None where the file has none; raises RecordingError when it is damaged.
+
+        Its labels go with the events as they are in the file: with those of `read` if `damage` is all zero.
+        """
         return self._source.truth()
 
     @property
@@ -92,9 +103,7 @@ class Recording:
         for _ in self.chunks(on_progress=on_progress):
             pass
 
-    def chunks(
-        self, max_events: int = CHUNK_EVENTS, on_progress: Progress | None = None
-    ) -> Iterator[EventBatch]:
+    def chunks(self, max_events: int = CHUNK_EVENTS, on_progress: Progress | None = None) -> Iterator[EventBatch]:
         """All events in order of time, 1 to max_events at once, in constant memory.
 
         Raises RecordingError on the way for what cannot be repaired; see `Damage` for what can.
@@ -104,14 +113,20 @@ class Recording:
     def read(
         self, start_us: int | None = None, end_us: int | None = None, on_progress: Progress | None = None
     ) -> EventBatch:
-        """All events of [start_us, end_us) in memory at once (13 bytes each)."""
+        """All events of [start_us, end_us) in memory at once; RecordingError when they do not fit there."""
         reading = Pass(CHUNK_EVENTS, start_us, end_us, on_progress)
-        try:
-            return EventBatch.concatenate(self._batches(reading))
-        except MemoryError as error:
-            raise RecordingError(
-                f"the events do not fit in memory: read a part (--window START_US END_US): {self.path}"
-            ) from error
+        most_events = _memory_bytes() // (3 * EVENT_BYTES)  # twice to join them, and room for the work on them
+        parts: list[EventBatch] = []
+        events = 0
+        for batch in self._batches(reading):
+            parts.append(batch)
+            events += len(batch)
+            if events > most_events:
+                raise RecordingError(
+                    f"more than {most_events / 1e6:.0f} million events do not fit in memory: read a part "
+                    f"(--window START_US END_US): {self.path}"
+                )
+        return EventBatch.concatenate(parts)
 
     def identity(self) -> str:
         """Hash of the file's bytes (BLAKE2b, 32 hexadecimal digits).
@@ -131,9 +146,7 @@ class Recording:
                     file.seek(place)
                     digest.update(file.read(HASH_BLOCK_BYTES))
         except OSError as error:
-            raise RecordingError(
-                f"recording can no longer be read ({error.strerror}): {self.path}"
-            ) from error
+            raise RecordingError(f"recording can no longer be read ({error.strerror}): {self.path}") from error
         return digest.hexdigest()
 
     def _scanned(self) -> Pass:
@@ -147,7 +160,7 @@ class Recording:
             return self._asked
         if self._source.stated is not None:
             return self._source.stated
-        extent = self._source.extent_px(on_progress)
+        extent = self._extent_px(on_progress)
         sensor = guessed_sensor(*extent)
         self._sensor_warnings.append(
             f"the file does not state its sensor: taken as {sensor.width_px} x {sensor.height_px}, the "
@@ -156,15 +169,21 @@ class Recording:
         )
         return sensor
 
+    def _extent_px(self, on_progress: Progress | None) -> tuple[int, int]:
+        """One more than the largest x and y of all events, (0, 0) without events; a pass over the file."""
+        columns_px = rows_px = 0
+        for block in self._source.columns(Pass(on_progress=on_progress)):
+            columns_px = max(columns_px, int(block.x.max()) + 1)
+            rows_px = max(rows_px, int(block.y.max()) + 1)
+        return columns_px, rows_px
+
     def _batches(self, reading: Pass) -> Iterator[EventBatch]:
-        order = TimeOrder(self.path, reading.damage, self._source.order_is_law)
+        order = TimeOrder(self.path, reading, self._source.order_is_law)
         whole = reading.start_us is None and reading.end_us is None
         start_us = -(2**63) if reading.start_us is None else reading.start_us
         end_us = 2**63 - 1 if reading.end_us is None else reading.end_us
         for columns in self._ordered(reading, order):
-            batch = (
-                self._on_sensor(columns, reading).between(start_us, end_us) if columns else EventBatch.empty()
-            )
+            batch = self._on_sensor(columns, reading).between(start_us, end_us) if columns else EventBatch.empty()
             for first in range(0, len(batch), reading.max_events):
                 yield batch[first : first + reading.max_events]
             if columns and int(columns.t_us[-1]) >= end_us:
@@ -198,7 +217,7 @@ class Recording:
         )
 
     def _refuse_small_sensor(self) -> None:
-        extent = self._source.extent_px(None)
+        extent = self._extent_px(None)
         size = smallest_known(*extent) or extent
         raise RecordingError(
             f"--sensor {self.width_px}x{self.height_px} is too small, the events reach over {extent[0]} x "

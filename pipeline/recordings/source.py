@@ -113,13 +113,16 @@ class Columns:
     def __getitem__(self, rows: slice | NDArray[Any]) -> Columns:
         return Columns(self.t_us[rows], self.x[rows], self.y[rows], self.on[rows])
 
-    def then(self, other: Columns) -> Columns:
-        """These events, then the other ones."""
-        return Columns(
-            np.concatenate([self.t_us, other.t_us]),
-            np.concatenate([self.x, other.x]),
-            np.concatenate([self.y, other.y]),
-            np.concatenate([self.on, other.on]),
+    @classmethod
+    def joined(cls, parts: list[Columns]) -> Columns:
+        """One after the other; at least one."""
+        if len(parts) == 1:
+            return parts[0]
+        return cls(
+            np.concatenate([p.t_us for p in parts]),
+            np.concatenate([p.x for p in parts]),
+            np.concatenate([p.y for p in parts]),
+            np.concatenate([p.on for p in parts]),
         )
 
 
@@ -128,12 +131,14 @@ class Pass:
     """One pass over a file: what it is asked for, and what it counted so far.
 
     start_us, end_us : a reader may leave out events that lie surely outside [start_us, end_us)
+    first_row : number of the first event that the reader gave; set by the reader
     """
 
     max_events: int = CHUNK_EVENTS
     start_us: int | None = None
     end_us: int | None = None
     on_progress: Progress | None = None
+    first_row: int = 0
     damage: Damage = field(default_factory=Damage)
     triggers: list[Triggers] = field(default_factory=list)
 
@@ -147,7 +152,7 @@ class Source(Protocol):
     """A reader of one format.
 
     order_is_law : whether events far behind others make the file unreadable (columns) or are dropped (RAW)
-    events : number of events when the file tells without a pass
+    events : number of events in the file when it tells without a pass
     """
 
     path: Path
@@ -162,9 +167,6 @@ class Source(Protocol):
     def columns(self, reading: Pass) -> Iterator[Columns]:
         """The events in file order in parts that are never empty; counts damage and triggers on the way."""
 
-    def extent_px(self, on_progress: Progress | None) -> tuple[int, int]:
-        """One more than the largest x and y of all events, (0, 0) without events."""
-
     def truth(self) -> Truth | None:
         """The simulator's truth, if the file has it."""
 
@@ -176,6 +178,4 @@ def translated(path: Path, kind: str) -> Iterator[None]:
         yield
     except FILE_ERRORS as error:
         why = " ".join(str(error).split())[:200] or type(error).__name__
-        raise RecordingError(
-            f"{kind} file is damaged or was cut ({why}): copy or export it again: {path}"
-        ) from error
+        raise RecordingError(f"{kind} file is damaged or was cut ({why}): copy or export it again: {path}") from error

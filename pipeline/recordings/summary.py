@@ -14,12 +14,12 @@ from .recording import Recording
 from .source import Progress
 
 PEAK_BIN_US = 1000  # the peak rate is that of the fullest millisecond
-# A hot pixel has 10 events or more, and over 10 times as many as the third busiest of its 8 neighbours: a
+# A hot pixel has 10 events or more, and over 10 times as many as the second busiest of its 8 neighbours: a
 # line in the scene that keeps firing has two busy neighbours along it. Against the truth of ten simulated
-# recordings: 85 to 100 % of the pixels found are hot, and they hold 90 % or more of the hot pixels' events.
+# recordings: all pixels found are hot, and they hold 90 % or more of the hot pixels' events.
 HOT_EVENTS = 10
 HOT_RATIO = 10
-HOT_NEIGHBOUR = 3
+HOT_NEIGHBOUR = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,9 +125,7 @@ class _Tally:
         """Number of hot pixels, and of their events."""
         rows, columns = np.nonzero(self._counts >= HOT_EVENTS)
         padded = np.pad(self._counts, 1)
-        around = np.stack(
-            [padded[rows + dy, columns + dx] for dy in range(3) for dx in range(3) if (dy, dx) != (1, 1)]
-        )
+        around = np.stack([padded[rows + dy, columns + dx] for dy in range(3) for dx in range(3) if (dy, dx) != (1, 1)])
         neighbour = np.sort(around, axis=0)[-HOT_NEIGHBOUR]
         events = self._counts[rows, columns]
         hot = events > HOT_RATIO * neighbour

@@ -63,9 +63,7 @@ def write_recording(
         writer.finish(attributes or {}, truth, triggers, t_offset_us)
 
 
-def write_npz(
-    path: str | Path, events: Batches, *, width_px: int | None = None, height_px: int | None = None
-) -> None:
+def write_npz(path: str | Path, events: Batches, *, width_px: int | None = None, height_px: int | None = None) -> None:
     """Write NPZ with columns t (int64, us), x, y (uint16), p (uint8), and scalars `width`, `height` if given.
 
     The file appears under its name only when complete. Raises RecordingError when it cannot be written.
@@ -97,7 +95,7 @@ def write_raw(
     attributes: Mapping[str, str | float] | None = None,
     triggers: Triggers | None = None,
 ) -> None:
-    """Write Prophesee RAW (format EVT3 or EVT2); triggers, in order of time, go between the events.
+    """Write Prophesee RAW (format EVT3 or EVT2), with triggers among the events.
 
     The file appears under its name only when complete. Raises RecordingError when it cannot be written, for
     pixels above 2047 and for times before 0 or beyond 2^40 us (EVT3: 12 days) or 2^52 us (EVT2: 142 years).
@@ -177,9 +175,7 @@ class Hdf5Writer:
             )
         for name in Truth.__slots__:
             values = getattr(truth, name)
-            self._file.create_dataset(
-                f"truth/{name}", data=values, compression="gzip" if values.size else None
-            )
+            self._file.create_dataset(f"truth/{name}", data=values, compression="gzip" if values.size else None)
 
 
 class FileThatHoldsErrors(FileIO):
@@ -221,9 +217,7 @@ class CheckedEvents:
     def __init__(self, path: str | Path, width_px: int, height_px: int) -> None:
         self._path, self._width_px, self._height_px = path, width_px, height_px
         if not (0 < width_px <= MAX_SIZE_PX and 0 < height_px <= MAX_SIZE_PX):
-            raise RecordingError(
-                f"sensor of {width_px} x {height_px} px: 1 to {MAX_SIZE_PX} are allowed: {path}"
-            )
+            raise RecordingError(f"sensor of {width_px} x {height_px} px: 1 to {MAX_SIZE_PX} are allowed: {path}")
         self.events = 0
         self._last_us = -(2**63)
 
@@ -255,9 +249,7 @@ def complete_file(path: str | Path) -> Iterator[Path]:
         os.replace(part, target)
     except WRITE_ERRORS as error:
         why = getattr(error, "strerror", None) or " ".join(str(error).split())[:200]
-        raise RecordingError(
-            f"recording cannot be written ({why}): check free space and rights: {path}"
-        ) from error
+        raise RecordingError(f"recording cannot be written ({why}): check free space and rights: {path}") from error
     finally:
         part.unlink(missing_ok=True)
 

@@ -30,7 +30,7 @@ def intensity_map(scene: Scene, camera: Camera) -> NDArray[np.float64]:
 
 
 def _table(scene: Scene, camera: Camera) -> NDArray[np.float64]:
-    """Albedo of the table below the camera, its length along the image's rows; lines are drawn with soft edges."""
+    """Albedo of the table below the camera, its length along the image's columns; soft-edged lines."""
     background = scene.background
     column, row = np.meshgrid(np.arange(camera.width_px), np.arange(camera.height_px))
     rays = camera.rays(column.ravel(), row.ravel())
@@ -52,8 +52,12 @@ def _table(scene: Scene, camera: Camera) -> NDArray[np.float64]:
     table = within(a, TABLE_WIDTH_M / 2) * within(b, TABLE_LENGTH_M / 2)
     field = within(a, TABLE_WIDTH_M / 2 - SIDE_LINE_M) * within(b, TABLE_LENGTH_M / 2 - SIDE_LINE_M)
     # A line thinner than a pixel covers it in part.
-    centre = np.clip((CENTRE_LINE_M + pixel_m) / 2 / pixel_m - np.abs(a) / pixel_m, 0.0, min(CENTRE_LINE_M / pixel_m, 1.0))
+    centre = np.clip(
+        (CENTRE_LINE_M + pixel_m) / 2 / pixel_m - np.abs(a) / pixel_m, 0.0, min(CENTRE_LINE_M / pixel_m, 1.0)
+    )
     line = table * np.maximum(1 - field, centre)
-    return background.floor_albedo + table * (background.albedo - background.floor_albedo) + line * (
-        background.line_albedo - background.albedo
+    return (
+        background.floor_albedo
+        + table * (background.albedo - background.floor_albedo)
+        + line * (background.line_albedo - background.albedo)
     )

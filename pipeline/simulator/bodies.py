@@ -1,4 +1,4 @@
-"""Balls and arms as the kernels want them: when they are seen, how fast they move in the image, their poses."""
+"""Balls and arms as the kernels want them: when they are seen, how fast they move, their poses."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera import Camera
-from . import kernels
+from . import kernels_light as columns
 from .logos import RADIUS_MM, texture
 from .motion import Path, arm_ends, path
 from .scene import Arm, Ball, Scene
@@ -27,7 +27,7 @@ LOOK_S = 1e-3  # a ball of 30 m/s moves 30 mm in this time, less than its width
 
 @dataclass(frozen=True, eq=False)
 class PackedBody:
-    """One body at n times; see `kernels.Bodies`."""
+    """One body at n times; see `kernels_light.Bodies`."""
 
     pose: Floats
     box: NDArray[np.int32]
@@ -89,26 +89,31 @@ class BallBody:
         return self.paths[-1]
 
     def packed(self, camera: Camera, lens: Lens, time_s: Floats, every: int, slower: int) -> PackedBody:
-        """The ball at these times, looked at in every so many of them; slower: see `kernels`."""
+        """The ball at these times, looked at in every so many of them; slower: see `kernels_light`."""
         there = self._path_at(float(time_s[time_s.size // 2])).at(time_s)
-        pose = np.empty((time_s.size, kernels.POSE_COLUMNS))
-        pose[:, kernels.CENTRE : kernels.CENTRE + 3] = there.position_m
-        pose[:, kernels.TURN : kernels.TURN + 9] = np.swapaxes(there.rotation, 1, 2).reshape(-1, 9)
+        pose = np.empty((time_s.size, columns.POSE_COLUMNS))
+        pose[:, columns.CENTRE : columns.CENTRE + 3] = there.position_m
+        pose[:, columns.TURN : columns.TURN + 9] = np.swapaxes(there.rotation, 1, 2).reshape(-1, 9)
         sigma = _sigma_px(camera, lens, there.position_m[:, 2])
-        pose[:, kernels.SIGMA] = sigma
+        pose[:, columns.SIGMA] = sigma
         # The texture's own blur: one for the ball's whole time, so that it is drawn once.
         far = float(np.median(np.concatenate([one.position_m[:, 2] for one in self.paths])))
         typical = float(_sigma_px(camera, lens, np.array([far]))[0])
         blur_mm = TEXTURE_SHARE * typical * far / camera.focal_px * 1e3 * RADIUS_MM / (self.ball.radius_m * 1e3)
         printed = texture(self.ball.logo, round(blur_mm, 2))
-        kind = np.zeros(kernels.BODY_COLUMNS)
-        kind[[kernels.KIND, kernels.OWNER, kernels.EVERY, kernels.SLOWER]] = kernels.BALL, self.number, every, slower
-        kind[kernels.RADIUS] = self.ball.radius_m
-        kind[[kernels.ALBEDO, kernels.ALBEDO_2]] = self.ball.albedo, self.ball.ink_albedo
-        kind[[kernels.HALF_EXTENT, kernels.TEXELS]] = printed.half_extent, printed.ink.shape[0]
-        kind[kernels.CAP_COSINE] = 2.0 if self.ball.logo.name == "none" else math.cos(printed.cap_rad)
-        kind[[kernels.INK_X, kernels.INK_Y]] = printed.ink_u, printed.ink_w
-        kind[kernels.SAMPLE] = math.sqrt(3 * (1 - TEXTURE_SHARE**2)) * typical
+        kind = np.zeros(columns.BODY_COLUMNS)
+        kind[[columns.KIND, columns.OWNER, columns.EVERY, columns.SLOWER]] = (
+            columns.BALL,
+            self.number,
+            every,
+            slower,
+        )
+        kind[columns.RADIUS] = self.ball.radius_m
+        kind[[columns.ALBEDO, columns.ALBEDO_2]] = self.ball.albedo, self.ball.ink_albedo
+        kind[[columns.HALF_EXTENT, columns.TEXELS]] = printed.half_extent, printed.ink.shape[0]
+        kind[columns.CAP_COSINE] = 2.0 if self.ball.logo.name == "none" else math.cos(printed.cap_rad)
+        kind[[columns.INK_X, columns.INK_Y]] = printed.ink_u, printed.ink_w
+        kind[columns.SAMPLE] = math.sqrt(3 * (1 - TEXTURE_SHARE**2)) * typical
         box = self._box(camera, there.position_m, 4 * float(sigma.max()) + 1.0)
         return PackedBody(pose, box, kind, printed.ink)
 
@@ -151,9 +156,9 @@ class ArmBody:
         return float(elbow[0, 2] + hand[0, 2]) / 2
 
     def packed(self, camera: Camera, lens: Lens, time_s: Floats, every: int, slower: int) -> PackedBody:
-        """The arm at these times, looked at in every so many of them; slower: see `kernels`."""
+        """The arm at these times, looked at in every so many of them; slower: see `kernels_light`."""
         arm = self.arm
-        pose = np.zeros((time_s.size, kernels.POSE_COLUMNS))
+        pose = np.zeros((time_s.size, columns.POSE_COLUMNS))
         low, high = [], []
         for column, place, radius in zip(
             (0, 3), arm_ends(arm, time_s), (arm.radius_elbow_m, arm.radius_hand_m), strict=True
@@ -163,10 +168,15 @@ class ArmBody:
             low.append(image - radius_px[:, None])
             high.append(image + radius_px[:, None])
         sigma = _sigma_px(camera, lens, np.array([self.distance_m(time_s)]))[0]
-        pose[:, kernels.SIGMA] = sigma
-        kind = np.zeros(kernels.BODY_COLUMNS)
-        kind[[kernels.KIND, kernels.OWNER, kernels.EVERY, kernels.SLOWER]] = kernels.ARM, self.number, every, slower
-        kind[[kernels.ALBEDO, kernels.ALBEDO_2]] = arm.sleeve_albedo, arm.hand_albedo
+        pose[:, columns.SIGMA] = sigma
+        kind = np.zeros(columns.BODY_COLUMNS)
+        kind[[columns.KIND, columns.OWNER, columns.EVERY, columns.SLOWER]] = (
+            columns.ARM,
+            self.number,
+            every,
+            slower,
+        )
+        kind[[columns.ALBEDO, columns.ALBEDO_2]] = arm.sleeve_albedo, arm.hand_albedo
         first, last = np.minimum(*low) - 4 * sigma - 1, np.maximum(*high) + 4 * sigma + 1
         box = _clipped(first[:, 0], first[:, 1], last[:, 0], last[:, 1], camera)
         return PackedBody(pose, box, kind, np.zeros((2, 2), np.float32))

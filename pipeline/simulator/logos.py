@@ -1,9 +1,10 @@
 """Logos: ink painted on the ball, drawn in millimetres on its surface.
 
-A logo is drawn in a plane that touches the ball at the logo's centre: the point at (a, b) mm lies at the surface
-distance hypot(a, b) from the centre (azimuthal equidistant, so strokes keep their width). In the ball's own frame
-the centre is +z, a runs along +x and b along +y (seen from outside: a to the right, b upwards). For the kernels it is resampled onto the Lambert azimuthal
-equal-area map (u, w) = (x, y) sqrt(2 / (1 + z)), which needs no arc cosine.
+A logo is drawn in a plane that touches the ball at the logo's centre: the point at (a, b) mm lies at the
+surface distance hypot(a, b) from the centre (azimuthal equidistant, so strokes keep their width). In the
+ball's own frame the centre is +z, a runs along +x and b along +y (seen from outside: a to the right, b
+upwards). For the kernels it is resampled onto the Lambert azimuthal equal-area map (u, w) = (x, y) sqrt(2 /
+(1 + z)), which needs no arc cosine.
 """
 
 from __future__ import annotations
@@ -76,7 +77,7 @@ class Texture:
 
 @lru_cache(maxsize=8)
 def texture(logo: Logo, blur_mm: float = 0.0) -> Texture:
-    """The logo's texture, softened by a Gaussian of this sigma (the part of the optical blur that is isotropic)."""
+    """The logo's texture, softened by a Gaussian of this sigma (the isotropic part of the optics')."""
     drawing, reach_mm = _drawing(logo)
     cap_rad = min((reach_mm + 3 * blur_mm + 2 * TEXEL_MM) / RADIUS_MM, np.pi * 0.99)
     half_extent = 2 * np.sin(cap_rad / 2)
@@ -107,7 +108,8 @@ def _stroke(a: Floats, b: Floats, start: tuple[float, float], end: tuple[float, 
     along_a, along_b = end[0] - start[0], end[1] - start[1]
     share = ((a - start[0]) * along_a + (b - start[1]) * along_b) / (along_a**2 + along_b**2)
     share = np.clip(share, 0.0, 1.0)
-    return np.hypot(a - start[0] - share * along_a, b - start[1] - share * along_b)
+    distance: Floats = np.hypot(a - start[0] - share * along_a, b - start[1] - share * along_b)
+    return distance
 
 
 def _ring(a: Floats, b: Floats, centre: tuple[float, float], half: tuple[float, float]) -> Floats:
@@ -189,7 +191,7 @@ def _png_ink(png_base64: str) -> Floats:
     image = cv2.imdecode(content, cv2.IMREAD_UNCHANGED) if content.size else None
     if image is None:
         raise ParameterError("the logo is no PNG picture that can be read")
-    picture = image.astype(np.float64) / float(np.iinfo(image.dtype).max)
+    picture = image.astype(np.float64) / (65535.0 if image.dtype == np.uint16 else 255.0)
     if picture.ndim == 2:
         return 1.0 - picture
     dark = 1.0 - picture[..., :3].mean(axis=2)

@@ -89,8 +89,18 @@ def quaternion_of(matrix: Floats) -> Quaternion:
             [
                 [matrix[0, 0] - matrix[1, 1] - matrix[2, 2], 0, 0, 0],
                 [matrix[1, 0] + matrix[0, 1], matrix[1, 1] - matrix[0, 0] - matrix[2, 2], 0, 0],
-                [matrix[2, 0] + matrix[0, 2], matrix[2, 1] + matrix[1, 2], matrix[2, 2] - matrix[0, 0] - matrix[1, 1], 0],
-                [matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1], np.trace(matrix)],
+                [
+                    matrix[2, 0] + matrix[0, 2],
+                    matrix[2, 1] + matrix[1, 2],
+                    matrix[2, 2] - matrix[0, 0] - matrix[1, 1],
+                    0,
+                ],
+                [
+                    matrix[2, 1] - matrix[1, 2],
+                    matrix[0, 2] - matrix[2, 0],
+                    matrix[1, 0] - matrix[0, 1],
+                    np.trace(matrix),
+                ],
             ]
         )
     )
@@ -102,7 +112,11 @@ def accelerations(ball: Ball, air: Air, up: Sequence[float]) -> tuple[Floats, fl
     """Gravity (3,) in m/s^2, drag in 1/m (times -|v| v) and Magnus in 1 (times 2 pi spin x v)."""
     area = math.pi * ball.radius_m**2
     pressure = 0.5 * air.density_kg_m3 * area / ball.mass_kg
-    return -air.gravity_m_s2 * np.asarray(up, np.float64), pressure * air.drag, pressure * air.magnus * ball.radius_m
+    return (
+        -air.gravity_m_s2 * np.asarray(up, np.float64),
+        pressure * air.drag,
+        pressure * air.magnus * ball.radius_m,
+    )
 
 
 def path(motion: Fixed | Flight, ball: Ball, scene: Scene) -> Path:
@@ -152,7 +166,7 @@ def _flown(flight: Flight, ball: Ball, scene: Scene) -> Path:
 def bounced(velocity_m_s: Floats, spin_rps: Floats, up: Floats, radius_m: float) -> tuple[Floats, Floats]:
     """Velocity and spin after the table: restitution, and friction until the ball grips (hollow sphere)."""
     omega = 2 * np.pi * spin_rps
-    fall = -velocity_m_s @ up
+    fall = -float(velocity_m_s @ up)
     slip = velocity_m_s + fall * up - radius_m * np.cross(omega, up)
     slip_speed = float(np.linalg.norm(slip))
     after = velocity_m_s + (1 + RESTITUTION) * fall * up

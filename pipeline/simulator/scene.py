@@ -1,6 +1,8 @@
-"""A scene: balls, an arm, a background and the light, in the camera frame; readable from and writable to JSON.
+"""A scene: balls, an arm, a background and the light, in the camera frame; readable from and writable to
+JSON.
 
-Everything random was drawn when the scene was made, so the same scene can be simulated again with other biases.
+Everything random was drawn when the scene was made, so the same scene can be simulated again with other
+biases.
 """
 
 from __future__ import annotations
@@ -73,7 +75,7 @@ class Ball:
     mass_kg: float = 0.0027
     albedo: float = 0.85
     ink_albedo: float = 0.12
-    logo: Logo = Logo()
+    logo: Logo = field(default_factory=Logo)
 
 
 @dataclass(frozen=True)
@@ -203,8 +205,7 @@ def _made(kind: type[Kind], plain: Mapping[str, Any]) -> Kind:
 def _ball(plain: Mapping[str, Any]) -> Ball:
     values = dict(plain)
     values["motions"] = tuple(
-        _made(Flight if "velocity_m_s" in motion else Fixed, motion)  # type: ignore[arg-type]
-        for motion in values["motions"]
+        _made(Flight if "velocity_m_s" in motion else Fixed, motion) for motion in values["motions"]
     )
     values["logo"] = _made(Logo, values.get("logo", {}))
     return _made(Ball, values)

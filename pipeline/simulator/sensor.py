@@ -1,8 +1,8 @@
 """The sensor around the light: what a pixel is like, its noise, and the readout.
 
-Model after the published ones (Lichtsteiner 2008; v2e, Hu 2021; IEBCS, Joubert 2021; Graca 2021): log intensity,
-first-order low-pass whose cut-off falls with darkness, two contrast thresholds with mismatch, a dead time during
-which the reference follows the signal, a slower OFF after ON, noise, delay and jitter.
+Model after the published ones (Lichtsteiner 2008; v2e, Hu 2021; IEBCS, Joubert 2021; Graca 2021): log
+intensity, first-order low-pass whose cut-off falls with darkness, two contrast thresholds with mismatch, a
+dead time during which the reference follows the signal, a slower OFF after ON, noise, delay and jitter.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ class Lens:
     def __post_init__(self) -> None:
         if not (0 < self.blur_px <= 50 and self.aperture_mm >= 0 and self.focus_m > 0):
             raise ParameterError(
-                f"lens blur {self.blur_px:g} px, aperture {self.aperture_mm:g} mm, focus {self.focus_m:g} m is out of "
-                "range: blur more than 0 and at most 50 px, aperture 0 mm or more, focus more than 0 m"
+                f"lens blur {self.blur_px:g} px, aperture {self.aperture_mm:g} mm, focus {self.focus_m:g} m "
+                "is out of range: blur more than 0 and at most 50 px, aperture 0 mm or more, focus more than 0 m"
             )
 
     def sigma_px(self, distance_m: NDArray[np.float64], focal_px: float) -> NDArray[np.float64]:
@@ -50,17 +50,20 @@ class Lens:
 class Sensor:
     """A pixel array in physical units. Intensities are relative to white at 1,930 lx.
 
-    threshold_on, threshold_off : contrast thresholds, log intensity; `mismatch` is their relative sigma over pixels
+    threshold_on, threshold_off : contrast thresholds, log intensity; `mismatch` is their relative sigma over
+        pixels
     cutoff_hz : of the low-pass in bright light; dark_tau_us : time constant added at intensity 1, growing as
         1 / intensity
     highpass_hz : rate at which the reference forgets; refractory_us : dead time after an event
-    off_after_on_us : an OFF event waits until this long after an ON event of its pixel (the paper's limitation)
+    off_after_on_us : an OFF event waits until this long after an ON event of its pixel (the paper's
+        limitation)
     contrast_noise : sigma of the temporal noise in log intensity at intensity 1; grows as intensity ** -0.5
     delay_us, jitter_us : constant part of the latency and its sigma; the rest comes from low-pass and noise
     noise_hz : rate of uniform noise per pixel at intensity 1, at ON : OFF shares in noise_on : noise_off
     hot_share, hot_median_hz, hot_sigma : log-normal rates of the pixels that make most of the noise
     timestamp_us : step of the readout's clock; rate_limit_hz : events a second let through, 0 = no limit
-    pattern_seed : of mismatch and hot pixels (one camera = one pattern); None = drawn from the recording's seed
+    pattern_seed : of mismatch and hot pixels (one camera = one pattern); None = drawn from the recording's
+        seed
     """
 
     threshold_on: float = 0.27
@@ -148,7 +151,9 @@ def thresholds(sensor: Sensor, pixels: int, random: np.random.Generator) -> tupl
     return tuple(result)
 
 
-def hot_rates_hz(sensor: Sensor, pixels: int, random: np.random.Generator) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def hot_rates_hz(
+    sensor: Sensor, pixels: int, random: np.random.Generator
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Which pixels are hot (flat indices, rising) and their rates."""
     count = int(random.binomial(pixels, sensor.hot_share))
     where = np.sort(random.choice(pixels, count, replace=False)).astype(np.int64)
@@ -168,7 +173,8 @@ def noise(
     intensity : (pixels,) float64 of the background, relative to white
     """
     pixels = intensity.size
-    # Shot noise in log intensity falls with the root of the photocurrent, and so does the noise rate (v2e's law).
+    # Shot noise in log intensity falls with the root of the photocurrent, and so does the noise rate (v2e's
+    # law).
     weight = 1 / np.sqrt(np.maximum(intensity, 1e-3))
     total = np.cumsum(weight)
     count = int(random.poisson(sensor.noise_hz * total[-1] * duration_us * 1e-6))
@@ -191,8 +197,8 @@ def noise(
 def read_out(parts: list[LabelledEvents], sensor: Sensor, duration_us: int) -> LabelledEvents:
     """Put events in order of time, on the readout's clock and under its rate limit.
 
-    The limit counts in windows of 1 ms; what exceeds it in a window is lost, later events first (as the camera's
-    own rate control drops them).
+    The limit counts in windows of 1 ms; what exceeds it in a window is lost, later events first (as the
+    camera's own rate control drops them).
     """
     time = np.concatenate([part.events.t_us for part in parts])
     keep = np.flatnonzero((time >= 0) & (time < duration_us))
@@ -204,7 +210,5 @@ def read_out(parts: list[LabelledEvents], sensor: Sensor, duration_us: int) -> L
         first = np.searchsorted(window, window)
         allowed = np.arange(time.size) - first < sensor.rate_limit_hz * 1e-3
         time, keep = time[allowed], keep[allowed]
-    x, y, on = (
-        np.concatenate([getattr(part.events, name) for part in parts])[keep] for name in ("x_px", "y_px", "on")
-    )
+    x, y, on = (np.concatenate([getattr(part.events, name) for part in parts])[keep] for name in ("x_px", "y_px", "on"))
     return LabelledEvents(EventBatch(time, x, y, on), np.concatenate([part.label for part in parts])[keep])

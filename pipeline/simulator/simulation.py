@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,9 +17,10 @@ from ..camera import Camera, CameraParameters
 from ..errors import ParameterError
 from ..events import EventBatch
 from ..results import Truth
-from . import kernels
+from . import kernels, kernels_light, kernels_pixel
 from .backdrop import intensity_map
 from .bodies import ArmBody, BallBody, bodies_of
+from .motion import Path
 from .scene import Scene
 from .sensor import EDGE, LOGO, OTHER, LabelledEvents, Lens, Sensor, noise, read_out, thresholds
 
@@ -30,6 +32,7 @@ MOST_SLOWER = 8  # how much longer the outline of a fast spinning ball may go wi
 TRUTH_STEP_US = 500
 DARK_FLOOR = 1e-3  # dark current as an intensity: lets the logarithm live without light
 NORMALS = 1 << 16
+REFERENCE_LUX = 1930.0  # the paper's setup, section 4.1
 VERSION = 1  # of the model: raised whenever the same scene and seed give other events
 
 Progress = Callable[[float], None]
@@ -116,24 +119,27 @@ def simulate_again(
     return simulate(scene, camera=camera, sensor=sensor, lens=lens, seed=seed, progress=progress)
 
 
-REFERENCE_LUX = 1930.0  # the paper's setup, section 4.1
-
-
 def truth_of(scene: Scene, camera: Camera, label: NDArray[np.uint8]) -> Truth:
     """The truth of the first ball every 500 us of its motions."""
-    columns: list[tuple[NDArray[Any], ...]] = []
-    for body in bodies_of(scene)[:1]:
-        assert isinstance(body, BallBody)
-        for path in body.paths:
-            first = -(-round(path.start_s * 1e6) // TRUTH_STEP_US) * TRUTH_STEP_US
-            t_us = np.arange(first, round(min(path.end_s, scene.duration_s) * 1e6), TRUTH_STEP_US, dtype=np.int64)
-            pose = path.at(t_us * 1e-6)
-            outline = camera.silhouette(pose.position_m, body.ball.radius_m)
-            columns.append((t_us, *outline, pose.position_m, pose.velocity_m_s, pose.spin_rps))
-    if not columns:
-        nothing, nowhere = np.empty(0), np.empty((0, 3))
-        columns.append((np.empty(0, np.int64), nothing, nothing, nothing, nowhere, nowhere, nowhere))
-    return Truth(*(np.concatenate(column) for column in zip(*columns, strict=True)), label=label)
+    rows: list[tuple[NDArray[np.int64], Path]] = []
+    for path in BallBody(scene, 0).paths if scene.balls else ():
+        first = -(-max(round(path.start_s * 1e6), 0) // TRUTH_STEP_US) * TRUTH_STEP_US
+        last = round(min(path.end_s, scene.duration_s) * 1e6)
+        t_us = np.arange(first, last, TRUTH_STEP_US, dtype=np.int64)
+        rows.append((t_us, path.at(t_us * 1e-6)))
+    nowhere = np.empty((0, 3))
+    position = np.concatenate([nowhere, *(pose.position_m for _, pose in rows)])
+    x_px, y_px, radius_px = camera.silhouette(position, scene.balls[0].radius_m if scene.balls else 1.0)
+    return Truth(
+        t_us=np.concatenate([np.empty(0, np.int64), *(t_us for t_us, _ in rows)]),
+        x_px=x_px,
+        y_px=y_px,
+        radius_px=radius_px,
+        position_m=position,
+        velocity_m_s=np.concatenate([nowhere, *(pose.velocity_m_s for _, pose in rows)]),
+        spin_rps=np.concatenate([nowhere, *(pose.spin_rps for _, pose in rows)]),
+        label=label,
+    )
 
 
 class _Simulation:
@@ -156,7 +162,7 @@ class _Simulation:
         on, off = thresholds(sensor, count, pattern)
         column, row = np.meshgrid(np.arange(camera.width_px), np.arange(camera.height_px))
         rays = camera.rays(column.ravel(), row.ravel())
-        self.view = kernels.View(
+        self.view = kernels_pixel.View(
             np.ascontiguousarray(rays[:, 0]),
             np.ascontiguousarray(rays[:, 1]),
             backdrop,
@@ -165,7 +171,7 @@ class _Simulation:
             random.standard_normal(NORMALS),
         )
         light = scene.light
-        self.physics = kernels.Physics(
+        self.physics = kernels_light.Physics(
             tau_us=1e6 / (2 * math.pi * sensor.cutoff_hz),
             dark_tau_us=sensor.dark_tau_us,
             forget_per_us=2 * math.pi * sensor.highpass_hz * 1e-6,
@@ -187,11 +193,11 @@ class _Simulation:
         self.pixels = self._at_rest(count)
         self.found: list[LabelledEvents] = []
 
-    def _at_rest(self, count: int) -> kernels.Pixels:
+    def _at_rest(self, count: int) -> kernels_pixel.Pixels:
         buffer = 4 * count if self.scene.light.flicker_depth else 1 << 20
-        return kernels.Pixels(
-            state=np.zeros((count, kernels.STATE_COLUMNS)),
-            role=np.full(count, kernels.NEW, np.uint8),
+        return kernels_pixel.Pixels(
+            state=np.zeros((count, kernels_pixel.STATE_COLUMNS)),
+            role=np.full(count, kernels_pixel.NEW, np.uint8),
             owner=np.zeros(count, np.uint8),
             looked=np.full(count, -1, np.int32),
             rest=np.full(count, -1, np.int32),
@@ -207,12 +213,10 @@ class _Simulation:
         end = self.scene.duration_s
         visible = [body.visible(self.camera, end) for body in self.bodies]
         edges = sorted({0.0, end, *(min(t, end) for spans in visible for span in spans for t in span)})
-        for start, stop in zip(edges[:-1], edges[1:], strict=True):
+        for start, stop in itertools.pairwise(edges):
             middle = (start + stop) / 2
             there = [
-                body
-                for body, spans in zip(self.bodies, visible, strict=True)
-                if any(a <= middle < b for a, b in spans)
+                body for body, spans in zip(self.bodies, visible, strict=True) if any(a <= middle < b for a, b in spans)
             ]
             if there or self.pixels.cursor[0] or self.scene.light.flicker_depth:
                 self._segment(there, start, stop, progress)
@@ -250,7 +254,13 @@ class _Simulation:
             row = 0 if fresh and first == 0 else 1
             while row <= count:
                 row = kernels.run(
-                    self.pixels, self.view, packed, self.physics, time_s * 1e6, row, fresh and first == 0 and row == 0
+                    self.pixels,
+                    self.view,
+                    packed,
+                    self.physics,
+                    time_s * 1e6,
+                    row,
+                    fresh and first == 0 and row == 0,
                 )
                 self._collect()
             if progress is not None:
@@ -281,7 +291,7 @@ def _packed(
     camera: Camera,
     lens: Lens,
     time_s: NDArray[np.float64],
-) -> kernels.Bodies:
+) -> kernels_light.Bodies:
     """The bodies at these times in the kernels' form, from far to near."""
     order = sorted(range(len(there)), key=lambda k: -there[k].distance_m(time_s))
     packed = [there[k].packed(camera, lens, time_s, every[k], max(slower[k], 1)) for k in order]
@@ -289,9 +299,9 @@ def _packed(
     ink = np.zeros((len(packed), side, side), np.float32)
     for k, body in enumerate(packed):
         ink[k, : body.ink.shape[0], : body.ink.shape[1]] = body.ink
-    pose = np.empty((time_s.size, len(packed), kernels.POSE_COLUMNS))
+    pose = np.empty((time_s.size, len(packed), kernels_light.POSE_COLUMNS))
     box = np.empty((time_s.size, len(packed), 4), np.int32)
-    kind = np.empty((len(packed), kernels.BODY_COLUMNS))
+    kind = np.empty((len(packed), kernels_light.BODY_COLUMNS))
     for k, body in enumerate(packed):
         pose[:, k], box[:, k], kind[k] = body.pose, body.box, body.kind
-    return kernels.Bodies(pose, box, kind, ink)
+    return kernels_light.Bodies(pose, box, kind, ink)

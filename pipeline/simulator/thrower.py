@@ -47,17 +47,17 @@ HUMAN_SPEED_M_S = (9.0, 20.0, 30.0)  # the cap of 30 m/s is ours: a smash
 def thrower_spin(velocity_setting: int, spin_setting: int, side: bool) -> tuple[float, float]:
     """(side, top) components in rps of a thrower shot, side > 0 = left, top < 0 = backspin.
 
-    Back/top rows: magnitudes as printed; below the row's minimum we read backspin, above it topspin. Side rows never
-    reach zero and look like mixed axes. Our reading: the back/top component is the back/top row's, the side component
-    the side row's at setting 0 for negative settings (that reproduces the printed magnitudes within about 5 %) and
-    what is left of the magnitude for the others; the magnitude is always the printed one.
-    Raises ParameterError for settings that are not in the paper's table.
+    Back/top rows: magnitudes as printed; below the row's minimum we read backspin, above it topspin. Side
+    rows never reach zero and look like mixed axes. Our reading: the back/top component is the back/top row's,
+    the side component the side row's at setting 0 for negative settings (that reproduces the printed
+    magnitudes within about 5 %) and what is left of the magnitude for the others; the magnitude is always the
+    printed one. Raises ParameterError for settings that are not in the paper's table.
     """
     table = THROWER_SIDE_RPS if side else THROWER_BACKTOP_RPS
     if velocity_setting not in table or spin_setting not in table[velocity_setting]:
         raise ParameterError(
-            f"velocity setting {velocity_setting} with spin setting {spin_setting} is not in the paper's table: there "
-            "are velocities 10, 15, 20, 25 and spins from -5 to 5 (back/top also 6 and 7 for the slowest)"
+            f"velocity setting {velocity_setting} with spin setting {spin_setting} is not in the paper's table: "
+            "there are velocities 10, 15, 20, 25 and spins from -5 to 5 (back/top also 6 and 7 for the slowest)"
         )
     row = THROWER_BACKTOP_RPS[velocity_setting]
     lowest = min(row, key=lambda setting: row[setting])
@@ -81,13 +81,11 @@ def thrown(velocity_setting: int, spin_setting: int, *, side: bool = False, seed
     forward = np.array([math.cos(math.radians(heading)), math.sin(math.radians(heading)), 0.0])
     up = np.array([0.0, 0.0, -1.0])
     spin = left * up + top * np.cross(up, forward)
-    return flight(
-        spin_rps=spin.tolist(), speed_m_s=THROWER_SPEED_M_S[velocity_setting], heading_deg=heading, seed=seed
-    )
+    return flight(spin_rps=spin.tolist(), speed_m_s=THROWER_SPEED_M_S[velocity_setting], heading_deg=heading, seed=seed)
 
 
 def human_shot(*, seed: int = 0) -> Scene:
-    """A shot as people play them: log-normal speed and spin with the published medians and 95th percentiles."""
+    """A shot as people play them: log-normal speed and spin with the published quantiles."""
     random = np.random.default_rng([seed, 5])
     values = []
     for median, high, cap in (HUMAN_SPIN_RPS, HUMAN_SPEED_M_S):

@@ -58,7 +58,8 @@ class FlowResult:
     vx_px_s, vy_px_s : (n,) float64, Triplet Matching's flow
     slice_index : (n,) int64, which slice (from the shot's start)
     normal_t_us, normal_x_px, normal_y_px, normal_points_m, normal_normals : the same for the m events with normal
-        flow of a local plane; these come PLANE_REACH t_acc late, when their neighbours after them are known
+        flow of a local plane; these come PLANE_REACH t_acc late, when their neighbours after them are known. Of a
+        dense logo only a part of the events is tried (PLANES_PER_MS), and none that may be the outline's.
     normal_direction, normal_speed_px_s : (m, 2) float64 unit vectors across the edge, (m,) float64 speed along them
     normal_in_image : (m,) bool, the plane was fitted in the image and the ball's motion taken off afterwards; an
         event can have both kinds. A logo that turns against the flight hardly moves in the image: few pixels then see
@@ -87,7 +88,7 @@ class FlowResult:
 
 
 @dataclass(frozen=True, slots=True)
-class Logo:
+class LogoEvents:
     """Columns of logo events, in order of time; see FlowResult for what they hold."""
 
     t_us: NDArray[np.int64]
@@ -101,7 +102,7 @@ class Logo:
     centre_y_px: NDArray[np.float64]
 
     @classmethod
-    def of(cls, logo: LogoResult) -> Logo:
+    def of(cls, logo: LogoResult) -> LogoEvents:
         return cls(
             logo.events.t_us,
             logo.x_px,
@@ -114,8 +115,8 @@ class Logo:
             logo.centre_y_px,
         )
 
-    def __getitem__(self, rows: slice | NDArray[np.bool_] | NDArray[np.int64]) -> Logo:
-        return Logo(
+    def __getitem__(self, rows: slice | NDArray[np.bool_] | NDArray[np.int64]) -> LogoEvents:
+        return LogoEvents(
             self.t_us[rows],
             self.x_px[rows],
             self.y_px[rows],
@@ -128,7 +129,7 @@ class Logo:
         )
 
     @classmethod
-    def joined(cls, parts: Sequence[Logo]) -> Logo:
+    def joined(cls, parts: Sequence[LogoEvents]) -> LogoEvents:
         """Events that follow each other in time, as one; at least one part."""
         return cls(
             np.concatenate([part.t_us for part in parts]),
@@ -142,13 +143,13 @@ class Logo:
             np.concatenate([part.centre_y_px for part in parts]),
         )
 
-    def between(self, start_us: float, end_us: float) -> Logo:
+    def between(self, start_us: float, end_us: float) -> LogoEvents:
         """The events of [start_us, end_us)."""
         first, last = np.searchsorted(self.t_us, [start_us, end_us])
         return self[int(first) : int(last)]
 
 
-NO_EVENTS = Logo(
+NO_EVENTS = LogoEvents(
     np.empty(0, np.int64),
     np.empty(0),
     np.empty(0),
@@ -167,7 +168,7 @@ class State:
 
     setting: Setting
     shot: int | None = None
-    events: Logo = NO_EVENTS
+    events: LogoEvents = NO_EVENTS
     slice_start_us: int = 0
     slice_index: int = 0
     planes_until_us: float = 0.0
@@ -196,7 +197,7 @@ def step(
     if track.shot != state.shot:
         state.shot, state.events = track.shot, NO_EVENTS
         state.slice_start_us, state.slice_index, state.planes_until_us = packet.start_us, 0, packet.start_us
-    state.events = Logo.joined([state.events, Logo.of(logo)])
+    state.events = LogoEvents.joined([state.events, LogoEvents.of(logo)])
     t_acc_us = _t_acc_us(parameters, rate)
     bound_px_s = 2 * math.pi * state.setting.max_spin_rps * logo.radius_px
     triplets = _ended_slices(parameters, state, packet.end_us, t_acc_us, bound_px_s)
@@ -218,7 +219,7 @@ def _t_acc_us(parameters: FlowParameters, rate: RateResult) -> int:
 
 def _ended_slices(
     parameters: FlowParameters, state: State, end_us: int, t_acc_us: int, bound_px_s: float
-) -> tuple[Logo, Floats, Floats, NDArray[np.int64]]:
+) -> tuple[LogoEvents, Floats, Floats, NDArray[np.int64]]:
     """Events with flow of the slices that end by end_us, their flow and their slice."""
     events, vx, vy, index = [NO_EVENTS], [np.empty(0)], [np.empty(0)], [np.empty(0, np.int64)]
     while state.slice_start_us + t_acc_us <= end_us:
@@ -237,12 +238,12 @@ def _ended_slices(
         index.append(np.full(int(has.sum()), state.slice_index, np.int64))
         state.slice_start_us += t_acc_us
         state.slice_index += 1
-    return Logo.joined(events), np.concatenate(vx), np.concatenate(vy), np.concatenate(index)
+    return LogoEvents.joined(events), np.concatenate(vx), np.concatenate(vy), np.concatenate(index)
 
 
 def _planes(
     parameters: FlowParameters, state: State, track: TrackResult, end_us: int, t_acc_us: int, bound_px_s: float
-) -> tuple[Logo, Floats, Floats, NDArray[np.bool_]]:
+) -> tuple[LogoEvents, Floats, Floats, NDArray[np.bool_]]:
     """Events that are PLANE_REACH t_acc old and have normal flow, its directions and speeds, and in which frame.
 
     Without the events of the outline: they would be taken for a logo that stands still.
@@ -281,8 +282,8 @@ def _result(
     t_acc_us: int | None,
     bound_px_s: float,
     radius_px: float,
-    triplets: tuple[Logo, Floats, Floats, NDArray[np.int64]],
-    planes: tuple[Logo, Floats, Floats, NDArray[np.bool_]],
+    triplets: tuple[LogoEvents, Floats, Floats, NDArray[np.int64]],
+    planes: tuple[LogoEvents, Floats, Floats, NDArray[np.bool_]],
 ) -> FlowResult:
     full, vx_px_s, vy_px_s, slice_index = triplets
     normal, direction, speed_px_s, in_image = planes

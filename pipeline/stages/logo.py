@@ -116,9 +116,7 @@ def _rows(events: EventBatch, track: TrackResult, mask_radius_px: float) -> NDAr
     rows = np.empty(len(events), np.int64)
     x, y, vx, vy, _ = (float(value) for value in track.mean)
     reference_us = track.t_us + track.latency_us
-    inside = rows_inside(
-        rows, events.t_us, events.x_px, events.y_px, reference_us, (x, y), (vx, vy), mask_radius_px
-    )
+    inside = rows_inside(rows, events.t_us, events.x_px, events.y_px, reference_us, (x, y), (vx, vy), mask_radius_px)
     return rows[:inside]
 
 

@@ -16,6 +16,7 @@ from ..kernels.spin import robust_spin, sampled_spin
 from ..results import SpinEstimate
 from .flow import FlowResult
 from .logo import LogoResult
+from .rate import RateResult
 
 if TYPE_CHECKING:
     from .spin import SpinParameters
@@ -40,22 +41,32 @@ LONGEST_US = 10_000  # within which a line is looked for however slow the spin: 
 REACH_PX, WIDTH_PX, SHARPEST = 3.0, 1.2, 0.35
 # Tracks are not known better than this, and neither is the speed of strokes that are curved and blurred.
 POSITION_FLOOR_PX, SPEED_FLOOR = 0.2, 0.03
-# By how much all speeds may be off together, differently over the ball: what blur, latency and curvature do.
+# By how much speeds may be off together, differently over the ball: at the true spin of simulated balls the lines are
+# off by 2 to 5 percent towards the rim that the logo leaves by, by up to 9 in flight (blur, latency, curvature).
 BIAS = 0.05
 # A line counts for a start if it drifts less than this while the fastest of the starts turns FIRST_TURNS[-1].
 STANDS_PX = 0.5
 # Residuals in predicted standard deviations. Below GOOD the last tick's answer needs no second thought; above DOUBT
 # the events do not move like one turning ball.
-GOOD, DOUBT = 1.3, 1.8
+GOOD, DOUBT = 1.3, 1.6
 # Of the events looked at, so many must lie on lines that drift as one turning ball's do.
 FEWEST_SHARE = 0.4
 SEED = 1
+# The weakest direction of the spin must weigh this much against the strongest, or it is open.
+OPEN = 1e-4
+# The event rate's magnitude is not better than one percent: its crossings wander with the view of the logo. Nearer to
+# the axis than 30 degrees the line of sight's turning about it says nothing of when the logo reappears.
+RATE_FLOOR, STEADY_SIGHT = 0.01, 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class _Fit:
-    """A spin (rad/s) with the constraints behind it; `share` of the events looked at carry it.
+    """A spin (rad/s) with the constraints behind it.
 
+    events, rows, speeds, weights : the constraints rows . spin = speeds (kernels.comoving) with their final weights
+    matrix : (3, 3) normal matrix of these
+    scale : their residuals in predicted standard deviations
+    share : of the events looked at, how many carry the spin
     overlap : in how many of the constraints the same event takes part
     """
 
@@ -79,8 +90,8 @@ class NormalFlowSpin:
     1. Start: planes fitted in the ball's frame and in the image (flow), RANSAC, iteratively reweighted least squares.
     2. Refinement: the same constraints as an observer sees them who turns with the start (kernels.comoving), which
        keeps apart the strokes of the logo, and again from there.
-    3. Uncertainty: the scatter of the constraints, taken in blocks of one radian of turning because neighbouring
-       ones share their events, plus what the uncertainty of the ball's place and radius does to the spin.
+    3. Magnitude: where the rhythm of the event rate agrees, it sharpens the length of the vector.
+    4. Uncertainty: see `_covariance`.
     """
 
     def __init__(self, parameters: SpinParameters, setting: Setting) -> None:
@@ -97,8 +108,9 @@ class NormalFlowSpin:
         self.plane_in_image = np.empty(0, np.bool_)
         self.tracks = np.empty((0, 4))  # radius, and 1 sigma of position, radius (px) and velocity (px/s), a tick
         self.last: _Fit | None = None
+        self.restarted_with = 0  # number of events at the last start from scratch
 
-    def estimate(self, end_us: int, logo: LogoResult, flow: FlowResult) -> SpinEstimate:
+    def estimate(self, end_us: int, logo: LogoResult, flow: FlowResult, rate: RateResult) -> SpinEstimate:
         """The estimate at the end of a tick."""
         self._add(logo, flow)
         self._forget(end_us - self.parameters.window_us)
@@ -112,7 +124,7 @@ class NormalFlowSpin:
         self.last = self._fit()
         if self.last is None:
             return self._refused("the normal flow agrees on no spin")
-        return self._judged(self.last)
+        return self._judged(self.last, rate)
 
     def _refused(self, reason: str) -> SpinEstimate:
         self.last = None
@@ -151,11 +163,16 @@ class NormalFlowSpin:
             self.plane_speeds, self.plane_in_image = self.plane_speeds[keep], self.plane_in_image[keep]
 
     def _fit(self) -> _Fit | None:
-        """The best spin: last tick's brought up to date if it was good, else the best of all starts."""
-        if self.last is not None and self.last.scale < GOOD:
+        """The best spin: last tick's brought up to date if that is good, else the best of all starts.
+
+        A spin that is not good is only tried anew when the events are a quarter more, which bounds the time a tick
+        takes on events that no spin explains.
+        """
+        if self.last is not None:
             fit = self._refined(self.last.spin, NEXT_TURNS)
-            if fit is not None and fit.scale < GOOD:
+            if fit is not None and (fit.scale < GOOD or len(self.t_us) < 1.25 * self.restarted_with):
                 return fit
+        self.restarted_with = len(self.t_us)
         starts = [self._start(~self.plane_in_image), self._start(self.plane_in_image)]
         fits = [self._refined(start, FIRST_TURNS) for start in starts if start is not None]
         if self.last is not None:
@@ -163,14 +180,14 @@ class NormalFlowSpin:
         found = [fit for fit in fits if fit is not None]
         if len(found) < 2:
             return found[0] if found else None
-        turn_s = FIRST_TURNS[-1] / max(float(np.linalg.norm(fit.spin)) for fit in found)
+        turn_s = min(FIRST_TURNS[-1] / max(float(np.linalg.norm(fit.spin)) for fit in found), LONGEST_US * 1e-6)
         return max(found, key=lambda fit: self._standing(fit.spin, turn_s))
 
     def _standing(self, spin: Floats, turn_s: float) -> float:
         """Share of the events that lie on a line which stands still for so long if the ball turns like this."""
         radius_px = self._track()[0]
         (t_us, normals, on), stride, looked_at = self._looked_at()
-        _, rows, speeds, _, _, _ = comoving_constraints(
+        _, rows, speeds, _, _ = comoving_constraints(
             t_us, normals, on, spin, stride, REACH_PX / radius_px, turn_s * 1e6, WIDTH_PX / radius_px, SHARPEST
         )
         return float(np.sum(np.abs(speeds - rows @ spin) * turn_s * radius_px < STANDS_PX)) / looked_at
@@ -198,7 +215,7 @@ class NormalFlowSpin:
             speed = float(np.linalg.norm(spin))
             if not 1.0 < speed < 1.3 * TAU * self.setting.max_spin_rps:
                 return None
-            events, rows, speeds, variances, sizes, tried = comoving_constraints(
+            events, rows, speeds, variances, sizes = comoving_constraints(
                 t_us, normals, on, spin, stride, REACH_PX / radius_px, min(turn / speed * 1e6, LONGEST_US),
                 WIDTH_PX / radius_px, SHARPEST,
             )  # fmt: skip
@@ -208,7 +225,7 @@ class NormalFlowSpin:
             variances += (speed * position_px / radius_px / facing) ** 2 + (velocity_px_s / radius_px) ** 2
             stds = np.sqrt(variances + (SPEED_FLOOR * speed) ** 2)
             spin, weights, matrix, scale = robust_spin(rows, speeds, stds, spin, 10)
-            share = float(np.sum(weights * stds**2)) / looked_at; self.agree=float(np.sum(weights * stds**2)) / tried; self.lineshare=len(events)/tried
+            share = float(np.sum(weights * stds**2)) / looked_at
             overlap = max(float(sizes.mean()) / stride, 1.0)
             fit = _Fit(spin, events * self._thinning(), rows, speeds, weights, matrix, scale, share, overlap)
         return fit
@@ -230,45 +247,72 @@ class NormalFlowSpin:
         floor = POSITION_FLOOR_PX
         return float(self.tracks[-1, 0]), max(position_px, floor), max(radius_std_px, floor), velocity_px_s
 
-    def _judged(self, fit: _Fit) -> SpinEstimate:
+    def _judged(self, fit: _Fit, rate: RateResult) -> SpinEstimate:
         """The estimate, or the reason to doubt it."""
         if fit.share < FEWEST_SHARE:
             return self._doubted(f"only {100 * fit.share:.0f} % of the events move like one turning ball")
         if fit.scale > DOUBT:
             return self._doubted(f"the events scatter {fit.scale:.1f} times more than one turning ball's")
-        speed = float(np.linalg.norm(fit.spin))
-        if speed > TAU * self.setting.max_spin_rps:
-            return self._doubted(f"{speed / TAU:.0f} rps is above spin.max_spin_rps")
         covariance = self._covariance(fit)
         if covariance is None:
             return self._doubted("the logo's place leaves a part of the spin open")
-        return SpinEstimate("normal_flow", fit.spin / TAU, covariance / TAU**2, None, len(fit.events))
+        spin_rps, covariance_rps2 = fit.spin / TAU, covariance / TAU**2
+        if self.parameters.magnitude_from == "rate" and rate.spin_rps is not None:
+            spin_rps, covariance_rps2 = self._with_rate(spin_rps, covariance_rps2, rate)
+        magnitude_rps = float(np.linalg.norm(spin_rps))
+        if magnitude_rps > self.setting.max_spin_rps:
+            return self._doubted(f"{magnitude_rps:.0f} rps is above spin.max_spin_rps")
+        return SpinEstimate("normal_flow", spin_rps, covariance_rps2, None, len(self.t_us))
 
     def _doubted(self, reason: str) -> SpinEstimate:
         """A refusal that keeps the fit: the next tick may start from it."""
         return SpinEstimate.refused("normal_flow", reason, len(self.t_us))
 
+    def _with_rate(self, spin_rps: Floats, covariance_rps2: Floats, rate: RateResult) -> tuple[Floats, Floats]:
+        """The estimate after seeing the event rate's magnitude, if the two are within three sigma (Kalman update).
+
+        The logo reappears when the ball has turned once as seen from the camera. While the ball flies past, the line
+        of sight turns about the axis too, and that is added. A rate that disagrees has caught the strokes of the logo
+        or one of its multiples, and is left alone.
+        """
+        assert rate.spin_rps is not None and rate.spin_std_rps is not None
+        axis = spin_rps / np.linalg.norm(spin_rps)
+        seen = [sight - axis * (sight @ axis) for sight in (self.sights[0], self.sights[-1])]
+        turned_rps = 0.0
+        if min(float(np.linalg.norm(across)) for across in seen) > STEADY_SIGHT:
+            turned = math.atan2(float(axis @ np.cross(seen[0], seen[1])), float(seen[0] @ seen[1]))
+            turned_rps = turned / TAU / max((self.t_us[-1] - self.t_us[0]) * 1e-6, 1e-6)
+        off_rps = rate.spin_rps + turned_rps - float(np.linalg.norm(spin_rps))
+        variance = float(axis @ covariance_rps2 @ axis) + rate.spin_std_rps**2 + (RATE_FLOOR * rate.spin_rps) ** 2
+        if off_rps**2 > 9.0 * variance:
+            return spin_rps, covariance_rps2
+        gain = covariance_rps2 @ axis / variance
+        return spin_rps + gain * off_rps, covariance_rps2 - np.outer(gain, axis @ covariance_rps2)
+
     def _covariance(self, fit: _Fit) -> Floats | None:
-        """(3, 3) covariance of the spin, (rad/s)^2; None where the constraints do not fix it."""
+        """(3, 3) covariance of the spin, (rad/s)^2; None where the constraints do not fix it.
+
+        The sum of what is known to go wrong: the scatter from block to block of one radian of turning (constraints
+        within a block share events and a track); the scatter of the constraints, counted as if each event took part
+        in one only; the uncertainty of the ball's place and radius; and a bias of speeds that differs over the ball.
+        All of it grows with the square of a misfit.
+        """
         lengths = np.linalg.eigvalsh(fit.matrix)
-        if lengths[0] <= 1e-4 * lengths[-1]:
+        if lengths[0] <= OPEN * lengths[-1]:
             return None
         inverse = np.linalg.inv(fit.matrix)
-        pull = (fit.weights * (fit.speeds - fit.rows @ fit.spin))[:, None] * fit.rows
+        gain = inverse @ (fit.rows * fit.weights[:, None]).T
+        radius_px, position_px, radius_std_px, _ = self._track()
         turned = self.t_us[fit.events] * (float(np.linalg.norm(fit.spin)) * 1e-6)
         _, block = np.unique(np.floor(turned).astype(np.int64), return_inverse=True)
         blocks = int(block.max()) + 1
         pulls = np.zeros((blocks, 3))
-        np.add.at(pulls, block, pull)
-        scatter = inverse @ (pulls.T @ pulls) @ inverse * blocks / max(blocks - 1, 1)
-        radius_px, position_px, radius_std_px, _ = self._track()
-        response = position_response(
-            self.normals[fit.events], self.sights[fit.events], fit.rows, fit.spin, radius_px
-        )
-        gain = inverse @ (fit.rows * fit.weights[:, None]).T
+        np.add.at(pulls, block, (gain * (fit.speeds - fit.rows @ fit.spin)).T)
+        scatter = pulls.T @ pulls * blocks / max(blocks - 1, 1)
+        normals = self.normals[fit.events]
+        response = position_response(normals, self.sights[fit.events], fit.rows, fit.spin, radius_px)
         moved = gain @ response
         place = moved @ np.diag([position_px**2, position_px**2, radius_std_px**2]) @ moved.T
-        bent = gain @ (fit.speeds[:, None] * self.normals[fit.events])
-        shared = inverse * fit.overlap * max(fit.scale, 1.0) ** 2
-        total: Floats = scatter + shared + place + BIAS**2 * bent @ bent.T
+        bent = BIAS * gain @ (fit.speeds[:, None] * normals)
+        total: Floats = (scatter + fit.overlap * inverse + place + bent @ bent.T) * max(fit.scale, 1.0) ** 2
         return total

@@ -77,9 +77,7 @@ def start(parameters: RateParameters, setting: Setting) -> State:
     return State(setting.max_spin_rps)
 
 
-def step(
-    parameters: RateParameters, state: State, packet: Packet, track: TrackResult, logo: LogoResult
-) -> RateResult:
+def step(parameters: RateParameters, state: State, packet: Packet, track: TrackResult, logo: LogoResult) -> RateResult:
     """The event rate up to the end of the tick and, once it has a rhythm, the spin magnitude behind it.
 
     The magnitude is the rate of the logo's reappearance, seen from the camera: while the ball flies past, the line

@@ -1,9 +1,9 @@
 """Track: Hough circle and Kalman filter together (section 3.1).
 
-The Hough transform finds the ball in the surface: anywhere while there is no track, near the prediction and within
-the radii that the filter allows while there is one. Unlike the paper, which feeds the Hough circle to the filter,
-the filter gets the circle refined on the ball's outline in the events (track_outline): an EROS surface shows the
-outline one to two pixels late on fast balls, the events to a tenth of a pixel.
+The Hough transform finds the ball in the surface: anywhere while there is no track, near the prediction and
+within the radii that the filter allows while there is one. Unlike the paper, which feeds the Hough circle to the
+filter, the filter gets the circle refined on the ball's outline in the events (track_outline): an EROS surface
+shows the outline one to two pixels late on fast balls, the events to a tenth of a pixel.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from ..camera import Setting
 from ..errors import ParameterError
 from ..events import EventBatch
-from ..kernels import contour as kernels
 from ..parameters import ParameterGroup, choice, tunable
 from ..results import Circle, Packet, frozen
 from .filter import FilterResult
 from .surface import SurfaceResult
-from .track_hough import candidates, hough_near
-from .track_kalman import OBSERVED, BallFilter
-from .track_outline import VOTE_US, Edge, Limits, Sighting, measure, sight
+from .track_hough import hough_near
+from .track_kalman import OBSERVED, BallFilter, kalman_class
+from .track_outline import VOTE_US, Edge, Limits, Sighting, measure
+from .track_search import MOST_CANDIDATES, Rivals, agree, look
 
 INPUTS = ("packet", "filter", "surface")
 Status = Literal["searching", "starting", "tracking", "coasting", "lost"]
@@ -41,7 +41,7 @@ class TrackParameters(ParameterGroup):
     radius_max_px: float = tunable(40.0, 3.0, 500.0, 0.5, "px", "largest radius looked for")
     speed_min_m_s: float = tunable(1.0, 0.0, 100.0, 0.1, "m/s", "slowest ball that counts as a shot")
     speed_max_m_s: float = tunable(25.0, 1.0, 200.0, 1.0, "m/s", "fastest ball looked for")
-    latency_us: float = tunable(45.0, 0.0, 10_000.0, 5.0, "us", "how late the pixels report an edge")
+    latency_us: float = tunable(40.0, 0.0, 10_000.0, 5.0, "us", "how late the pixels report an edge")
     lag_px: float = tunable(0.1, -2.0, 5.0, 0.05, "px", "how far the outline seems behind, at any speed")
     outline_px: float = tunable(0.5, 0.0, 5.0, 0.05, "px", "how far outside the ball the pixels see its edge")
     contour_us: int = tunable(3000, 500, 50_000, 100, "us", "how far back in time the outline's events are taken")
@@ -58,7 +58,7 @@ class TrackParameters(ParameterGroup):
 class TrackResult:
     """The ball at the end of the tick, as a robot would have had it.
 
-    status : searching (nothing yet), starting (candidates, not yet trusted), tracking (measured in this tick),
+    status : searching (nothing yet), starting (candidates, not yet trusted), tracking (measured now),
         coasting (predicted, not measured), lost (just given up)
     reason : why there is no ball (searching, starting, lost), in words for people; None while there is one
     shot : number of the shot, from 0; None while there is no ball
@@ -66,7 +66,7 @@ class TrackResult:
     latency_us : that latency; an event stamped t shows the scene of t - latency_us
     mean : (5,) float64 Kalman state [x_px, y_px, vx_px_s, vy_px_s, radius_px]; NaN while there is no ball
     covariance : (5, 5) float64, its covariance
-    hough : the circle of the Hough transform on the surface, before refinement and gating; None if none was found
+    hough : circle of the Hough transform on the surface, before refinement and gating; None if none was found
     measured : the refined circle that entered the filter, None if none did
     candidate : the tick's best circle while the track is not trusted yet (for the viewer)
     """
@@ -88,27 +88,23 @@ class TrackResult:
         return self.status in ("tracking", "coasting")
 
     def centre_px(self, event_t_us: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Centre (x, y) in px at the scene times behind these event time stamps (section 3.2, eq. ball_pos)."""
+        """Centre (x, y) in px at the scene times behind these event times (section 3.2, eq. ball_pos)."""
         dt_s = (event_t_us - self.latency_us - self.t_us) * 1e-6
         return self.mean[0] + self.mean[2] * dt_s, self.mean[1] + self.mean[3] * dt_s
 
 
-# Squared Mahalanobis distance (three degrees of freedom) beyond which an outline is not the ball's: five sigma.
+# Share of the half outline ahead that a tracked ball must show to be measured: a third pins down its circle.
+LEAST_AHEAD = 0.3
+# Squared Mahalanobis distance (three degrees of freedom) beyond which an outline is not the ball's: 5 sigma.
 MOST_SURPRISE = 25.0
 # Scatter of an outline's centre and radius from tick to tick beyond the statistical one, on the samples.
 OUTLINE_STD_PX = 0.05
-# What no filtering takes away: the calibration of latency and outline, between shots of the samples.
+# What no filtering takes away: the calibration of latency, place and radius, which differs from shot to shot.
 LATENCY_STD_US = 12.0
-CALIBRATION_STD_PX = 0.05
-# A second ball takes the track over only when this much faster (a slower one rolls back), or while the first is
-# out of sight and not much slower (a ball that was hit).
+PLACE_STD_PX, RADIUS_STD_PX = 0.06, 0.1
+# A second ball takes the track over only when this much faster (a slower one rolls back), or while the first
+# is out of sight and when not much slower (a ball that was hit).
 RIVAL_SPEED, RIVAL_SPEED_UNSEEN = 1.5, 0.7
-# Beside a track that is seen, other balls are looked for this often: soon enough to find one within 10 ms.
-LOOK_US = 10_000
-# A slower ball is not looked at again for so long; by then it may have left its straight path by half a radius.
-RIVAL_US = 25_000
-# Circles of the full-frame vote looked at in one tick, without a track and beside one.
-MOST_CANDIDATES, MOST_RIVALS = 4, 2
 FREE = np.full(5, 1e9)
 
 
@@ -117,11 +113,11 @@ class TrackState:
     """What the tracker carries from tick to tick."""
 
     setting: Setting
+    limits: Limits
     contour: EventBatch = field(default_factory=EventBatch.empty)
     ball: BallFilter | None = None
-    pending: Sighting | None = None
-    rivals: list[tuple[int, Sighting]] = field(default_factory=list)
-    looked_us: int = 0
+    pending: tuple[int, Sighting] | None = None
+    rivals: Rivals = field(default_factory=Rivals)
     seen_us: int = 0
     shots: int = 0
 
@@ -135,7 +131,16 @@ def start(parameters: TrackParameters, setting: Setting) -> TrackState:
             f"track.radius_min_px = {parameters.radius_min_px:g} must be below "
             f"track.radius_max_px = {parameters.radius_max_px:g}"
         )
-    return TrackState(setting)
+    per_m = 1.0 / setting.ball_radius_m
+    limits = Limits(
+        parameters.radius_min_px,
+        parameters.radius_max_px,
+        parameters.speed_min_m_s * per_m,
+        parameters.speed_max_m_s * per_m,
+    )
+    if parameters.ball == "flying":
+        kalman_class()  # loaded now and not in the middle of a shot
+    return TrackState(setting, limits)
 
 
 def step(
@@ -159,17 +164,21 @@ def step(
 
 
 def _search(parameters: TrackParameters, state: TrackState, packet: Packet, surface: SurfaceResult) -> TrackResult:
-    """A tick without a track: start one from a sighting that is trusted, or that is promising twice in a row."""
-    hough, found = _look(parameters, state, packet, surface, state.contour, MOST_CANDIDATES)
+    """A tick without a track: start one from a sighting that is trusted, or promising for long enough."""
+    camera = state.setting.camera
+    hough, found = look(surface, state.contour, packet.end_us, camera, state.limits, MOST_CANDIDATES)
     pending, state.pending = state.pending, None
     if not found:
         reason = "no ball: no circle in the surface" if hough is None else "no ball: no circle moves like a ball"
         return _no_ball(parameters, packet, "searching", reason, hough)
     best, hough = found[0]
-    again = pending is not None and _agree(pending, best, packet.end_us - packet.start_us)
-    if best.trusted or again:
+    # A second look counts when it shares no events with the first.
+    since_us, first = pending or (packet.end_us, best)
+    apart_us = packet.end_us - since_us
+    same = agree(first, best, apart_us)
+    if best.trusted or (same and apart_us >= parameters.contour_us):
         return _begin(parameters, state, packet, best, hough, state.shots)
-    state.pending = best
+    state.pending = (since_us, first) if same else (packet.end_us, best)
     return _no_ball(
         parameters,
         packet,
@@ -193,24 +202,17 @@ def _follow(
     spread = np.sqrt(np.diag(ball.covariance))
     span = max(2.0, 3.0 * spread[4])
     hough = hough_near(surface, expected[0], expected[1], expected[4] - span, expected[4] + span)
-    # The velocity may leave the prediction by half a ball diameter in 0.1 s and the radius by half a pixel: loose
-    # for a ball wholly in view, and it keeps the fit sane on short arcs.
-    loose = np.array([1e9, 1e9, 10 * expected[4] + spread[2], 10 * expected[4] + spread[3], 0.5])
-    gate = 2.0 + 3.0 * max(spread[0], spread[1])
-    sighting = measure(state.contour, packet.end_us, camera, expected, gate, loose)
-    measured = None
-    if sighting is not None and sighting.ahead >= 0.3:
-        if ball.update(*_observation(parameters, packet, sighting), MOST_SURPRISE):
-            measured = _circle(parameters, sighting)
-            state.seen_us = packet.end_us
+    measured = _update(parameters, state, ball, packet, expected, spread)
     if measured is None:
         bounced = measure(state.contour, packet.end_us, camera, expected, 0.5 * expected[4], FREE)
         if bounced is not None and bounced.trusted and abs(bounced.ring[4] / expected[4] - 1) < 0.1:
             return _begin(parameters, state, packet, bounced, hough, state.shots - 1)
     now = ball.mean
-    if measured is None or packet.end_us - state.looked_us >= LOOK_US:
+    if measured is None or state.rivals.due(packet.end_us):
         least = (RIVAL_SPEED if measured else RIVAL_SPEED_UNSEEN) * math.hypot(now[2], now[3])
-        other = _other_ball(parameters, state, packet, surface, now if measured else None)
+        other = state.rivals.fastest(
+            surface, state.contour, packet.end_us, camera, state.limits, now if measured else None
+        )
         if other is not None and other[0].speed_px_s > least:
             return _begin(parameters, state, packet, *other, state.shots)
     if measured is None and packet.end_us - state.seen_us > parameters.coast_us:
@@ -219,52 +221,30 @@ def _follow(
     return _result(parameters, packet, status, state.shots - 1, now, _honest(ball), hough, measured)
 
 
-def _other_ball(
+def _update(
     parameters: TrackParameters,
     state: TrackState,
+    ball: BallFilter,
     packet: Packet,
-    surface: SurfaceResult,
-    tracked: NDArray[np.float64] | None,
-) -> tuple[Sighting, Circle] | None:
-    """The fastest trusted ball besides the tracked one and those looked at lately."""
-    state.looked_us = packet.end_us
-    state.rivals = [(since, one) for since, one in state.rivals if packet.end_us - since < RIVAL_US]
-    rings = [_moved(one.ring, packet.end_us - since) for since, one in state.rivals]
-    if tracked is not None:
-        rings.append(tracked)
-    events = state.contour
-    for ring in rings:
-        margin = 0.3 * ring[4] + 2.0  # room for trails, and for errors of the older ones
-        events = events[kernels.clear_of(ring, events.t_us, events.x_px, events.y_px, packet.end_us, margin)]
-    _, found = _look(parameters, state, packet, surface, events, MOST_RIVALS)
-    state.rivals += [(packet.end_us, one) for one, _ in found]
-    return found[0] if found and found[0][0].trusted else None
-
-
-def _look(
-    parameters: TrackParameters,
-    state: TrackState,
-    packet: Packet,
-    surface: SurfaceResult,
-    events: EventBatch,
-    most: int,
-) -> tuple[Circle | None, list[tuple[Sighting, Circle]]]:
-    """The best Hough circle anywhere, and those that move like a ball: trusted ones first, then by speed."""
-    per_m = 1.0 / state.setting.ball_radius_m
-    limits = Limits(
-        parameters.radius_min_px,
-        parameters.radius_max_px,
-        parameters.speed_min_m_s * per_m,
-        parameters.speed_max_m_s * per_m,
-    )
-    first: Circle | None = None
-    found: list[tuple[Sighting, Circle]] = []
-    for circle in candidates(surface, events, limits.radius_min_px, limits.radius_max_px, most):
-        first = first or circle
-        sighting = sight(events, packet.end_us, state.setting.camera, circle, limits)
-        if sighting is not None and (sighting.trusted or sighting.promising):
-            found.append((sighting, circle))
-    return first, sorted(found, key=lambda one: (one[0].trusted, one[0].speed_px_s), reverse=True)
+    expected: NDArray[np.float64],
+    spread: NDArray[np.float64],
+) -> Circle | None:
+    """Measure the outline near the expected ring (5,) with 1 sigma spread (5,) and give it to the filter."""
+    # The velocity may leave the prediction by ten radii a second and the radius by half a pixel: loose for a
+    # ball wholly in view, and it keeps the fit sane on short arcs.
+    loose = np.array([1e9, 1e9, 10 * expected[4] + spread[2], 10 * expected[4] + spread[3], 0.5])
+    gate = 2.0 + 3.0 * max(spread[0], spread[1])
+    sighting = measure(state.contour, packet.end_us, state.setting.camera, expected, gate, loose)
+    if sighting is None or sighting.ahead < LEAST_AHEAD:
+        return None
+    observed = _edge(parameters).ball(sighting.ring)[OBSERVED]
+    # Outlines taken further back than one tick share events with the tick before and so count for less.
+    shared = max(1.0, parameters.contour_us / (packet.end_us - packet.start_us))
+    noise = sighting.covariance[OBSERVED[:, None], OBSERVED] + OUTLINE_STD_PX**2 * np.eye(3)
+    if not ball.update(observed, noise * shared, MOST_SURPRISE):
+        return None
+    state.seen_us = packet.end_us
+    return _circle(parameters, sighting)
 
 
 def _begin(
@@ -284,7 +264,7 @@ def _begin(
     covariance[[2, 3], [2, 3]] += (0.2 * per_m) ** 2
     growth = parameters.approach_m_s * per_m * mean[4] / state.setting.camera.focal_px
     state.ball = BallFilter(mean, covariance, parameters.acceleration_m_s2 * per_m, growth)
-    state.pending, state.rivals = None, []
+    state.pending, state.rivals = None, Rivals()
     state.seen_us = packet.end_us
     state.shots = shot + 1
     measured = _circle(parameters, sighting)
@@ -296,26 +276,12 @@ def _end(parameters: TrackParameters, state: TrackState, packet: Packet, reason:
     return _no_ball(parameters, packet, "lost", reason)
 
 
-def _observation(
-    parameters: TrackParameters, packet: Packet, sighting: Sighting
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(3,) [x, y, radius] and its covariance (3, 3), for one step of the filter.
-
-    Outlines taken further back than one tick share events with the tick before and so count for less.
-    """
-    observed = _edge(parameters).ball(sighting.ring)[OBSERVED]
-    shared = max(1.0, parameters.contour_us / (packet.end_us - packet.start_us))
-    noise = sighting.covariance[OBSERVED[:, None], OBSERVED]
-    noise[[0, 1, 2], [0, 1, 2]] += OUTLINE_STD_PX**2
-    return observed, noise * shared
-
-
 def _honest(ball: BallFilter) -> NDArray[np.float64]:
     """The filter's covariance plus the errors that every tick has in common."""
     covariance = ball.covariance
     late = ball.mean[2:4] * LATENCY_STD_US * 1e-6
     covariance[:2, :2] += np.outer(late, late)
-    covariance[OBSERVED, OBSERVED] += CALIBRATION_STD_PX**2
+    covariance[OBSERVED, OBSERVED] += np.array([PLACE_STD_PX, PLACE_STD_PX, RADIUS_STD_PX]) ** 2
     return covariance
 
 
@@ -329,24 +295,6 @@ def _circle(parameters: TrackParameters, sighting: Sighting) -> Circle:
     return Circle(x, y, radius, sighting.score)
 
 
-def _moved(ring: NDArray[np.float64], by_us: int) -> NDArray[np.float64]:
-    """The ring (5,) that much later."""
-    later = ring.copy()
-    later[:2] += ring[2:4] * by_us * 1e-6
-    return later
-
-
-def _agree(before: Sighting, now: Sighting, tick_us: int) -> bool:
-    """Whether a sighting is the one of the tick before, moved on."""
-    off = (now.ring - _moved(before.ring, tick_us))[:2]
-    turned = now.ring[2:4] - before.ring[2:4]
-    return bool(
-        np.hypot(*off) <= 2.0 + 0.1 * before.speed_px_s * tick_us * 1e-6
-        and abs(now.ring[4] - before.ring[4]) <= 1.0 + 0.1 * before.ring[4]
-        and np.hypot(*turned) <= 0.3 * before.speed_px_s
-    )
-
-
 def _beyond(mean: NDArray[np.float64], width_px: int, height_px: int) -> bool:
     """Whether hardly anything of the ball is in the image."""
     x, y, margin = mean[0], mean[1], 0.8 * mean[4]
@@ -357,8 +305,8 @@ def _fixed_ring(parameters: TrackParameters) -> NDArray[np.float64]:
     x, y, radius = parameters.fixed_x_px, parameters.fixed_y_px, parameters.fixed_radius_px
     if x is None or y is None or radius is None:
         raise ParameterError(
-            "track.ball = fixed needs the ball's place: give --fixed-ball X_PX Y_PX RADIUS_PX or --fixed-ball auto "
-            "(track.fixed_x_px, track.fixed_y_px, track.fixed_radius_px)"
+            "track.ball = fixed needs the ball's place: give --fixed-ball X_PX Y_PX RADIUS_PX or --fixed-ball "
+            "auto (track.fixed_x_px, track.fixed_y_px, track.fixed_radius_px)"
         )
     return np.array([x, y, 0.0, 0.0, radius])
 

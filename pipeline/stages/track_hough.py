@@ -1,4 +1,4 @@
-"""Hough circles for the tracker: one near a prediction, candidates anywhere, and the one of a single image."""
+"""Hough circles for the tracker: near a prediction, anywhere in the surface, and in a single image."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def hough_near(
     radius_to_px: float,
     reach_px: int = REACH_PX,
 ) -> Circle | None:
-    """The best circle of the surface with its centre within reach_px of this place and a radius between these.
+    """The surface's best circle with its centre within reach_px of this place and a radius between these.
 
     None when no edge pixel votes for such a circle.
     """
@@ -78,13 +78,14 @@ def candidates(
         support, a, b, k = kernels.peak(votes, first_radius)
         if support < 1.0:
             return
-        centre = (np.array([left + a, top + b]) + 0.5) * CELL_PX - 0.5
+        x, y = ((left + a + 0.5) * CELL_PX - 0.5, (top + b + 0.5) * CELL_PX - 0.5)
         radius = (first_radius + k) * CELL_PX
         near = max(1, (first_radius + k) // 2)
         votes[max(0, b - near) : b + near + 1, max(0, a - near) : a + near + 1] = 0
         found = hough_near(
             surface,
-            *centre,
+            x,
+            y,
             max(radius - 1.5 * CELL_PX, radius_min_px),
             min(radius + 1.5 * CELL_PX, radius_max_px),
             2 * CELL_PX,
@@ -96,10 +97,10 @@ def candidates(
 def find_circle(image: NDArray[Any], radius_min_px: float, radius_max_px: float) -> Circle | None:
     """The circle that the set pixels of one image draw best, to sub-pixel; None when they draw none.
 
-    image : (height, width) bool or uint8; pixels of at least half its maximum count. For single frames without
-        times and polarities, such as accumulated events; the centre may lie outside the image.
-    The score is the share of the outline's directions (out of 24) that have a pixel within 1.5 px; less than half
-    is no circle.
+    image : (height, width) bool or uint8; pixels of at least half its maximum count. For single frames
+        without times and polarities, such as accumulated events; the centre may lie outside the image.
+    The score is the share of the outline's directions (out of 24) that have a pixel within 1.5 px; less than
+    half is no circle.
     """
     pixels = np.ascontiguousarray(image).view(np.uint8)
     brightest = int(pixels.max(initial=0))

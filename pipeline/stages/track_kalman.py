@@ -11,6 +11,13 @@ Floats = NDArray[np.float64]
 OBSERVED = np.array([0, 1, 4])
 
 
+def kalman_class() -> Any:
+    """filterpy's KalmanFilter; the first call loads scipy.stats with it, which takes two seconds."""
+    from filterpy.kalman import KalmanFilter
+
+    return KalmanFilter
+
+
 class BallFilter:
     """filterpy's Kalman filter with the paper's F and H, and process noise from what moves a ball.
 
@@ -19,9 +26,7 @@ class BallFilter:
     """
 
     def __init__(self, mean: Floats, covariance: Floats, acceleration_px_s2: float, growth_px_s: float) -> None:
-        from filterpy.kalman import KalmanFilter  # loads scipy.stats, which takes two seconds
-
-        kalman: Any = KalmanFilter(dim_x=5, dim_z=3)
+        kalman = kalman_class()(dim_x=5, dim_z=3)
         kalman.x = np.array(mean, np.float64)
         kalman.P = np.array(covariance, np.float64)
         kalman.H = np.eye(5)[OBSERVED]
@@ -60,8 +65,8 @@ class BallFilter:
     def update(self, observed: Floats, noise: Floats, most_surprise: float) -> bool:
         """Take in an observation (3,) [x, y, radius] with covariance noise (3, 3), unless it is no match.
 
-        Returns False, and leaves the state as predicted, when its squared Mahalanobis distance from the prediction
-        exceeds most_surprise.
+        Returns False, and leaves the state as predicted, when its squared Mahalanobis distance from the
+        prediction exceeds most_surprise.
         """
         kalman = self._kalman
         mean, covariance = kalman.x, kalman.P

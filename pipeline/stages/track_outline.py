@@ -1,8 +1,8 @@
 """The ball's outline measured in the events, to sub-pixel: the refinement of the tracker's Hough circles.
 
 Only the half of the outline that moves outwards is fitted, the background-to-ball edge: it is as sharp as the
-pixels allow whatever the light. At the other half the ball's own shading fires before the edge comes, by up to
-0.8 px on the samples, which differs from shot to shot.
+pixels allow whatever the light. At the other half the ball's own shading fires before the edge comes, by up
+to 0.8 px on the samples, which differs from shot to shot.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from ..results import Circle
 
 Floats = NDArray[np.float64]
 
-# Events used for a fit: beyond this the pixels' common errors outweigh the statistical one (0.1 px / sqrt(n)).
+# Events used for a fit: beyond this the pixels' common errors outweigh the statistical, 0.1 px / sqrt(n).
 MOST_EVENTS = 300
-# An event this near the fitted outline supports it: four times the scatter seen on clean outlines (0.1-0.15 px),
-# and room for the early events behind.
+# An event this near the fitted outline supports it: the scatter on clean outlines is 0.1-0.15 px, on a dim or
+# textured scene three times as much.
 ON_OUTLINE_PX = 1.2
 # Behind, the ball's shading fires up to a fifth of the radius before the edge comes.
 EARLY_SHARE = 0.2
@@ -50,7 +50,8 @@ class Limits:
 class Edge:
     """How the outline that the pixels report differs from the ball's.
 
-    It lies outline_px outside, because a pixel answers as soon as part of it sees the ball, and lag_px behind.
+    It lies outline_px outside, because a pixel answers as soon as part of it sees the ball, and lag_px
+    behind.
     """
 
     outline_px: float
@@ -109,7 +110,7 @@ class Sighting:
 
     @property
     def trusted(self) -> bool:
-        """Whether this one outline alone is enough to start a track: both halves, each of its own polarity."""
+        """Whether this outline alone is enough to start a track: both halves, each of its own polarity."""
         return (
             self.ahead >= 0.8
             and self.behind >= 0.6
@@ -125,7 +126,7 @@ class Sighting:
 
 
 def oval_of(camera: Camera, x_px: float, y_px: float) -> Floats:
-    """(2,) float64 departure from a circle of a sphere's outline around this pixel, as the contour kernels take it.
+    """(2,) float64 departure from a circle of a sphere's outline around this pixel (see the contour kernels).
 
     The semi-axes are as 1 to cos(theta), the longer one pointing away from the principal point (`Camera`).
     """
@@ -146,14 +147,13 @@ def measure(
     gate_px: float,
     prior_std: Floats,
 ) -> Sighting | None:
-    """Fit the outline near an expected ring (5,) at end_us; None when there are too few events or no ring results.
+    """Fit the outline near an expected ring (5,) at end_us; None with too few events or without a result.
 
-    gate_px : events this near the expected outline take part; prior_std (5,) : how firmly the expectation holds
+    gate_px : events this near the expected outline take part
+    prior_std : (5,) how firmly the expectation holds
     """
     oval = oval_of(camera, expected[0], expected[1])
-    chosen = kernels.near_outline(
-        expected, events.t_us, events.x_px, events.y_px, end_us, gate_px, MOST_EVENTS, True
-    )
+    chosen = kernels.near_outline(expected, events.t_us, events.x_px, events.y_px, end_us, gate_px, MOST_EVENTS, True)
     if chosen.size < 12:
         return None
     ring, covariance, scatter, weight = kernels.fit_ring(
@@ -174,7 +174,14 @@ def _judged(
     oval: Floats,
 ) -> Sighting:
     around = kernels.near_outline(
-        ring, events.t_us, events.x_px, events.y_px, end_us, max(4 * ON_OUTLINE_PX, EARLY_SHARE * ring[4]), 400, False
+        ring,
+        events.t_us,
+        events.x_px,
+        events.y_px,
+        end_us,
+        max(4 * ON_OUTLINE_PX, EARLY_SHARE * ring[4]),
+        400,
+        False,
     )
     found, ahead_on, behind_on, ahead, behind, visible, outside, _ = kernels.support(
         ring,
@@ -202,21 +209,19 @@ def _judged(
 
 
 def sight(events: EventBatch, end_us: int, camera: Camera, circle: Circle, limits: Limits) -> Sighting | None:
-    """The moving outline behind a Hough circle: its velocity by vote, then the fit; None when there is none."""
+    """The moving outline behind a Hough circle: velocity by vote, then the fit; None when there is none."""
     radius = circle.radius_px
     fastest = limits.speed_max_radii_s * radius
     recent = events.between(end_us - VOTE_US, end_us)
     reach = 1.3 * radius + fastest * VOTE_US * 1e-6
-    chosen = np.flatnonzero(
-        (np.abs(recent.x_px - circle.x_px) <= reach) & (np.abs(recent.y_px - circle.y_px) <= reach)
-    )
+    chosen = np.flatnonzero((np.abs(recent.x_px - circle.x_px) <= reach) & (np.abs(recent.y_px - circle.y_px) <= reach))
     chosen = chosen[:: max(1, chosen.size // MOST_VOTERS)]
     if chosen.size < 12:
         return None
     columns = _columns(recent, chosen, end_us)
     ring = np.array([circle.x_px, circle.y_px, 0.0, 0.0, radius])
-    # Two rounds: all velocities with an outline as wide as the steps, then between them. The second width is what
-    # a Hough circle may be off, about 2 px on balls of 20 px.
+    # Two rounds: all velocities with an outline as wide as the steps, then between them. The second width is
+    # what a Hough circle may be off, about 2 px on balls of 20 px.
     for gate, span in ((0.3 * radius, fastest), (max(2.0, 0.15 * radius), 0.3 * radius / (VOTE_US * 1e-6))):
         velocity_step = gate / (VOTE_US * 1e-6)
         m = math.ceil(span / velocity_step)
@@ -240,8 +245,5 @@ def sight(events: EventBatch, end_us: int, camera: Camera, circle: Circle, limit
 
 def _columns(events: EventBatch, chosen: NDArray[np.int64], end_us: int) -> tuple[Floats, Floats, Floats]:
     """Seconds after end_us, and pixels, of the chosen events, as float64."""
-    return (
-        (events.t_us[chosen] - end_us) * 1e-6,
-        events.x_px[chosen].astype(np.float64),
-        events.y_px[chosen].astype(np.float64),
-    )
+    tau_s = np.asarray((events.t_us[chosen] - end_us) * 1e-6, np.float64)
+    return tau_s, events.x_px[chosen].astype(np.float64), events.y_px[chosen].astype(np.float64)

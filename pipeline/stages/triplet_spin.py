@@ -37,8 +37,8 @@ class TripletSpin:
 
     Magnitude: section 3.3 takes "a better estimate of the spin magnitude" from the event rate, and only that explains
     the errors of 0.5 rps with 0.1 rps spread at 100 ms beside 30 rps at 10 ms (table 1). So once the event rate has
-    a rhythm, it gives the magnitude (and t_acc) and the flow gives the axis; `triplet_magnitude = flow` uses it for
-    t_acc alone.
+    a rhythm, it gives the magnitude (and t_acc) and the flow gives the axis; `magnitude_from = flow` uses it for t_acc
+    alone.
     """
 
     def __init__(self, parameters: SpinParameters, setting: Setting) -> None:
@@ -65,7 +65,7 @@ class TripletSpin:
                 return SpinEstimate.refused("triplet", "the logo is seen from one side only", int(counts.sum()))
             spin, covariance = _full_rank(matrix, moments, squares)
         vector_rps, covariance_rps2 = spin / (2 * math.pi), covariance / (2 * math.pi) ** 2
-        if self.parameters.triplet_magnitude == "rate" and rate.spin_rps is not None:
+        if self.parameters.magnitude_from == "rate" and rate.spin_rps is not None:
             vector_rps, covariance_rps2 = _with_magnitude(vector_rps, covariance_rps2, rate)
         return SpinEstimate("triplet", vector_rps, covariance_rps2, None, int(counts.sum()))
 

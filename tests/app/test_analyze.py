@@ -46,7 +46,7 @@ def test_reports_keep_the_schema(reports: dict[str, dict[str, Any]], name: str) 
 
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_track_and_speed_are_the_truths(reports: dict[str, dict[str, Any]], samples: Path, name: str) -> None:
-    """The accuracy that the README promises: centre 0.3 px, radius 0.5 px, while the whole ball is in view."""
+    """What the README promises: centre to 0.3 px, radius to 0.5 px, while the whole ball is in view."""
     with h5py.File(samples / f"{name}.h5") as file:
         t, x, y, r = (file[f"truth/{key}"][:] for key in ("t_us", "x_px", "y_px", "radius_px"))
         velocity = file["truth/velocity_m_s"][:]
@@ -78,8 +78,9 @@ def test_a_trusted_answer_is_right_and_a_hidden_logo_is_refused(
 
 
 def test_a_window_uses_its_events_only(samples: Path) -> None:
-    done = spinscope("analyze", samples / "spinner_ball2_side.h5", "--fixed-ball", 528.43, 426.87, 16.49,
-                     "--window", 20_000, 30_000, "--json", "-")  # fmt: skip
+    ball = ("--fixed-ball", 528.43, 426.87, 16.49)
+    window = ("--window", 20_000, 30_000)
+    done = spinscope("analyze", samples / "spinner_ball2_side.h5", *ball, *window, "--json", "-")
     report = json.loads(done.stdout)
     assert report["recording"]["duration_us"] == 10_000
     shot = report["shots"][0]
@@ -88,8 +89,8 @@ def test_a_window_uses_its_events_only(samples: Path) -> None:
 
 
 def test_one_method_only(samples: Path) -> None:
-    done = spinscope("analyze", samples / "spinner_ball2_side.h5", "--fixed-ball", "auto", "--method", "triplet",
-                     "--json", "-")  # fmt: skip
+    chosen = ("--fixed-ball", "auto", "--method", "triplet")
+    done = spinscope("analyze", samples / "spinner_ball2_side.h5", *chosen, "--json", "-")
     report = json.loads(done.stdout)
     assert list(report["shots"][0]["spin"]) == ["triplet"]
     assert any("fixed ball found" in warning for warning in report["warnings"])

@@ -1,4 +1,4 @@
-"""The chain's bookkeeping, with toy stages that count what they do: what is re-run, kept, forgotten and resumed."""
+"""The chain's bookkeeping, with toy stages that count: what is re-run, kept, forgotten and resumed."""
 
 from __future__ import annotations
 

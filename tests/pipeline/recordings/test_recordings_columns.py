@@ -125,12 +125,8 @@ def test_damaged_ecf_blocks_are_refused_not_misread(tmp_path: Path) -> None:
             assert decode_ecf(_room(300), np.frombuffer(bytes(data), np.uint8)) <= 300
 
 
-@pytest.mark.parametrize(
-    "places", [("/", "width_height"), ("events", "width_height"), ("events", "geometry")]
-)
-def test_the_file_says_its_sensor_and_the_command_line_beats_it(
-    tmp_path: Path, places: tuple[str, str]
-) -> None:
+@pytest.mark.parametrize("places", [("/", "width_height"), ("events", "width_height"), ("events", "geometry")])
+def test_the_file_says_its_sensor_and_the_command_line_beats_it(tmp_path: Path, places: tuple[str, str]) -> None:
     path = tmp_path / "a.h5"
     write_columns(path, some_columns())
     with h5py.File(path, "a") as file:
@@ -250,9 +246,7 @@ def test_small_disorder_is_sorted_as_by_the_twin(
 
 @settings(max_examples=30)
 @given(st.integers(0, 1_000_100), st.integers(-10, 400_000), st.sampled_from(["h5", "npz"]))
-def test_a_window_is_the_events_of_it(
-    window_files: dict[str, Recording], start: int, span: int, kind: str
-) -> None:
+def test_a_window_is_the_events_of_it(window_files: dict[str, Recording], start: int, span: int, kind: str) -> None:
     recording = window_files[kind]
     t = some_columns()["t"]
     inside = (t >= start) & (t < start + span)
@@ -293,9 +287,7 @@ def test_npz_may_hold_one_array_of_records(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["h5", "npz"])
-def test_floating_times_are_seconds_with_fractions_and_microseconds_without(
-    tmp_path: Path, kind: str
-) -> None:
+def test_floating_times_are_seconds_with_fractions_and_microseconds_without(tmp_path: Path, kind: str) -> None:
     columns = some_columns()
     for times, unit in ((columns["t"] * 1e-6, "seconds"), (columns["t"].astype(float), "microseconds")):
         path = tmp_path / f"{unit}.{kind}"
@@ -324,7 +316,7 @@ def test_objects_in_npz_are_refused_without_opening_them(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("kind", ["h5", "npz"])
 def test_bombs_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
-    """Zeros that pack a thousand times; the size from which that is refused is lowered to 1 MB for the test."""
+    """Zeros that pack a thousand times; what is too small to be refused is lowered to 1 MB."""
     monkeypatch.setattr("pipeline.recordings.columns.EXPANSION_FREE_BYTES", 1 << 20)
     path, zeros = tmp_path / f"bomb.{kind}", dict.fromkeys("txyp", np.zeros(3_000_000, np.int8))
     if kind == "h5":
@@ -337,7 +329,7 @@ def test_bombs_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind
 
 @pytest.mark.parametrize("kind", ["h5", "npz"])
 def test_flipped_bits_and_cuts_are_refused_or_read_in_order(tmp_path: Path, kind: str) -> None:
-    """600 damaged files: one line or events that keep the rules, never a traceback."""
+    """400 damaged files: one line or events that keep the rules, never a traceback."""
     events = EventBatch.checked(**_arguments(some_columns(400)), width_px=640, height_px=480)
     path = tmp_path / f"a.{kind}"
     if kind == "h5":
@@ -346,7 +338,7 @@ def test_flipped_bits_and_cuts_are_refused_or_read_in_order(tmp_path: Path, kind
         write_npz(path, events, width_px=640, height_px=480)
     whole = path.read_bytes()
     rng = np.random.default_rng(5)
-    for k in range(600):
+    for k in range(400):
         data = bytearray(whole)
         if k % 6 == 0:
             data = data[: int(rng.integers(1, len(data)))]
@@ -378,3 +370,48 @@ def test_an_unfinished_file_is_refused(tmp_path: Path) -> None:
             data[:300] = 1
     with pytest.raises(RecordingError, match="only 3 of 10 blocks of /events/"):
         open_recording(tmp_path / "a.h5")
+
+
+def test_dat_files_are_read_and_their_times_wrap(tmp_path: Path) -> None:
+    columns = some_columns()
+    t = columns["t"] + 2**32 - 500_000  # wraps in the middle
+    words = np.stack([t % 2**32, columns["x"] | columns["y"] << 14 | columns["p"] << 28], axis=1).astype("<u4")
+    header = b"% Data file containing CD events.\n% Version 2\n% Height 480\n% Width 640\n"
+    path = tmp_path / "a.dat"
+    path.write_bytes(header + b"\x0c\x08" + words.tobytes() + b"cut")
+    recording = open_recording(path)
+    assert_columns(recording.read(), {**columns, "t": t})
+    parts = EventBatch.concatenate(recording.chunks(max_events=333))
+    assert_columns(parts, {**columns, "t": t})
+    assert (recording.width_px, recording.height_px, recording.sensor_from) == (640, 480, "file")
+    assert recording.events == N and recording.damage.lost_bytes == 3
+    path.write_bytes(header + b"\x0e\x08" + words.tobytes())
+    with pytest.raises(RecordingError, match="holds events of kind 14"):
+        open_recording(path)
+    path.write_bytes(header)
+    assert len(open_recording(path).read()) == 0
+
+
+@pytest.mark.parametrize("places", ["root", "events"])
+def test_a_damaged_heap_of_texts_does_not_hold_the_reader_up(tmp_path: Path, places: str) -> None:
+    """Flips in every byte of the heap's heads: HDF5 itself goes round for ever on some of them."""
+    path = tmp_path / "a.h5"
+    write_columns(path, some_columns(20))
+    with h5py.File(path, "a") as file:
+        file["/" if places == "root" else "events"].attrs["geometry"] = "640x480"
+    whole = path.read_bytes()
+    heap = whole.index(b"GCOL")
+    for place in range(heap, heap + 56):
+        for bit in range(0, 8, 3):
+            data = bytearray(whole)
+            data[place] ^= 1 << bit
+            path.write_bytes(data)
+            try:
+                assert len(open_recording(path).read()) <= 20
+            except RecordingError as error:
+                assert "damaged" in str(error)
+    data = bytearray(whole)
+    data[heap + 40 : heap + 56] = bytes(16)  # free space of size 0
+    path.write_bytes(data)
+    with pytest.raises(RecordingError, match="a heap of texts without end"):
+        open_recording(path)

@@ -116,9 +116,7 @@ def test_an_empty_recording_can_be_read(tmp_path: Path) -> None:
     write_recording(tmp_path / "a.h5", nothing, width_px=64, height_px=64)
     for kind in ("npz", "raw", "h5"):
         recording = open_recording(tmp_path / f"a.{kind}")
-        assert (
-            len(recording.read()) == 0 and len(recording.read(0, 100)) == 0 and len(recording.triggers) == 0
-        )
+        assert len(recording.read()) == 0 and len(recording.read(0, 100)) == 0 and len(recording.triggers) == 0
 
 
 def test_batches_do_not_change_when_reading_goes_on(tmp_path: Path) -> None:

@@ -40,9 +40,7 @@ EVT2_WORDS = st.lists(
         evt2_word,
         st.sampled_from([0x0, 0x1, 0x1, 0x8, 0x8, 0xA, 0xE, 0xF, 0x3]),
         st.integers(0, (1 << 28) - 1),
-        st.one_of(
-            st.integers(0, 300), st.integers((1 << 28) - 300, (1 << 28) - 1), st.integers(0, (1 << 28) - 1)
-        ),
+        st.one_of(st.integers(0, 300), st.integers((1 << 28) - 300, (1 << 28) - 1), st.integers(0, (1 << 28) - 1)),
     ),
     max_size=60,
 )
@@ -191,9 +189,7 @@ def test_time_wraps_and_goes_on(tmp_path: Path) -> None:
 @st.composite
 def recordings(draw: st.DrawFn) -> tuple[EventBatch, Triggers]:
     """Up to 40 events and 5 triggers with gaps from nothing to an hour."""
-    gap = st.one_of(
-        st.integers(0, 3), st.integers(0, 9000), st.integers(0, 20_000_000), st.integers(0, 3_600_000_000)
-    )
+    gap = st.one_of(st.integers(0, 3), st.integers(0, 9000), st.integers(0, 20_000_000), st.integers(0, 3_600_000_000))
     t = np.cumsum(draw(st.lists(gap, max_size=40)), dtype=np.int64)
     edges = np.sort(np.array(draw(st.lists(st.integers(0, 10**8), max_size=5)), np.int64))
     seed = draw(st.integers(0, 2**32 - 1))
@@ -205,9 +201,7 @@ def recordings(draw: st.DrawFn) -> tuple[EventBatch, Triggers]:
         rng.integers(0, 2, t.size).astype(np.bool_),
     )
     n = edges.size
-    return events, Triggers(
-        edges, rng.integers(0, 2, n).astype(np.uint8), rng.integers(0, 16, n).astype(np.uint8)
-    )
+    return events, Triggers(edges, rng.integers(0, 2, n).astype(np.uint8), rng.integers(0, 16, n).astype(np.uint8))
 
 
 @settings(max_examples=60)
@@ -242,18 +236,13 @@ def test_late_events_of_raw_files_are_dropped_and_said(tmp_path: Path) -> None:
 
 @given(EVT3_WORDS)
 @settings(max_examples=50)
-def test_a_raw_recording_is_its_words_in_order(
-    tmp_path_factory: pytest.TempPathFactory, words: list[int]
-) -> None:
+def test_a_raw_recording_is_its_words_in_order(tmp_path_factory: pytest.TempPathFactory, words: list[int]) -> None:
     recording = raw_of_words(tmp_path_factory.mktemp("raw") / "words.raw", words)
     found = recording.read()
     twin = naive_evt3(words)
     ordered, backward, late = naive_order(twin.events)
     inside = [event for event in ordered if event[1] < 1280 and event[2] < 720]
-    assert (
-        list(zip(*(c.tolist() for c in (found.t_us, found.x_px, found.y_px, found.on)), strict=True))
-        == inside
-    )
+    assert list(zip(*(c.tolist() for c in (found.t_us, found.x_px, found.y_px, found.on)), strict=True)) == inside
     damage = recording.damage
     assert (damage.backward_steps, damage.late_events) == (backward, late)
     assert damage.outside_events == twin.outside + len(ordered) - len(inside)
@@ -271,18 +260,14 @@ def test_a_raw_recording_is_its_words_in_order(
         (b"% evt 3.0\n% geometry 0x0\n% end\n", (304, 240), "guess"),
     ],
 )
-def test_headers_old_and_new_say_the_sensor(
-    tmp_path: Path, header: bytes, size: tuple[int, int], source: str
-) -> None:
+def test_headers_old_and_new_say_the_sensor(tmp_path: Path, header: bytes, size: tuple[int, int], source: str) -> None:
     recording = raw_of_words(tmp_path / "a.raw", [0x8001, 0x6000, 0x0005, 0x2001], header)
     assert (recording.width_px, recording.height_px) == size and recording.sensor_from == source
     assert len(recording.read()) == 1
     assert bool(recording.warnings) == (source == "guess")
 
 
-@pytest.mark.parametrize(
-    "head", [b"% camera x\n% end\n", b"% evt 4.0\n% end\n", b"% format HISTO3D\n% end\n"]
-)
+@pytest.mark.parametrize("head", [b"% camera x\n% end\n", b"% evt 4.0\n% end\n", b"% format HISTO3D\n% end\n"])
 def test_other_encodings_are_refused(tmp_path: Path, head: bytes) -> None:
     (tmp_path / "a.raw").write_bytes(head + bytes(8))
     with pytest.raises(RecordingError, match=r"EVT2, EVT2\.1 and EVT3 are read.*a\.raw$"):

@@ -18,9 +18,7 @@ from tests.pipeline.recordings.test_recordings_raw import moving_edge
 
 @settings(max_examples=40)
 @given(st.lists(st.integers(0, 9000), max_size=80), st.integers(1, 9))
-def test_summary_is_what_plain_sums_say(
-    tmp_path_factory: pytest.TempPathFactory, times: list[int], batch: int
-) -> None:
+def test_summary_is_what_plain_sums_say(tmp_path_factory: pytest.TempPathFactory, times: list[int], batch: int) -> None:
     path = tmp_path_factory.mktemp("summary") / "a.npz"
     t = np.sort(np.array(times, np.int64))
     n = t.size
@@ -44,13 +42,9 @@ def test_summary_is_what_plain_sums_say(
 
 
 def test_summary_is_ready_for_json(tmp_path: Path) -> None:
-    write_recording(
-        tmp_path / "a.h5", moving_edge(900), width_px=1280, height_px=720, attributes={"lens": "x"}
-    )
+    write_recording(tmp_path / "a.h5", moving_edge(900), width_px=1280, height_px=720, attributes={"lens": "x"})
     found = json.loads(json.dumps(summary(open_recording(tmp_path / "a.h5")).as_dict()))
-    assert {"format", "width", "height", "events", "duration_us", "on_share", "triggers", "damage"} <= set(
-        found
-    )
+    assert {"format", "width", "height", "events", "duration_us", "on_share", "triggers", "damage"} <= set(found)
     assert found["events"] == 900 and found["width"] == 1280
 
 
@@ -67,11 +61,11 @@ def test_hot_pixels_are_the_simulators(samples: Path, name: str) -> None:
     assert info.hot_share == pytest.approx(hot.mean(), rel=1 / 3)
 
 
-def test_a_line_that_keeps_firing_is_not_hot(tmp_path: Path) -> None:
-    """A slanted line of pixels with 50 events each, and one hot pixel away from it."""
-    line = np.repeat(np.arange(10, 50), 50)
-    x = np.concatenate([line, np.full(50, 5)]).astype(np.uint16)
-    y = np.concatenate([line, np.full(50, 40)]).astype(np.uint16)
+def test_an_outline_that_keeps_firing_is_not_hot(tmp_path: Path) -> None:
+    """A circle of 1 pixel with 50 events each, as of a spinner's ball, and one hot pixel away from it."""
+    angle = np.linspace(0, 2 * np.pi, 400)
+    circle = np.unique(np.rint(40 + 16 * np.stack([np.cos(angle), np.sin(angle)])).astype(np.uint16), axis=1)
+    x, y = np.repeat(np.append(circle, [[5], [40]], axis=1), 50, axis=1).astype(np.uint16)
     t = np.arange(x.size, dtype=np.int64) * 100
     order = np.random.default_rng(0).permutation(x.size)
     write_npz(tmp_path / "a.npz", EventBatch(t, x[order], y[order], np.ones(x.size, np.bool_)))

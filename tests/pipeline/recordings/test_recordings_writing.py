@@ -31,9 +31,7 @@ def any_events(draw: st.DrawFn) -> EventBatch:
 
 @settings(max_examples=40)
 @given(any_events(), st.sampled_from(["h5", "npz"]))
-def test_round_trips_are_exact(
-    tmp_path_factory: pytest.TempPathFactory, events: EventBatch, kind: str
-) -> None:
+def test_round_trips_are_exact(tmp_path_factory: pytest.TempPathFactory, events: EventBatch, kind: str) -> None:
     path = tmp_path_factory.mktemp("round") / f"a.{kind}"
     if kind == "h5":
         write_recording(path, events, width_px=65535, height_px=65535)
@@ -64,9 +62,7 @@ def test_our_own_layout_is_as_promised(tmp_path: Path) -> None:
     events = moving_edge(1000)
     truth = some_truth(events)
     attributes = {"camera.focal_length_mm": 12.0, "note": "a text"}
-    write_recording(
-        tmp_path / "a.h5", events, width_px=1280, height_px=720, attributes=attributes, truth=truth
-    )
+    write_recording(tmp_path / "a.h5", events, width_px=1280, height_px=720, attributes=attributes, truth=truth)
     with h5py.File(tmp_path / "a.h5") as file:
         assert set(file) == {"events", "truth"} and set(file["events"]) == {"t", "x", "y", "p"}
         kinds = {name: (data.dtype.str, data.compression) for name, data in file["events"].items()}
@@ -100,9 +96,7 @@ def test_npz_has_the_promised_columns(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("first", ["h5", "npz", "raw"])
 @pytest.mark.parametrize("second", ["h5", "hdf5", "npz", "raw"])
-def test_conversion_keeps_events_and_what_the_format_can_hold(
-    tmp_path: Path, first: str, second: str
-) -> None:
+def test_conversion_keeps_events_and_what_the_format_can_hold(tmp_path: Path, first: str, second: str) -> None:
     events = moving_edge(2000)
     edges = Triggers(np.array([4_000_100, 4_100_000]), np.array([1, 0], np.uint8), np.array([0, 6], np.uint8))
     source, target = tmp_path / f"a.{first}", tmp_path / f"b.{second}"
@@ -198,9 +192,7 @@ def test_what_no_reader_would_take_back_is_not_written(tmp_path: Path) -> None:
         with pytest.raises(RecordingError, match="state a larger sensor"):
             write(tmp_path / name, events, width_px=1280, height_px=20)
     with pytest.raises(RecordingError, match="one an event is needed"):
-        write_recording(
-            tmp_path / "a.h5", events, width_px=1280, height_px=720, truth=some_truth(events[:10])
-        )
+        write_recording(tmp_path / "a.h5", events, width_px=1280, height_px=720, truth=some_truth(events[:10]))
     early = EventBatch(events.t_us - 10**9, events.x_px, events.y_px, events.on)
     with pytest.raises(RecordingError, match="do not fit in EVT3"):
         write_raw(tmp_path / "a.raw", early, width_px=1280, height_px=720)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import itertools
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -130,7 +131,7 @@ def test_stop_and_resume_gives_the_same(
 
 def test_results_hold_no_state(ticks: list[Tick]) -> None:
     """No two ticks' results share memory that someone could still write to."""
-    for one, other in zip(ticks, ticks[1:], strict=False):
+    for one, other in itertools.pairwise(ticks):
         for name in STAGES:
             arrays = [a for _, a in leaves(getattr(one, name)) if isinstance(a, np.ndarray) and a.size]
             later = [a for _, a in leaves(getattr(other, name)) if isinstance(a, np.ndarray) and a.size]

@@ -1,0 +1,243 @@
+"""`spinscope simulate`: a scene of the simulator as a recording with exact truth."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.biases import PAPER, BiasParameters, read_biases
+from pipeline.camera import Camera, CameraParameters
+from pipeline.errors import ParameterError, RecordingError
+from pipeline.parameters import ParameterGroup, choice, switch, tunable
+from pipeline.recordings import open_recording, write_npz, write_raw, write_recording
+from pipeline.simulator import Background, Light, Scene, SimulatedRecording, flight, rally, simulate, spinner
+from pipeline.simulator import simulate_again as simulated_again
+from pipeline.simulator.recipes import FLIGHT_KINDS
+
+Progress = Callable[[float, str], None]  # share done (0..1) and what is being done
+
+KINDS = ("spinner", "flight", "rally")
+# At 1000 rps an outline crosses 0.25 px, the simulator's step, in 2.4 us. The fastest spin measured: 152 rps.
+MAX_SPIN_RPS = 1000.0
+DESCRIPTION = "simulation"  # root attribute: what `simulate_again` needs, as JSON
+BIASES = "biases"  # root attribute: the biases alone, as JSON
+SUFFIXES = (".h5", ".hdf5", ".raw", ".npz")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulateParameters(ParameterGroup):
+    """What can be chosen of a scene; none = the kind's own default, or drawn from the seed."""
+
+    seed: int = tunable(0, 0, 2**31 - 1, 1, "", "same seed and options, same events")
+    spin: str = choice("top", (*FLIGHT_KINDS, "side"), "kind of spin; spinner: top, back, side")
+    magnitude_rps: float | None = tunable(None, 0.0, MAX_SPIN_RPS, 5.0, "rps", "none = 50 (rally: 10 to 80)")
+    speed_m_s: float | None = tunable(None, 0.5, 50.0, 0.5, "m/s", "none = 7.5 (rally: 4 to 10)")
+    duration_ms: float | None = tunable(
+        None, 1.0, 600_000.0, 10.0, "ms", "none = spinner 100, rally 20000, flight until the ball is gone"
+    )
+    ball: float | None = tunable(None, 1, 7, 1, "", "how the logo sits; none = 1 (flight: any way)")
+    heading_deg: float | None = tunable(
+        None, -360.0, 360.0, 5.0, "deg", "0 = to the right, 90 = down; none = along"
+    )
+    spin_decay_hz: float = tunable(0.0, 0.0, 10.0, 0.1, "Hz", "the spin falls as exp(-spin_decay_hz t)")
+    shots: int = tunable(8, 1, 1000, 1, "", "shots of a rally")
+    second_ball: bool = switch(False, "another ball crosses")
+    arm: bool = switch(False, "an arm swings at the border of the image")
+    bounce: bool = switch(False, "the ball bounces on the table")
+    background: str = choice("auto", ("auto", "plain", "table"), "auto: plain for a spinner, else table")
+    texture: float = tunable(0.0, 0.0, 2.0, 0.05, "", "contrast of the background's texture (log intensity)")
+    light_lux: float = tunable(1930.0, 1.0, 100_000.0, 10.0, "lx", "illuminance on the table")
+    flicker_depth: float = tunable(0.0, 0.0, 0.99, 0.05, "", "half the light's swing; 0 = steady")
+    flicker_hz: float = tunable(100.0, 1.0, 1000.0, 10.0, "Hz", "of the flicker (mains: 100 or 120)")
+    width_px: int = tunable(1280, 16, 2048, 1, "px", "columns of the sensor")
+    height_px: int = tunable(720, 16, 2048, 1, "px", "rows of the sensor")
+    focal_length_mm: float = tunable(8.0, 0.5, 1000.0, 0.1, "mm", "focal length of the lens")
+
+
+ALWAYS = {"seed", "background", "texture", "light_lux", "flicker_depth", "flicker_hz"}
+ALWAYS |= {"width_px", "height_px", "focal_length_mm", "duration_ms", "magnitude_rps"}
+USED = {
+    "spinner": ALWAYS | {"spin", "ball"},
+    "flight": ALWAYS
+    | {"spin", "ball", "speed_m_s", "heading_deg", "spin_decay_hz", "second_ball", "arm", "bounce"},
+    "rally": ALWAYS | {"speed_m_s", "shots", "arm"},
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """What `simulate_to_file` wrote, for people."""
+
+    path: Path
+    events: int
+    logo_events: int
+    duration_us: int
+    spin_rps: tuple[float, float, float] | None  # of the first ball, at its first appearance
+    warnings: list[str]
+
+
+def simulate_to_file(
+    kind: str,
+    out: Path,
+    *,
+    spin_rps: Sequence[float] | None = None,
+    logo: str = "andro",
+    biases_path: Path | None = None,
+    on_progress: Progress | None = None,
+    **options: Any,
+) -> Written:
+    """Simulate a spinner, a flight or a rally and write it; the format follows the suffix of `out`.
+
+    spin_rps : (x, y, z) in the camera frame, instead of `spin` and `magnitude_rps`
+    logo : a name of the simulator's, or a PNG file
+    biases_path : a `.bias` file; None = the paper's biases
+    options : fields of SimulateParameters; None counts as not given
+    HDF5 carries the truth and what it takes to simulate the scene again; RAW (EVT3) and NPZ hold
+    events alone. The file appears only when complete. Raises ParameterError and RecordingError.
+    """
+    if kind not in KINDS:
+        raise ParameterError(f"{kind!r} cannot be simulated: there are {', '.join(KINDS)}")
+    given = {name: value for name, value in options.items() if value is not None}
+    chosen = SimulateParameters().with_values(given)
+    for name in given:
+        if name not in USED[kind] and given[name] != SimulateParameters.tunables()[name].default:
+            raise ParameterError(f"{name} does not belong to a {kind}: leave it out")
+    _writable(out)
+    biases = read_biases(biases_path) if biases_path else PAPER
+    optics = CameraParameters(focal_length_mm=chosen.focal_length_mm)
+    camera = Camera.of(optics, chosen.width_px, chosen.height_px)
+    scene = _scene(kind, chosen, spin_rps, logo, camera)
+    share = (lambda done: on_progress(done, "simulating")) if on_progress else None
+    made = simulate(scene, camera=camera, sensor=biases, seed=chosen.seed, progress=share)
+    return _write(made, out, biases)
+
+
+def simulate_again_to_file(
+    recording: Path,
+    out: Path,
+    *,
+    biases_path: Path | None = None,
+    on_progress: Progress | None = None,
+) -> Written:
+    """Simulate the scene of a simulated recording again, with other biases if given; raises as above."""
+    _writable(out)
+    text = open_recording(recording).attributes.get(DESCRIPTION)
+    try:
+        description = json.loads(str(text)) if text is not None else None
+    except json.JSONDecodeError:
+        description = None
+    if not isinstance(description, dict):
+        raise RecordingError(
+            f"the recording holds no scene: give one that `spinscope simulate` wrote as HDF5: {recording}"
+        )
+    biases = read_biases(biases_path) if biases_path else None
+    share = (lambda done: on_progress(done, "simulating")) if on_progress else None
+    made = simulated_again(description, sensor=biases, progress=share)
+    if biases is None and made.description["biases"] is not None:
+        biases = BiasParameters(**made.description["biases"])
+    return _write(made, out, biases)
+
+
+def _scene(
+    kind: str, chosen: SimulateParameters, spin_rps: Sequence[float] | None, logo: str, camera: Camera
+) -> Scene:
+    """The scene of these choices."""
+    plain = {"auto": kind == "spinner", "plain": True, "table": False}[str(chosen.background)]
+    values: dict[str, Any] = {
+        "seed": chosen.seed,
+        "logo": logo,
+        "background": Background(kind="plain" if plain else "table", contrast=chosen.texture),
+        "light": Light(
+            illuminance_lux=chosen.light_lux, flicker_depth=chosen.flicker_depth, flicker_hz=chosen.flicker_hz
+        ),
+    }
+    if kind == "rally":
+        if spin_rps is not None:
+            raise ParameterError("spin_rps does not belong to a rally: its shots have spins of their own")
+        for name in ("speed_m_s", "magnitude_rps"):
+            if (value := getattr(chosen, name)) is not None:
+                values[name] = (value, value)
+        if chosen.duration_ms is not None:
+            values["duration_s"] = chosen.duration_ms * 1e-3
+        return rally(shots=chosen.shots, arm=chosen.arm, camera=camera, **values)
+    values["kind"] = chosen.spin
+    values["spin_rps"] = _spin(spin_rps)
+    if chosen.magnitude_rps is not None:
+        values["magnitude_rps"] = chosen.magnitude_rps
+    if chosen.ball is not None:
+        values["ball"] = int(chosen.ball)
+    if kind == "spinner":
+        return spinner(duration_ms=chosen.duration_ms or 100.0, **values)
+    for name in ("speed_m_s", "heading_deg"):
+        if (value := getattr(chosen, name)) is not None:
+            values[name] = value
+    for name in ("spin_decay_hz", "second_ball", "arm", "bounce"):
+        values[name] = getattr(chosen, name)
+    scene = flight(camera=camera, **values)
+    if chosen.duration_ms is None:
+        return scene
+    return dataclasses.replace(scene, duration_s=min(scene.duration_s, chosen.duration_ms * 1e-3))
+
+
+def _spin(spin_rps: Sequence[float] | None) -> Sequence[float] | None:
+    if spin_rps is None:
+        return None
+    size = math.hypot(*spin_rps)
+    if not size <= MAX_SPIN_RPS:  # not a number fails here too
+        raise ParameterError(
+            f"spin of {size:g} rps is out of range: the simulator's time step allows {MAX_SPIN_RPS:g} rps"
+        )
+    return spin_rps
+
+
+def _writable(out: Path) -> None:
+    """Find out before the work what would fail after it; a disk that fills up is found out in writing."""
+    if out.suffix.lower() not in SUFFIXES:
+        raise RecordingError(f"a recording is written as {', '.join(SUFFIXES)}: give another suffix: {out}")
+    if out.is_dir() or not out.parent.is_dir() or not os.access(out.parent, os.W_OK):
+        why = "it is a folder" if out.is_dir() else "its folder does not exist or may not be written to"
+        raise RecordingError(f"recording cannot be written, {why}: give another name: {out}")
+
+
+def _write(made: SimulatedRecording, out: Path, biases: BiasParameters | None) -> Written:
+    """Write in the format of the suffix; see `simulate_to_file`."""
+    width_px, height_px = made.width_px, made.height_px
+    suffix, warnings = out.suffix.lower(), []
+    attributes: dict[str, str | float] = {
+        DESCRIPTION: json.dumps(made.description, separators=(",", ":")),
+        "camera.focal_length_mm": made.description["camera"]["focal_px"] * CameraParameters().pixel_um / 1000,
+    }
+    if biases is not None:
+        attributes[BIASES] = json.dumps(biases.as_dict())
+    if suffix in (".h5", ".hdf5"):
+        write_recording(
+            out,
+            made.events,
+            width_px=width_px,
+            height_px=height_px,
+            attributes=attributes,
+            truth=made.truth,
+        )
+    else:
+        warnings.append(f"{suffix} holds no truth and no scene: write .h5 to keep them")
+        if suffix == ".raw":
+            write_raw(out, made.events, width_px=width_px, height_px=height_px)
+        else:
+            write_npz(out, made.events, width_px=width_px, height_px=height_px)
+    spin = made.truth.spin_rps[0] if made.truth.t_us.size else None
+    return Written(
+        path=out,
+        events=len(made.events),
+        logo_events=int(np.count_nonzero(made.truth.label == 2)),
+        duration_us=round(made.description["scene"]["duration_s"] * 1e6),
+        spin_rps=None if spin is None else (float(spin[0]), float(spin[1]), float(spin[2])),
+        warnings=warnings,
+    )

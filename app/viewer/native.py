@@ -1,0 +1,73 @@
+"""The viewer in Rerun's own window."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from pipeline.errors import SpinscopeError
+
+from ..terminal import note
+from .recorded import write_rrd
+from .rerun_api import place_playhead, program, quiet_environment
+from .run import Run
+from .web import HOST, free_ports
+
+START_S = 30.0  # patience until the window has read the recording
+
+
+def show_native(run: Run, layout: str, *, window: tuple[str, ...] = ()) -> None:
+    """Show the run in a window and wait until it is closed or Ctrl-C is pressed.
+
+    window : more arguments for Rerun's program
+    Raises SpinscopeError where no window can open.
+    """
+    if sys.platform.startswith("linux") and not window and not _has_display():
+        raise SpinscopeError(
+            "there is no display for Rerun's window: leave out --native to get an address for the browser, "
+            "or use --save FILE.rrd"
+        )
+    with tempfile.TemporaryDirectory(prefix="spinscope-") as folder:
+        path = Path(folder) / "recording.rrd"
+        write_rrd(run, path, layout)
+        (port,) = free_ports(1)
+        command = [program(), "--bind", HOST, "--port", str(port), "--hide-welcome-screen", *window, str(path)]
+        process = subprocess.Popen(
+            command,
+            env=quiet_environment(),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,  # Ctrl-C in the terminal is for us
+        )
+        try:
+            _place_playhead(run, port, process)
+            status = process.wait()
+        except KeyboardInterrupt:
+            note("")
+            return
+        finally:
+            process.kill()
+            process.wait()
+    if status != 0:
+        raise SpinscopeError(
+            f"Rerun's window closed with status {status}, perhaps for want of a graphics driver: leave out --native "
+            "to use the browser"
+        )
+
+
+def _place_playhead(run: Run, port: int, process: subprocess.Popen[bytes]) -> None:
+    """Put the playhead where the track starts, as soon as the window has read the recording; give up quietly."""
+    deadline = time.monotonic() + START_S
+    while process.poll() is None and time.monotonic() < deadline:
+        if place_playhead(HOST, port, run.first_sight_us):
+            return
+        time.sleep(0.2)
+
+
+def _has_display() -> bool:
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

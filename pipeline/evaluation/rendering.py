@@ -1,0 +1,56 @@
+"""Simulated recordings for the suites, rendered once and kept on disk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..biases import PAPER, BiasParameters
+from ..errors import RecordingError
+from ..events import EventBatch
+from ..recordings import open_recording, write_recording
+from ..results import Truth
+from ..simulator import Scene, simulate
+from .work import Bench, digest, text_of
+
+
+@dataclass(frozen=True, eq=False)
+class Rendered:
+    """A recording in memory.
+
+    identity : names scene, biases, seed and version of the simulator
+    """
+
+    identity: str
+    events: EventBatch
+    truth: Truth
+    width_px: int
+    height_px: int
+    duration_us: int
+
+
+def rendered(bench: Bench, scene: Scene, *, seed: int, biases: BiasParameters = PAPER) -> Rendered:
+    """The scene before the paper's camera at these biases, from the cache where it is there."""
+    identity = digest([scene.to_dict(), biases.as_dict(), seed, text_of("simulator")])
+    duration_us = round(scene.duration_s * 1e6)
+    place = None if bench.cache is None else bench.cache / "recordings" / f"{identity}.h5"
+    if place is not None and place.exists():
+        try:
+            recording = open_recording(place)
+            events, truth = recording.read(), recording.truth
+            if truth is not None and truth.label.size == len(events):
+                return Rendered(identity, events, truth, recording.width_px, recording.height_px, duration_us)
+        except RecordingError:
+            pass  # damaged: rendered anew below
+    made = simulate(scene, sensor=biases, seed=seed)
+    if place is not None:
+        _keep(place, made.events, made.truth, made.width_px, made.height_px)
+    return Rendered(identity, made.events, made.truth, made.width_px, made.height_px, duration_us)
+
+
+def _keep(place: Path, events: EventBatch, truth: Truth, width_px: int, height_px: int) -> None:
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(f"the cache cannot be written ({error.strerror}): {place.parent}") from error
+    write_recording(place, events, width_px=width_px, height_px=height_px, truth=truth)

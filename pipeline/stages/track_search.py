@@ -1,0 +1,91 @@
+"""Finding the ball anywhere: full-frame Hough circles, each tried for an outline that moves like a ball's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Camera
+from ..events import EventBatch
+from ..kernels import contour as kernels
+from ..results import Circle
+from .surface import SurfaceResult
+from .track_hough import candidates
+from .track_outline import Limits, Sighting, sight
+
+# Circles of the full-frame vote looked at in one tick, without a track and beside one.
+MOST_CANDIDATES, MOST_RIVALS = 4, 2
+# Beside a track that is seen, other balls are looked for this often: soon enough to find one within 10 ms.
+LOOK_US = 10_000
+# A ball looked at is not looked at again for so long; by then it may be half a radius off its straight path.
+RIVAL_US = 25_000
+
+Found = list[tuple[Sighting, Circle]]
+
+
+def look(
+    surface: SurfaceResult, events: EventBatch, end_us: int, camera: Camera, limits: Limits, most: int
+) -> tuple[Circle | None, Found]:
+    """The best Hough circle anywhere, and those that move like a ball: trusted ones first, then by speed."""
+    first: Circle | None = None
+    found: Found = []
+    for circle in candidates(surface, events, limits.radius_min_px, limits.radius_max_px, most):
+        first = first or circle
+        sighting = sight(events, end_us, camera, circle, limits)
+        if sighting is not None and (sighting.trusted or sighting.promising):
+            found.append((sighting, circle))
+    return first, sorted(found, key=lambda one: (one[0].trusted, one[0].speed_px_s), reverse=True)
+
+
+@dataclass(slots=True)
+class Rivals:
+    """The search beside a track, and the balls it came upon lately."""
+
+    looked_us: int = 0
+    known: list[tuple[int, Sighting]] = field(default_factory=list)
+
+    def due(self, end_us: int) -> bool:
+        """Whether it is time to look again."""
+        return end_us - self.looked_us >= LOOK_US
+
+    def fastest(
+        self,
+        surface: SurfaceResult,
+        events: EventBatch,
+        end_us: int,
+        camera: Camera,
+        limits: Limits,
+        tracked: NDArray[np.float64] | None,
+    ) -> tuple[Sighting, Circle] | None:
+        """The fastest trusted ball apart from the tracked ring (5,) and the balls known already."""
+        self.looked_us = end_us
+        self.known = [(since, one) for since, one in self.known if end_us - since < RIVAL_US]
+        rings = [moved(one.ring, end_us - since) for since, one in self.known]
+        if tracked is not None:
+            rings.append(tracked)
+        for ring in rings:
+            margin = 0.3 * ring[4] + 2.0  # room for trails, and for errors of the older ones
+            events = events[kernels.clear_of(ring, events.t_us, events.x_px, events.y_px, end_us, margin)]
+        _, found = look(surface, events, end_us, camera, limits, MOST_RIVALS)
+        self.known += [(end_us, one) for one, _ in found]
+        return found[0] if found and found[0][0].trusted else None
+
+
+def moved(ring: NDArray[np.float64], by_us: int) -> NDArray[np.float64]:
+    """The ring (5,) that much later."""
+    later = ring.copy()
+    later[:2] += ring[2:4] * by_us * 1e-6
+    return later
+
+
+def agree(before: Sighting, now: Sighting, tick_us: int) -> bool:
+    """Whether a sighting is the one of the tick before, moved on."""
+    off = (now.ring - moved(before.ring, tick_us))[:2]
+    turned = now.ring[2:4] - before.ring[2:4]
+    return bool(
+        np.hypot(*off) <= 2.0 + 0.1 * before.speed_px_s * tick_us * 1e-6
+        and abs(now.ring[4] - before.ring[4]) <= 1.0 + 0.1 * before.ring[4]
+        and np.hypot(*turned) <= 0.3 * before.speed_px_s
+    )

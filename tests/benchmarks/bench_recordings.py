@@ -1,0 +1,99 @@
+"""Reading speed in events a second, against the twins and the usual libraries.
+
+    pytest tests/benchmarks/bench_recordings.py --benchmark-only -s
+
+Every test prints its own figure and the ratio to what it is compared with, measured in the same run.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from pipeline.events import EventBatch
+from pipeline.recordings import open_recording, summary, write_npz, write_raw, write_recording
+from tests.naive_recordings import naive_evt2, naive_evt3
+
+EVENTS = 2_000_000
+TWIN_EVENTS = 20_000
+
+
+def scene(n: int) -> EventBatch:
+    """n events at 10 million a second, in bursts along rows as sensors read them out."""
+    rng = np.random.default_rng(1)
+    t = np.sort(rng.integers(0, max(n // 10, 1), n))
+    y = (np.cumsum(rng.random(n) < 0.2) * 37 % 720).astype(np.uint16)
+    return EventBatch(t, rng.integers(0, 1280, n).astype(np.uint16), y, rng.integers(0, 2, n).astype(np.bool_))
+
+
+def best_seconds(run: Callable[[], Any], times: int = 3) -> float:
+    """Processor time of the fastest of several runs: other work on the machine does not count."""
+    seconds = []
+    for _ in range(times):
+        start = time.process_time()
+        run()
+        seconds.append(time.process_time() - start)
+    return min(seconds)
+
+
+def say(name: str, seconds: float, other: str, other_seconds: float) -> None:
+    ratio = other_seconds / seconds
+    sys.stdout.write(f"\n{name}: {EVENTS / seconds / 1e6:.1f} Mev/s, {ratio:.1f} x {other}\n")
+
+
+@pytest.mark.parametrize("format", ["EVT3", "EVT2"])
+def test_raw_against_its_twin(benchmark: Any, tmp_path: Path, format: str) -> None:
+    path = tmp_path / "a.raw"
+    write_raw(path, scene(TWIN_EVENTS), width_px=1280, height_px=720, format=format)
+    data = path.read_bytes()
+    words = data[data.index(b"% end\n") + 6 :]
+    numbers = np.frombuffer(words, "<u2" if format == "EVT3" else "<u4").tolist()
+    twin = naive_evt3 if format == "EVT3" else naive_evt2
+    twin_seconds = best_seconds(lambda: twin(numbers), 1) * EVENTS / TWIN_EVENTS
+    write_raw(path, scene(EVENTS), width_px=1280, height_px=720, format=format)
+    recording = open_recording(path)
+    recording.scan()
+    benchmark.pedantic(recording.scan, rounds=3)
+    say(f"{format} RAW scan", best_seconds(recording.scan), "the twin", twin_seconds)
+
+
+def test_hdf5_against_h5py(benchmark: Any, tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    write_recording(path, scene(EVENTS), width_px=1280, height_px=720)
+    recording = open_recording(path)
+
+    def plain() -> list[Any]:
+        with h5py.File(path) as file:
+            return [file["events"][name][:] for name in "txyp"]
+
+    benchmark.pedantic(recording.read, rounds=3)
+    say("HDF5 read", best_seconds(recording.read), "h5py alone", best_seconds(plain))
+
+
+def test_npz_against_numpy(benchmark: Any, tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    write_npz(path, scene(EVENTS), width_px=1280, height_px=720)
+    recording = open_recording(path)
+
+    def plain() -> list[Any]:
+        with np.load(path) as arrays:
+            return [arrays[name] for name in "txyp"]
+
+    benchmark.pedantic(recording.read, rounds=3)
+    say("NPZ read", best_seconds(recording.read), "numpy.load alone", best_seconds(plain))
+
+
+def test_summary_against_reading_alone(benchmark: Any, tmp_path: Path) -> None:
+    path = tmp_path / "a.raw"
+    write_raw(path, scene(EVENTS), width_px=1280, height_px=720)
+    recording = open_recording(path)
+    recording.scan()
+    benchmark.pedantic(lambda: summary(recording), rounds=3)
+    say("summary of EVT3", best_seconds(lambda: summary(recording)), "a scan", best_seconds(recording.scan))
