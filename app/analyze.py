@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,25 +22,35 @@ def analyze(path: Path, choices: Choices, method: str, on_progress: Progress | N
     begin = time.perf_counter()
     session = Session.open(path, choices, on_progress)
     log = session.shots(on_progress)
+    made = report(session, log.shots, log.no_shot_reason, method)
+    made["recording"]["path"] = str(path)
+    made["seconds"]["total"] = time.perf_counter() - begin
+    return made
+
+
+def report(
+    session: Session, shots: Sequence[Shot], no_shot_reason: str | None, method: str = "all"
+) -> dict[str, Any]:
+    """The report on the shots found in a session; its total is what reading and the stages took."""
     seconds = session.chain.seconds
     return {
         "schema": SCHEMA,
         "recording": {
-            "path": str(path),
+            "path": str(session.recording.path),
             "events": len(session.source.events),
             "duration_us": session.source.end_us - session.source.start_us,
             "width": session.source.width_px,
             "height": session.source.height_px,
         },
         "parameters": session.parameters.as_dict(),
-        "shots": [_shot(session, shot, method) for shot in log.shots],
-        "no_shot_reason": log.no_shot_reason,
+        "shots": [_shot(session, shot, method) for shot in shots],
+        "no_shot_reason": no_shot_reason,
         "warnings": session.warnings,
         "seconds": {
             "read": session.read_seconds,
             "track": sum(seconds[stage] for stage in TRACKING),
             "spin": sum(taken for stage, taken in seconds.items() if stage not in TRACKING),
-            "total": time.perf_counter() - begin,
+            "total": session.read_seconds + sum(seconds.values()),
         },
     }
 

@@ -317,7 +317,7 @@ def _view(recording: Path, save: Path | None, native: bool, layout: str, choices
             viewer.save(session, ticks, log.shots, save, layout=layout, no_shot_reason=log.no_shot_reason)
     if save:
         note(
-            f"saved {save} ({save.stat().st_size / 1e6:.1f} MB): open it with `spinscope view --native` or `rerun {save}`"
+            f"saved {save} ({save.stat().st_size / 1e6:.1f} MB): `uv run rerun {save}` opens it"
         )
     else:
         viewer.show(

@@ -20,7 +20,7 @@ from pipeline.parameters import ParameterGroup, choice, switch, tunable
 from pipeline.recordings import open_recording, write_npz, write_raw, write_recording
 from pipeline.simulator import Background, Light, Scene, SimulatedRecording, flight, rally, simulate, spinner
 from pipeline.simulator import simulate_again as simulated_again
-from pipeline.simulator.recipes import FLIGHT_KINDS
+from pipeline.simulator.shots import FLIGHT_KINDS
 
 Progress = Callable[[float, str], None]  # share done (0..1) and what is being done
 

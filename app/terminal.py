@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import sys
 import time
+from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
 PATIENCE_S = 1.0  # work that ends sooner shows no bar
 
@@ -73,52 +73,32 @@ def announce_compilation() -> None:
 
 
 def print_reports(reports: list[dict[str, Any]]) -> None:
-    """The reports of `analyze` as one table for people, with what they warn of below."""
-    table = Table(title=None, header_style="bold", row_styles=["", "dim"] if len(reports) > 3 else None)
-    for column in (
-        "recording",
-        "shot",
-        "time [ms]",
-        "speed [m/s]",
-        "method",
-        "spin [rps]",
-        "axis (x, y, z)",
-        "+- [deg]",
-    ):
-        table.add_column(column, overflow="fold")
+    """The reports of `analyze` for people: a heading for every shot and a row for every method under it."""
     for report in reports:
-        name = report["recording"]["path"].rpartition("/")[2]
+        name = Path(report["recording"]["path"]).name
         if "error" in report:
-            table.add_row(name, "", "", "", "", f"error: {report['error']}")
+            print(f"{name}: error: {report['error']}")
         elif not report["shots"]:
-            table.add_row(name, "none", "", "", "", report["no_shot_reason"])
+            print(f"{name}: {report['no_shot_reason']}")
         for number, shot in enumerate(report.get("shots", [])):
-            _add_shot(table, name if number == 0 else "", number, shot)
-    console = Console()
-    console.print(table)
-    console.print(
-        "* = the answer that Spinscope trusts; +- is 1 sigma; axis in the camera frame (x right, y down, z away)"
-    )
+            speed = "" if shot["speed_m_s"] is None else f", {shot['speed_m_s']:.2f} m/s"
+            print(
+                f"{name}, shot {number + 1} of {len(report['shots'])}: {shot['start_us'] / 1000:.1f} to "
+                f"{shot['end_us'] / 1000:.1f} ms{speed}, {shot['logo_events']} logo events"
+            )
+            print(f"    {'method':<12} {'spin [rps]':>18}   {'axis x, y, z':<24}  {'+- [deg]':>8}")
+            for method, estimate in shot["spin"].items():
+                print(f"  {'*' if method == shot['best'] else ' '} {method:<12} {_row(estimate)}")
+    print("* = trusted; +- is 1 sigma; axis in the camera frame: x right, y down, z into the scene")
     for report in reports:
         for warning in report.get("warnings", []):
-            note(f"warning: {warning}")
+            note(f"warning: {Path(report['recording']['path']).name}: {warning}")
 
 
-def _add_shot(table: Table, name: str, number: int, shot: dict[str, Any]) -> None:
-    speed = shot["speed_m_s"]
-    first = [
-        name,
-        str(number + 1),
-        f"{shot['start_us'] / 1000:.1f} to {shot['end_us'] / 1000:.1f}",
-        "" if speed is None else f"{speed:.2f}",
-    ]
-    for method, estimate in shot["spin"].items():
-        label = f"{method} *" if method == shot["best"] else method
-        if estimate["status"] == "ok":
-            std, axis_std = estimate["magnitude_std_rps"], estimate["axis_std_deg"]
-            spin = f"{estimate['magnitude_rps']:.2f}" + ("" if std is None else f" +- {std:.2f}")
-            axis = ", ".join(f"{value:+.3f}" for value in estimate["axis"])
-            table.add_row(*first, label, spin, axis, "" if axis_std is None else f"{axis_std:.1f}")
-        else:
-            table.add_row(*first, label, f"refused: {estimate['reason']}")
-        first = [""] * len(first)
+def _row(estimate: dict[str, Any]) -> str:
+    if estimate["status"] != "ok":
+        return f"refused: {estimate['reason']}"
+    std, axis_std = estimate["magnitude_std_rps"], estimate["axis_std_deg"]
+    spin = f"{estimate['magnitude_rps']:.2f}" + ("" if std is None else f" +- {std:.2f}")
+    axis = ", ".join(f"{value:+.3f}" for value in estimate["axis"])
+    return f"{spin:>18}   {axis:<24}  " + ("" if axis_std is None else f"{axis_std:>8.1f}")

@@ -112,10 +112,10 @@ def naive_line(u: Floats, v: Floats, t_s: Floats, width: float, rounds: int) -> 
     """(normal (2,), drift, sharpness) of the drifting line by matrix algebra: see kernels.comoving.drifting_line."""
     points = np.stack([u, v], axis=1)
     weights = np.ones(len(t_s))
-    normal, drift, sharpness = np.zeros(2), 0.0, 2.0
+    normal, drift, constant, sharpness = np.zeros(2), 0.0, 0.0, 2.0
     for number in range(rounds):
         if number:
-            off = (points @ normal - drift * t_s - constant) / width  # noqa: F821 - from the round before
+            off = (points @ normal - drift * t_s - constant) / width
             weights = np.where(np.abs(off) < 1, (1 - off**2) ** 2, 0.0)
         design = np.stack([t_s, np.ones_like(t_s)], axis=1)
         root = np.sqrt(weights)[:, None]

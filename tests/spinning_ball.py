@@ -114,9 +114,9 @@ def no_track(end_us: int) -> TrackResult:
     )
 
 
-def packets(events: EventBatch, tick_us: int = 5000) -> Iterator[Packet]:
-    """The events cut into ticks, from tick 0 to the last event's."""
-    for index in range(int(events.t_us[-1]) // tick_us + 1):
+def packets(events: EventBatch, tick_us: int = 5000, until_us: int | None = None) -> Iterator[Packet]:
+    """The events cut into ticks, from tick 0 to the last event's or to until_us."""
+    for index in range(int(events.t_us[-1]) // tick_us + 1 if until_us is None else until_us // tick_us):
         start_us, end_us = index * tick_us, (index + 1) * tick_us
         yield Packet(index, start_us, end_us, events.between(start_us, end_us))
 
@@ -142,9 +142,7 @@ def after_track(
         seen = logo.step(groups[0], logo_state, packet, FilterResult(packet.events, packet.events), track)
         rhythm = rate.step(groups[1], rate_state, packet, track, seen)
         moved = flow.step(groups[2], flow_state, packet, track, seen, rhythm)
-        results.append(
-            (seen, rhythm, moved, spin.step(groups[3], spin_state, packet, track, seen, rhythm, moved))
-        )
+        results.append((seen, rhythm, moved, spin.step(groups[3], spin_state, packet, track, seen, rhythm, moved)))
     return results
 
 

@@ -20,9 +20,7 @@ def viewer_version() -> str:
     except PackageNotFoundError as error:
         raise SpinscopeError(f"{error.name} is not installed: run `uv sync`") from None
     if sdk != script:
-        raise SpinscopeError(
-            f"rerun-sdk is {sdk}, rerun-notebook {script}: both must be the same, run `uv sync`"
-        )
+        raise SpinscopeError(f"rerun-sdk is {sdk}, rerun-notebook {script}: both must be the same, run `uv sync`")
     return sdk
 
 
@@ -36,13 +34,9 @@ def viewer_script() -> str:
     try:
         script = (_folder() / "widget.js").read_text(encoding="utf-8")
     except OSError as error:
-        raise SpinscopeError(
-            f"the viewer's script cannot be read ({error.strerror}): run `uv sync`"
-        ) from None
+        raise SpinscopeError(f"the viewer's script cannot be read ({error.strerror}): run `uv sync`") from None
     if CLASS not in script:
-        raise SpinscopeError(
-            "the viewer's script holds no WebViewer: rerun-notebook must be 0.41.0, run `uv sync`"
-        )
+        raise SpinscopeError("the viewer's script holds no WebViewer: rerun-notebook must be 0.41.0, run `uv sync`")
     return script + EXPORT
 
 

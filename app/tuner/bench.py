@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.session import Choices, Progress, Session
+from app.session import Choices, Session
 from pipeline.chain import STAGES, Chain, EventSource, Parameters, Source, Tick
 from pipeline.errors import ParameterError
 from pipeline.results import Packet, Truth
@@ -111,19 +111,22 @@ class Bench:
     """A recording on the bench.
 
     session : as opened: all events of the window, the parameters chosen on the command line
+    original : the recording it goes back to: itself, or the one whose scene was simulated again
     found : [start, end) in us of the shots of a long recording found so far, in order of time
     """
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Session, choices: Choices, original: Path) -> None:
         self.session = session
+        self.choices = choices
+        self.original = original
         self.found: list[tuple[int, int]] = []
         self._clips: OrderedDict[tuple[int, int], Clip] = OrderedDict()
         self._lock = threading.Lock()
 
     @classmethod
-    def open(cls, path: Path, choices: Choices, on_progress: Progress | None = None) -> Bench:
+    def open(cls, path: Path, choices: Choices, original: Path | None = None) -> Bench:
         """Open a recording and read it once; raises SpinscopeError."""
-        return cls(Session.open(path, choices, on_progress))
+        return cls(Session.open(path, choices), choices, original or path)
 
     @property
     def window_us(self) -> tuple[int, int]:

@@ -67,11 +67,11 @@ def _control(group: str, field: str, declared: Tunable) -> dict[str, Any]:
         "choices": list(declared.choices),
         "help": declared.help,
         "allowed": declared.allowed,
-        "scale": _scale(declared),
+        "scale": scale_of(declared),
     }
 
 
-def _scale(declared: Tunable) -> str:
+def scale_of(declared: Tunable) -> str:
     """How a slider's way is spread over the range: linear, logarithmic or cubic; none where it has no end."""
     low, high = declared.low, declared.high
     if declared.kind not in ("number", "whole number") or low is None or high is None:

@@ -38,9 +38,7 @@ class Guard:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        headers = {
-            name.decode("latin-1").lower(): value.decode("latin-1") for name, value in scope["headers"]
-        }
+        headers = {name.decode("latin-1").lower(): value.decode("latin-1") for name, value in scope["headers"]}
         refusal = _refusal(scope, headers)
         if refusal is not None:
             await _answer(send, *refusal)
@@ -61,9 +59,7 @@ def _refusal(scope: Scope, headers: dict[str, str]) -> tuple[int, str] | None:
     if origin is not None and origin != f"http://{host}":
         return 403, "requests from other origins are refused"
     site = headers.get("sec-fetch-site", "none")
-    is_visit = (
-        scope["method"] == "GET" and scope["path"] == "/" and headers.get("sec-fetch-mode") == "navigate"
-    )
+    is_visit = scope["method"] == "GET" and scope["path"] == "/" and headers.get("sec-fetch-mode") == "navigate"
     if site not in ("same-origin", "none") and not is_visit:
         return 403, "requests from other origins are refused"
     if scope["method"] == "POST":
@@ -77,7 +73,8 @@ def _refusal(scope: Scope, headers: dict[str, str]) -> tuple[int, str] | None:
 
 async def _body(receive: Receive) -> bytes | None:
     """The whole request body; None when it is too long."""
-    parts, length = [], 0
+    parts: list[bytes] = []
+    length = 0
     while True:
         message = await receive()
         if message["type"] != "http.request":

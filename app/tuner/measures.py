@@ -74,9 +74,7 @@ def _jitter_px(ticks: Sequence[Tick]) -> float | None:
 
 def _shot(session: Session, shot: Shot) -> dict[str, Any]:
     velocity = (
-        None
-        if session.parameters.track.ball == "fixed"
-        else shot.velocity_m_s(session.camera, session.ball_radius_m)
+        None if session.parameters.track.ball == "fixed" else shot.velocity_m_s(session.camera, session.ball_radius_m)
     )
     trusted = shot.estimates[shot.best] if shot.best is not None else None
     kind = None
@@ -107,7 +105,19 @@ def _estimate(session: Session, shot: Shot, estimate: SpinEstimate) -> dict[str,
         "axis_std_deg": _finite(estimate.axis_std_deg),
         "error_rps": _finite(error[0]) if error else None,
         "error_deg": _finite(error[1]) if error else None,
+        "error_share": _error_share(session, shot, estimate) if error else None,
     }
+
+
+def _error_share(session: Session, shot: Shot, estimate: SpinEstimate) -> float | None:
+    """|spin - truth| / |truth| at the shot's middle; None without an answer or a true spin."""
+    truth = session.truth
+    if truth is None or estimate.vector_rps is None:
+        return None
+    middle_us = (shot.start_us + shot.end_us) / 2
+    spin = np.array([np.interp(middle_us, truth.t_us, truth.spin_rps[:, axis]) for axis in range(3)])
+    size = float(np.linalg.norm(spin))
+    return float(np.linalg.norm(estimate.vector_rps - spin)) / size if size > 0 else None
 
 
 def _finite(value: float | None) -> float | None:

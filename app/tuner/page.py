@@ -5,22 +5,20 @@ from __future__ import annotations
 import secrets
 import threading
 import time
-import traceback
 from collections import OrderedDict
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from app.session import Session
-from app.viewer.run import Run
 from app.viewer.tuning import Drawings, compared, note_with_a, note_without_a, rrd_bytes
 from pipeline.chain import STAGES, Parameters, Tick
-from pipeline.errors import SpinscopeError
-from pipeline.shots import Shot, ShotLog
 
 from .bench import Bench, Clip
+from .jobs import Job, fault
 from .measures import measures
 from .outbox import Outbox
 from .presets import differences
+from .runs import Finished
 
 REPORT_S = 0.05  # a page learns of a run's progress this often
 # The rest of a clip is worth waiting for when it takes no longer than an eye needs to see a change.
@@ -37,21 +35,6 @@ class Wanted:
     pinned: Parameters | None
     window_us: tuple[int, int]
     playhead_us: float | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Finished:
-    """All ticks of a clip with one setting."""
-
-    session: Session
-    ticks: list[Tick]
-    shots: list[Shot]
-    no_shot_reason: str | None
-
-    @property
-    def run(self) -> Run:
-        """As the viewer takes it."""
-        return Run.of(self.session, self.ticks, self.shots, self.no_shot_reason)
 
 
 class Superseded(Exception):  # no error: the page wants something newer
@@ -91,6 +74,7 @@ class Page:
         self.finished: Finished | None = None
         self._drawings = drawings
         self._pictures: OrderedDict[str, bytes] = OrderedDict()
+        self._jobs: dict[str, Job] = {}
         self._wanted: Wanted | None = None
         self._newest = -1
         self._closed = False
@@ -111,16 +95,30 @@ class Page:
         """The bytes of a picture that is still there."""
         return self._pictures.get(recording_id)
 
+    def start(self, kind: str, work: Callable[[Job], dict[str, Any]]) -> None:
+        """Start longer work in place of what was going on of its kind."""
+        self.cancel(kind)
+        self._jobs[kind] = Job(kind, self.outbox, work)
+
+    def cancel(self, kind: str) -> None:
+        """Stop the work of this kind, if there is any."""
+        if kind in self._jobs:
+            self._jobs[kind].cancel()
+
     def close(self) -> None:
-        """End the page's thread and its connection."""
+        """End the page's threads and its connection."""
+        for job in self._jobs.values():
+            job.cancel()
         with self._changed:
             self._closed = True
             self._changed.notify()
         self.outbox.close()
 
     def join(self, seconds: float) -> None:
-        """Wait for the thread to end."""
+        """Wait for the threads to end."""
         self._thread.join(seconds)
+        for job in self._jobs.values():
+            job.cancel(seconds)
 
     def _work(self) -> None:
         while True:
@@ -166,8 +164,8 @@ class Page:
                 previewed = True
                 rest_s = (time.perf_counter() - began) / len(ticks) * (count - len(ticks))
                 if rest_s > REST_WORTH_WAITING_S:
-                    self._show(wanted, clip, _finished(session, ticks), None, report, partial=True)
-        return _finished(session, ticks)
+                    self._show(wanted, clip, Finished.of(session, ticks), None, report, partial=True)
+        return Finished.of(session, ticks)
 
     def _show(
         self,
@@ -215,30 +213,6 @@ class Page:
 
     def _is_old(self, wanted: Wanted) -> bool:
         return self._closed or wanted.serial != self._newest
-
-
-def fault(error: Exception) -> str:
-    """One line for people: our own message, or which stage failed and how."""
-    if isinstance(error, SpinscopeError):
-        return str(error)
-    places = [str(frame.f_globals.get("__name__")) for frame, _ in traceback.walk_tb(error.__traceback__)]
-    stage = next(
-        (place.rsplit(".", 1)[1] for place in places if place.startswith("pipeline.stages.")), "the tuner"
-    )
-    return f"{stage} failed: {type(error).__name__}: {' '.join(str(error).split())[:300]}"
-
-
-def finish(clip: Clip, parameters: Parameters) -> Finished:
-    """A clip run to its end with these parameters, without anybody being told."""
-    return _finished(clip.with_parameters(parameters), [step.tick for step in clip.run(parameters)])
-
-
-def _finished(session: Session, ticks: list[Tick]) -> Finished:
-    log = ShotLog()
-    for tick in ticks:
-        log.add(tick)
-    log.close()
-    return Finished(session, list(ticks), log.shots, log.no_shot_reason)
 
 
 def _measured(clip: Clip, finished: Finished) -> dict[str, Any]:

@@ -46,8 +46,51 @@ class Settings(Request):
     """Parameters, and the clip when it is not the whole recording."""
 
     parameters: Values
-    start_us: int | None = None
-    end_us: int | None = None
+    start_us: int | None = Field(default=None, ge=-(2**62), le=2**62)
+    end_us: int | None = Field(default=None, ge=-(2**62), le=2**62)
+
+
+class Curve(Settings):
+    """A tuning curve of one parameter; without low and high over its whole range."""
+
+    name: str = Field(max_length=100)
+    low: float | None = None
+    high: float | None = None
+    points: int = 15
+
+
+class Search(Settings):
+    """Look for better values of some parameters."""
+
+    names: list[str] = Field(max_length=20)
+    objective: str = Field(max_length=20)
+    trials: int = 40
+
+
+class Cancel(Request):
+    """Stop the work of a kind."""
+
+    kind: str = Field(pattern="^(curve|search|biases|bias_curve)$")
+
+
+class Biases(Request):
+    """Simulate the recording's scene again with these biases."""
+
+    biases: dict[str, int]
+
+
+class BiasCurve(Request):
+    """Rates against one bias, all others as given."""
+
+    biases: dict[str, int]
+    name: str = Field(max_length=20)
+    points: int = 9
+
+
+class BiasText(Request):
+    """A `.bias` file."""
+
+    text: str = Field(max_length=TEXT_MOST)
 
 
 def parameters_of(values: Values) -> Parameters:

@@ -22,9 +22,7 @@ PORT = 8377  # free of well-known services; another one is taken when it is busy
 class _Server(uvicorn.Server):
     """Says its address once it answers, and ends the pages' connections before it waits for them to end."""
 
-    def __init__(
-        self, config: uvicorn.Config, workshop: Workshop, address: str, *, open_browser: bool
-    ) -> None:
+    def __init__(self, config: uvicorn.Config, workshop: Workshop, address: str, *, open_browser: bool) -> None:
         super().__init__(config)
         self._workshop, self._address, self._open_browser = workshop, address, open_browser
 

@@ -23,10 +23,12 @@ from pipeline.errors import SpinscopeError
 from . import presets
 from .assets import STATIC, viewer_script, viewer_version, viewer_wasm
 from .bench import OVERVIEW_BINS, Bench
+from .biases import state_of
 from .controls import sections
 from .guard import Guard
 from .page import Page, Wanted
 from .requests import OpenPage, PresetText, Run, Settings, parameters_of
+from .tools import PageOf, add_tools
 from .workshop import Workshop
 
 MESSAGE_MOST = 400
@@ -57,9 +59,7 @@ def application(workshop: Workshop) -> FastAPI:
 
     @app.get(f"/rerun/{version}/widget.js")
     async def widget() -> Response:
-        return Response(
-            script, media_type="text/javascript", headers={"cache-control": "max-age=31536000, immutable"}
-        )
+        return Response(script, media_type="text/javascript", headers={"cache-control": "max-age=31536000, immutable"})
 
     @app.get(f"/rerun/{version}/re_viewer_bg.wasm")
     async def wasm() -> FileResponse:
@@ -67,12 +67,7 @@ def application(workshop: Workshop) -> FastAPI:
         return FileResponse(viewer_wasm(), media_type="application/wasm", headers=forever)
 
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
-    _page_routes(app, workshop, version)
-    _preset_routes(app, workshop)
-    return app
 
-
-def _page_routes(app: FastAPI, workshop: Workshop, version: str) -> None:
     def page_of(page_id: str) -> Page:
         page = workshop.page(page_id)
         if page is None:
@@ -80,10 +75,22 @@ def _page_routes(app: FastAPI, workshop: Workshop, version: str) -> None:
         page.last_sign_of_life = time.monotonic()
         return page
 
+    _page_routes(app, workshop, version, page_of)
+    _preset_routes(app, page_of)
+    add_tools(app, workshop, page_of)
+    return app
+
+
+def _page_routes(app: FastAPI, workshop: Workshop, version: str, page_of: PageOf) -> None:
     @app.post("/api/pages")
     async def open_page(request: OpenPage) -> dict[str, Any]:
         page = await run_in_threadpool(workshop.open_page, request.recording)
         return await run_in_threadpool(_opening, workshop, page, version)
+
+    @app.get("/api/pages/{page_id}/recording")
+    async def recording(page_id: str) -> dict[str, Any]:
+        bench = page_of(page_id).bench
+        return {"recording": await run_in_threadpool(_recording, bench), "biases": state_of(bench.session.recording)}
 
     @app.post("/api/pages/{page_id}/run", status_code=202)
     async def run(page_id: str, request: Run) -> dict[str, Any]:
@@ -121,20 +128,25 @@ def _page_routes(app: FastAPI, workshop: Workshop, version: str) -> None:
         return Response(made, media_type="application/octet-stream", headers={"cache-control": "no-store"})
 
 
-def _preset_routes(app: FastAPI, workshop: Workshop) -> None:
-    @app.post("/api/presets/read")
-    async def read_preset(request: PresetText) -> dict[str, Any]:
-        opened = workshop.bench().session.parameters
+def _preset_routes(app: FastAPI, page_of: PageOf) -> None:
+    @app.post("/api/pages/{page_id}/presets/read")
+    async def read_preset(page_id: str, request: PresetText) -> dict[str, Any]:
+        opened = page_of(page_id).bench.session.parameters
         return {"parameters": presets.applied(request.text, opened).as_dict()}
 
-    @app.post("/api/presets/write")
-    async def write_preset(request: Settings) -> dict[str, Any]:
-        parameters = parameters_of(request.parameters)
+    @app.post("/api/pages/{page_id}/presets/write")
+    async def write_preset(page_id: str, request: Settings) -> dict[str, Any]:
+        bench, parameters = page_of(page_id).bench, parameters_of(request.parameters)
         window = None
         if request.start_us is not None and request.end_us is not None:
             window = request.start_us, request.end_us
-        command = presets.command(workshop.path, parameters, window)
-        return {"toml": presets.as_toml(parameters), "command": command}
+        # The whole recording needs no window, but one chosen on the command line stays.
+        if window == bench.window_us and bench.choices.window_us is None:
+            window = None
+        return {
+            "toml": presets.as_toml(parameters),
+            "command": presets.command(bench.session.recording.path, parameters, window),
+        }
 
 
 def _opening(workshop: Workshop, page: Page, version: str) -> dict[str, Any]:
@@ -150,6 +162,7 @@ def _opening(workshop: Workshop, page: Page, version: str) -> dict[str, Any]:
         "stages": list(STAGES),
         "presets": presets.built_in(opened),
         "tabs": tab_names(),
+        "biases": state_of(bench.session.recording),
     }
 
 
@@ -212,6 +225,4 @@ def _answer_errors(app: FastAPI) -> None:
 
 def _error(status: int, text: str) -> JSONResponse:
     line = " ".join(text.split())
-    return JSONResponse(
-        {"error": line if len(line) <= MESSAGE_MOST else f"{line[:MESSAGE_MOST]} ..."}, status
-    )
+    return JSONResponse({"error": line if len(line) <= MESSAGE_MOST else f"{line[:MESSAGE_MOST]} ..."}, status)

@@ -7,12 +7,14 @@ import threading
 import time
 from collections import OrderedDict
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from app.session import Choices
 from app.viewer.tuning import Drawings
 from pipeline.errors import ParameterError, RecordingError
 
 from .bench import Bench
+from .finder import ShotFinder
 from .page import Page
 
 BENCHES_KEPT = 2  # each holds its events: 20 s of a rally are 260 MB
@@ -33,6 +35,8 @@ class Workshop:
         self.drawings = Drawings()
         self._choices = choices
         self._benches: OrderedDict[Path, Bench] = OrderedDict()
+        self._finders: dict[Path, ShotFinder] = {}
+        self._scratch: TemporaryDirectory[str] | None = None
         self._pages: dict[str, Page] = {}
         self._lock = threading.Lock()
 
@@ -44,22 +48,21 @@ class Workshop:
             if bench is None:
                 # What was chosen for the first recording alone does not go for others.
                 own = path == self.path
-                choices = (
-                    self._choices
-                    if own
-                    else dataclasses.replace(self._choices, window_us=None, fixed_ball=None)
-                )
+                choices = self._choices if own else dataclasses.replace(self._choices, window_us=None, fixed_ball=None)
                 bench = Bench.open(path, choices)
             self._benches[path] = bench
             while len(self._benches) > BENCHES_KEPT:
-                self._benches.popitem(last=False)
+                self._drop(self._benches.popitem(last=False)[0])
             return bench
+
+    def _drop(self, path: Path) -> None:
+        finder = self._finders.pop(path, None)
+        if finder is not None:
+            finder.close()
 
     def recordings(self) -> list[str]:
         """Names of the recordings in the folder."""
-        found = {
-            path.name for path in self.folder.iterdir() if path.suffix.lower() in SUFFIXES and path.is_file()
-        }
+        found = {path.name for path in self.folder.iterdir() if path.suffix.lower() in SUFFIXES and path.is_file()}
         return sorted(found | {self.path.name})
 
     def open_page(self, name: str | None) -> Page:
@@ -71,7 +74,23 @@ class Workshop:
                 raise ParameterError(f"{PAGES_MOST} pages are open: close one of them")
             page = Page(bench, self.drawings)
             self._pages[page.id] = page
-            return page
+        self.look_for_shots(page)
+        return page
+
+    def look_for_shots(self, page: Page) -> None:
+        """Tell the page of the shots of a long recording, looking for them when nobody has yet."""
+        bench = page.bench
+        if bench.is_long:
+            path = bench.session.recording.path
+            finder = self._finders.setdefault(path, ShotFinder(bench))
+            finder.add(page.outbox, bench.session.parameters)
+
+    @property
+    def scratch(self) -> Path:
+        """A folder for simulated recordings; it goes with the program."""
+        if self._scratch is None:
+            self._scratch = TemporaryDirectory(prefix="spinscope-")
+        return Path(self._scratch.name)
 
     def page(self, page_id: str) -> Page | None:
         """The page of that id, if it is open."""
@@ -84,19 +103,24 @@ class Workshop:
             if page.listeners == 0 and now - page.last_sign_of_life > ALONE_S:
                 self._pages.pop(page.id, None)
                 page.close()
+                for finder in self._finders.values():
+                    finder.remove(page.outbox)
 
     def close(self) -> None:
-        """Close all pages and wait for their threads."""
+        """Close all pages, wait for all threads, and leave nothing behind."""
         pages = list(self._pages.values())
         for page in pages:
             page.close()
+        for finder in self._finders.values():
+            finder.close()
         for page in pages:
             page.join(2.0)
+        if self._scratch is not None:
+            self._scratch.cleanup()
+            self._scratch = None
 
     def _inside(self, name: str) -> Path:
         path = (self.folder / name).resolve()
         if path.parent != self.folder or not path.is_file():
-            raise RecordingError(
-                f"there is no recording {name!r} in the opened folder: choose one of its files"
-            )
+            raise RecordingError(f"there is no recording {name!r} in the opened folder: choose one of its files")
         return path

@@ -25,7 +25,10 @@ EVENTS_PAINTED = 60_000  # the latest of the shot; more add nothing but time
 PAINT = np.array([32, 42, 80])
 WHITE = np.array([238, 236, 228])
 DISC = np.array([38, 43, 51])
-RPS_M = 0.0006  # an arrow's length: 50 rps reach 30 mm beyond the ball
+RPS_M = 0.00035  # an arrow's length: 100 rps reach 35 mm beyond the ball
+# From where the views in space look: as the camera does, tilted by 40 degrees towards the image's lower edge.
+TILT = np.radians(40)
+EYE = np.array([0.0, np.sin(TILT), -np.cos(TILT)])
 RING_RADII, RING_POINTS = 1.18, 51  # of the ring that shows which way the ball turns
 
 
@@ -154,18 +157,20 @@ def _ring(run: Run) -> list[Chunk]:
     radius = 0.025 * run.ball_radius_m
     return [
         once(at.SPIN_RING, rr.LineStrips3D.from_fields(colors=[at.RING_COLOUR], radii=[radius])),
-        columns_at(at.SPIN_RING, run.times_us, rr.LineStrips3D.columns(strips=strips), lengths),
+        columns_at(
+            at.SPIN_RING, run.times_us, rr.LineStrips3D.columns(strips=[strip[:-2] for strip in strips]), lengths
+        ),
         once(at.RING_TIP, rr.Arrows3D.from_fields(colors=[at.RING_COLOUR], radii=[2.5 * radius])),
         columns_at(at.RING_TIP, run.times_us, arrows, lengths),
     ]
 
 
 def _around(axis: Floats) -> Floats:
-    """(RING_POINTS, 3) a line around the axis by the right-hand rule, beginning on the far side; ball radii."""
-    start = np.array([0.0, 0.0, 1.0]) if abs(axis[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    side = start - (start @ axis) * axis
+    """(RING_POINTS, 3) a line around the axis by the right-hand rule, its tip where the viewer looks; ball radii."""
+    viewer = EYE if abs(axis @ EYE) < 0.95 else np.array([1.0, 0.0, 0.0])
+    side = viewer - (viewer @ axis) * axis
     side /= np.linalg.norm(side)
-    angle = np.radians(np.linspace(20, 320, RING_POINTS))
+    angle = np.radians(np.linspace(60, 370, RING_POINTS))
     ring: Floats = np.cos(angle)[:, None] * side + np.sin(angle)[:, None] * np.cross(axis, side)
     return RING_RADII * ring
 
@@ -191,7 +196,7 @@ def _path(run: Run) -> list[Chunk]:
 def _axes(run: Run) -> list[Chunk]:
     """The camera frame's directions, 0.1 m long, beside the path."""
     low, high = path_bounds_m(run)
-    corner = np.array([low[0] - 0.1, high[1], high[2]])
+    corner = np.array([low[0] - 0.25, (low[1] + high[1]) / 2, high[2]])
     arrows = rr.Arrows3D(
         origins=[corner] * 3,
         vectors=0.1 * np.eye(3),

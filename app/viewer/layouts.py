@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
@@ -9,7 +11,7 @@ from numpy.typing import NDArray
 
 from . import LAYOUTS
 from . import entities as at
-from .ball import path_bounds_m
+from .ball import EYE, path_bounds_m
 from .run import Run
 from .summary import CARD_PX
 
@@ -59,9 +61,7 @@ def _all(run: Run) -> rrb.Container:
             _still(),
             column_shares=[4, 3, 3, 4],
         ),
-        rrb.Horizontal(
-            _rate(run, legend=False), _magnitude(run, legend=False), _ball(run), _summary(), column_shares=[4, 4, 3, 5]
-        ),
+        rrb.Horizontal(_rate(run, legend=False), _magnitude(run), _ball(run), _summary(), column_shares=[4, 4, 3, 5]),
         row_shares=[4, 4, 5],
         name=NAMES["all"],
     )
@@ -110,7 +110,7 @@ def _spin(run: Run) -> rrb.Container:
 def _coach(run: Run) -> rrb.Container:
     return rrb.Horizontal(
         _ball(run, "Ball and spin", [at.SPIN_SHOWN]),
-        rrb.Vertical(_card(), _space(run, "Flight"), row_shares=[3, 2]),
+        rrb.Vertical(_card(), _space(run, "Flight", [at.AXES, at.TRUE_PATH, at.SPIN_SHOWN]), row_shares=[3, 2]),
         column_shares=[3, 2],
         name=NAMES["coach"],
     )
@@ -154,9 +154,8 @@ def _logo_events(run: Run) -> rrb.View:
 
 
 def _flow(run: Run) -> rrb.View:
-    view = _ball_view(
-        run, f"Flow: full colour = {run.fast_flow_px_s:,.0f} px/s", [at.FLOW, at.LOGO_OUTLINE, at.FLOW_WHEEL], 1.25
-    )
+    speed = "" if run.fast_flow_px_s is None else f": full colour = {run.fast_flow_px_s:,.0f} px/s"
+    view = _ball_view(run, f"Flow{speed}", [at.FLOW, at.LOGO_OUTLINE, at.FLOW_WHEEL], 1.25)
     radius = run.largest_radius_px
     view.properties["VisualBounds2D"] = rrb.VisualBounds2D(
         x_range=[-1.2 * radius, 2.3 * radius], y_range=[-1.2 * radius, 1.2 * radius]
@@ -170,7 +169,11 @@ def _still() -> rrb.View:
 
 
 def _plot(
-    origin: str, name: str, y_range: tuple[float, float] | None = None, legend: bool = False
+    origin: str,
+    name: str,
+    y_range: tuple[float, float] | None = None,
+    legend: bool = False,
+    corner: Literal["RightTop", "RightBottom"] = "RightTop",
 ) -> rrb.TimeSeriesView:
     """A plot over the time in view; with a legend the range grows upwards to make room for it."""
     if legend and y_range is not None:
@@ -180,12 +183,14 @@ def _plot(
         name=name,
         axis_x=rrb.TimeAxis(link="LinkToGlobal"),
         axis_y=None if y_range is None else rrb.ScalarAxis(range=y_range),
-        plot_legend=rrb.PlotLegend(corner="RightTop", visible=legend),
+        plot_legend=rrb.PlotLegend(corner=corner, visible=legend or corner == "RightBottom"),
     )
 
 
 def _status() -> rrb.View:
-    return rrb.StateTimelineView(origin=at.STATUS, name="Tracker", time_view=rrb.TimeAxis(link="LinkToGlobal"))
+    return rrb.StateTimelineView(
+        origin=at.STATUS, name="State of the tracker", time_view=rrb.TimeAxis(link="LinkToGlobal")
+    )
 
 
 def _state_plot(run: Run, name: str) -> rrb.View:
@@ -220,7 +225,7 @@ def _event_count(run: Run) -> rrb.View:
 
 def _rate(run: Run, legend: bool = True) -> rrb.View:
     rates = [0.0, *(tick.rate.rate_hz.max(initial=0.0) / 1e3 for tick in run.ticks)]
-    return _plot(at.RATE, "Logo's event rate [kev/s]", _range(np.array(rates)), legend)
+    return _plot(at.RATE, "Logo's event rate [kev/s], average yellow", _range(np.array(rates)), legend)
 
 
 def _rhythm(run: Run) -> rrb.View:
@@ -229,14 +234,14 @@ def _rhythm(run: Run) -> rrb.View:
     return _plot(at.RHYTHM, name, _range(np.concatenate(rates)), legend=True)
 
 
-def _magnitude(run: Run, legend: bool = True) -> rrb.View:
+def _magnitude(run: Run) -> rrb.View:
     values = [e.magnitude_rps for tick in run.ticks for e in tick.spin.estimates.values()]
     values += [tick.rate.spin_rps for tick in run.ticks]
     known = np.array([value for value in values if value is not None])
     top = 1.2 * float(np.quantile(known, 0.95)) if known.size else 100.0
     if run.truth is not None:
         top = max(top, 1.2 * float(np.linalg.norm(run.truth.spin_rps, axis=1).max()))
-    return _plot(at.SPIN_MAGNITUDE, "Spin [rps], ± 1σ", (0.0, top), legend)
+    return _plot(at.SPIN_MAGNITUDE, "Spin [rps] ± 1σ", (0.0, top), corner="RightBottom")
 
 
 def _parts(run: Run) -> rrb.View:
@@ -271,7 +276,7 @@ def _range(values: Floats) -> tuple[float, float] | None:
 def _ball(run: Run, name: str = "Ball, logo painted on", arrows: list[str] | None = None) -> rrb.View:
     """The ball from close by, from above the line of sight; moving along with it. Without `arrows`: all of them."""
     shown = arrows or [at.SPIN_SHOWN, f"{at.SPIN_ARROWS}/**"]
-    eye = _tilted(np.zeros(3), 5.5 * run.ball_radius_m, run)
+    eye = _tilted(np.zeros(3), 5.5 * run.ball_radius_m)
     return rrb.Spatial3DView(
         origin=at.BALL,
         contents=[at.BALL, at.MESH, f"{at.SPIN_RING}/**", *shown, at.PATH],
@@ -283,34 +288,33 @@ def _ball(run: Run, name: str = "Ball, logo painted on", arrows: list[str] | Non
     )
 
 
-def _space(run: Run, name: str = "Flight path, grid 0.1 m") -> rrb.View:
+def _space(run: Run, name: str = "Flight path, grid 0.1 m", without: list[str] | None = None) -> rrb.View:
     """The flight from above, tilted: right is the image's right, near is the image's lower edge."""
+    hidden = [f"- {path}" for path in (f"{at.SPIN_ARROWS}/**", *(without or []))]
     low, high = path_bounds_m(run)
     middle, size = (low + high) / 2, max(float(np.linalg.norm(high - low)), 0.3)
     up = np.array(run.camera.up)
     below = min(float(low @ up), float(high @ up)) - 2 * run.ball_radius_m
     return rrb.Spatial3DView(
         origin=at.WORLD,
-        contents=[f"{at.WORLD}/**", f"- {at.SPIN_ARROWS}/**"],
+        contents=[f"{at.WORLD}/**", *hidden],
         name=name,
         background=at.BACKGROUND,
         line_grid=rrb.LineGrid3D(
             visible=True, spacing=0.1, plane=rr.components.Plane3D(tuple(up), below), stroke_width=1.0
         ),
-        eye_controls=_tilted(middle, 1.3 * size, run),
+        eye_controls=_tilted(middle, 1.2 * size),
         overrides={at.PATH: _so_far()},
     )
 
 
-def _tilted(target: Floats, distance_m: float, run: Run) -> rrb.EyeControls3D:
-    """Look at the target as the camera does, tilted by 40 degrees towards the image's lower edge."""
-    tilt = np.radians(40)
-    away = np.array([0.0, np.sin(tilt), -np.cos(tilt)])
+def _tilted(target: Floats, distance_m: float) -> rrb.EyeControls3D:
+    """Look at the target as the camera does, tilted towards the image's lower edge."""
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
-        position=target + distance_m * away,
+        position=target + distance_m * EYE,
         look_target=target,
-        eye_up=(0.0, -np.cos(tilt), -np.sin(tilt)),
+        eye_up=(0.0, EYE[2], -EYE[1]),
     )
 
 

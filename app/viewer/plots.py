@@ -76,7 +76,7 @@ def spin_chunks(run: Run) -> list[Chunk]:
         entity, colour = f"{at.SPIN_MAGNITUDE}/{method}", at.method_colour(method)
         chunks += band(entity, run.times_us, values, np.nan_to_num(stds) ** 2, method, "rps", colour)
     rhythm = from_start([_number(tick.rate.spin_rps) for tick in run.ticks])
-    chunks += line(f"{at.SPIN_MAGNITUDE}/rate", run.times_us, rhythm, "rhythm of the event rate [rps]", at.RATE_COLOUR)
+    chunks += line(f"{at.SPIN_MAGNITUDE}/rate", run.times_us, rhythm, "rhythm of the event rate", at.RATE_COLOUR)
     vectors = np.full((len(run.ticks), 3), np.nan)
     for i, tick in enumerate(run.ticks):
         if tick.spin.best is not None:
@@ -134,6 +134,9 @@ def _rate_curves(run: Run) -> tuple[NDArray[np.int64], Floats, Floats]:
     if covered_us > run.start_us:
         times.append(np.array([run.start_us]))
         curves.append(np.full((1, 3), np.nan))
+    if len(times) == 1 and not np.isfinite(curves[0]).any():  # no rate at all: the plot spans the run all the same
+        times.insert(0, np.array([run.end_us]))
+        curves.insert(0, curves[0])
     found = np.concatenate([*crossings[::-1], np.empty(0)])
     return np.concatenate(times[::-1]), np.concatenate(curves[::-1]), found if found.size else np.array([np.nan])
 
@@ -143,9 +146,7 @@ def _true_spin(run: Run) -> list[Chunk]:
     t_us = np.array([tick.track.t_us for tick in run.ticks])
     spin = run.true_values(t_us, run.truth.spin_rps)
     magnitude = np.linalg.norm(spin, axis=1)
-    chunks = line(
-        f"{at.SPIN_MAGNITUDE}/truth", run.times_us, from_start(magnitude), "truth [rps]", at.TRUTH_COLOUR, 0.8
-    )
+    chunks = line(f"{at.SPIN_MAGNITUDE}/truth", run.times_us, from_start(magnitude), "truth", at.TRUTH_COLOUR, 0.8)
     for method in run.methods:
         errors = np.full(len(run.ticks), np.nan)
         for i, tick in enumerate(run.ticks):

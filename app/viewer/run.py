@@ -79,9 +79,9 @@ class Run:
 
     @cached_property
     def first_sight_us(self) -> int:
-        """When the first track starts: where the viewer waits for the user. The start if there is none."""
+        """When the first track starts: where the viewer waits for the user. The first tick's end if there is none."""
         found = [tick.packet.end_us for tick in self.ticks if tick.track.has_ball]
-        return found[0] if found else self.start_us
+        return found[0] if found else self.ticks[0].packet.end_us
 
     @cached_property
     def has_ball(self) -> NDArray[np.bool_]:
@@ -109,11 +109,11 @@ class Run:
         return float(np.nanmax(self.means[:, 4])) if self.has_ball.any() else 20.0
 
     @cached_property
-    def fast_flow_px_s(self) -> float:
-        """A speed that one in fifty of the flow's events exceed: full colour in its picture."""
+    def fast_flow_px_s(self) -> float | None:
+        """A speed that one in fifty of the flow's events exceed: full colour in its picture. None without flow."""
         flows = [np.hypot(tick.flow.vx_px_s, tick.flow.vy_px_s) for tick in self.ticks]
         speeds = np.concatenate([np.empty(0), *flows])
-        return float(np.quantile(speeds, 0.98)) if speeds.size else 1.0
+        return float(np.quantile(speeds, 0.98)) if speeds.size else None
 
     def centre_m(self, mean: Floats) -> Floats:
         """(n, 3) centres of the ball, camera frame, from Kalman states (n, 5) or (5,)."""
@@ -121,10 +121,13 @@ class Run:
         return self.camera.ball_centre_m(states[:, 0], states[:, 1], states[:, 4], self.ball_radius_m)
 
     def true_values(self, t_us: Floats, values: Floats) -> Floats:
-        """A column (m,) or (m, k) of the truth at times (n,); NaN outside the time the truth covers."""
+        """A column (m,) or (m, k) of the truth at times (n,); NaN more than a sample outside what the truth covers."""
         assert self.truth is not None
+        known_us = self.truth.t_us
+        spare_us = known_us[1] - known_us[0] if known_us.size > 1 else 0
+        covered = (t_us >= known_us[0] - spare_us) & (t_us <= known_us[-1] + spare_us)
         columns = values.reshape(len(values), -1).T
-        found = [np.interp(t_us, self.truth.t_us, column, np.nan, np.nan) for column in columns]
+        found = [np.where(covered, np.interp(t_us, known_us, column), np.nan) for column in columns]
         return np.stack(found, axis=1).reshape(len(t_us), *values.shape[1:])
 
 

@@ -125,7 +125,7 @@ def logo_chunks(run: Run) -> list[Chunk]:
 
 def flow_chunks(run: Run) -> list[Chunk]:
     """Triplet Matching's flow in the ball's frame, hue = direction, saturation = speed; and the wheel of colours."""
-    half_px, bound_px_s = int(np.ceil(1.1 * run.largest_radius_px)), run.fast_flow_px_s
+    half_px, bound_px_s = int(np.ceil(1.1 * run.largest_radius_px)), run.fast_flow_px_s or 1.0
     pictures = [
         hsv_image(
             tick.flow.x_px,

@@ -38,7 +38,8 @@ def summary_chunks(run: Run) -> list[Chunk]:
         velocity = _velocity_m_s(run, tick)
         shot = finals.get(tick.packet.end_us)
         if shot is not None:
-            velocity = None if run.fixed else shot.velocity_m_s(run.camera, run.ball_radius_m)
+            if not run.fixed and shot.t_us.size > 1:
+                velocity = shot.velocity_m_s(run.camera, run.ball_radius_m)
             result = _shot_result(run, tick, shot, velocity)
         if tick.track.has_ball:
             card = _tick_card(run, tick, velocity)
@@ -69,11 +70,21 @@ def _velocity_m_s(run: Run, tick: Tick) -> Vector | None:
 
 def _opening(run: Run) -> str:
     """What is said before anything is known."""
-    lines = ["## No ball yet", "", f"`{run.name}`: {run.end_us - run.start_us:,} us from {run.start_us:,} us.", ""]
+    lines = ["## No ball yet", ""]
     if run.no_shot_reason:
-        lines = ["## No ball in this recording", "", f"Because: **{run.no_shot_reason}**", "", *lines[2:]]
-    lines += [f"Warning: {warning}\n" for warning in run.warnings]
-    return "\n".join(lines)
+        reason = run.no_shot_reason.removeprefix("no ball: ")
+        lines = ["## No ball in this recording", "", f"Because: **{reason}**", ""]
+    return "\n".join([*lines, *_origin(run)])
+
+
+def _origin(run: Run) -> list[str]:
+    """What the run is of, and what people should know about it."""
+    span = f"{run.start_us:,} to {run.end_us:,} us"
+    return [
+        f"`{run.name}`, {span}; the timeline is the file's own time.",
+        "",
+        *(f"Warning: {warning}\n" for warning in run.warnings),
+    ]
 
 
 def _tick_text(run: Run, tick: Tick, velocity: Vector | None, result: list[str]) -> list[str]:
@@ -104,8 +115,7 @@ def _headline(run: Run, tick: Tick, velocity: Vector | None, said: str) -> list[
         turns = f"**{rpm(estimate.magnitude_rps or 0):.0f} rpm**"
         lines += [f"{kind.sentence}. {turns}, {speed_words(velocity)}; {said}.", ""]
     else:
-        reasons = {e.reason for e in tick.spin.estimates.values() if e.reason}
-        lines += ["## Spin not known", "", f"{speed_words(velocity)}; {said}. {'; '.join(sorted(reasons))}", ""]
+        lines += ["## Spin not known", "", f"{speed_words(velocity)}; {said}.", ""]
     return lines
 
 
@@ -115,12 +125,24 @@ def _table(run: Run, tick: Tick) -> list[str]:
     for method, estimate in tick.spin.estimates.items():
         name = f"**{method} ✔**" if tick.spin.best == method else method
         lines.append(f"| {name} | {_magnitude(estimate)} | {axis_words(estimate)} |")
-    if run.truth is not None:
-        truth = run.true_values(np.array([tick.track.t_us]), run.truth.spin_rps)[0]
-        if np.isfinite(truth).all() and truth.any():
-            true_estimate = SpinEstimate("truth", truth, None, None)
-            lines.append(f"| truth | {_magnitude(true_estimate)} | {axis_words(true_estimate)} |")
-    return [*lines, ""]
+    return [*lines, *_truth_rows(run, tick), ""]
+
+
+def _truth_rows(run: Run, tick: Tick) -> list[str]:
+    """The truth as the table's last row, and how far from it every answer is."""
+    if run.truth is None:
+        return []
+    spin = run.true_values(np.array([tick.track.t_us]), run.truth.spin_rps)[0]
+    if not (np.isfinite(spin).all() and spin.any()):
+        return []
+    truth = SpinEstimate("truth", spin, None, None)
+    lines = [f"| truth | {_magnitude(truth)} | {axis_words(truth)} |", ""]
+    for method, estimate in tick.spin.estimates.items():
+        if estimate.axis is not None:
+            angle = np.degrees(np.arccos(np.clip(estimate.axis @ spin / np.linalg.norm(spin), -1, 1)))
+            off = abs((estimate.magnitude_rps or 0) - (truth.magnitude_rps or 0))
+            lines += [f"{method} is {off:.1f} rps and {angle:.1f}° from the truth.", ""]
+    return lines
 
 
 def _magnitude(estimate: SpinEstimate) -> str:
@@ -144,6 +166,8 @@ def _evidence(run: Run, tick: Tick) -> list[str]:
         f"radius {mean[4]:.1f} ± {deviation[4]:.1f} px; {len(tick.logo.events)} logo events in this tick.",
         "",
         f"{rhythm[0].upper()}{rhythm[1:]}{slices}.",
+        "",
+        *_origin(run),
     ]
 
 

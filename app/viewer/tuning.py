@@ -103,9 +103,7 @@ def rrd_bytes(chunks: Sequence[Chunk], recording_id: str) -> bytes:
     """The chunks as one recording of this id, without a layout."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "run.rrd"
-        ChunkStore.from_chunks(list(chunks)).write_rrd(
-            path, application_id=at.APPLICATION, recording_id=recording_id
-        )
+        ChunkStore.from_chunks(list(chunks)).write_rrd(path, application_id=at.APPLICATION, recording_id=recording_id)
         return path.read_bytes()
 
 

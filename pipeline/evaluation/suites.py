@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import ParameterError
-from . import spinner, thrower
+from . import biases, detector, filters, frames, runtime, spinner, thrower
 from .tables import Row, Table
 from .work import Bench, Progress, Task, run
 
@@ -31,8 +31,13 @@ class Suite:
 SUITES: dict[str, Suite] = {
     suite.name: suite
     for suite in (
+        Suite("detector", "Ball detector: error against speed", detector.tasks, detector.tables),
         Suite("spinner", "Ball spinner: the paper's table 1", spinner.tasks, spinner.tables),
         Suite("thrower", "Ball thrower: the paper's table 2", thrower.tasks, thrower.tables),
+        Suite("frames", "Frame camera against event camera: the paper's table 2", frames.tasks, frames.tables),
+        Suite("biases", "Biases: event rates and pictures of the logo", biases.tasks, biases.tables),
+        Suite("filters", "Filters: events kept, and the spin", filters.tasks, filters.tables),
+        Suite("runtime", "Run times", runtime.tasks, runtime.tables, alone=True),
     )
 }
 

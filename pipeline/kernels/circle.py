@@ -99,7 +99,7 @@ def active_cells(
     bright = 0
     for i in range(x_px.size):
         bright += values[y_px[i], x_px[i]] >= least
-    if bright < 2:
+    if bright < 8:
         return np.empty(0, np.int64), np.empty(0, np.int64)
     rows = -(-values.shape[0] // cell_px)
     columns = -(-values.shape[1] // cell_px)

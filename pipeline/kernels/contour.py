@@ -125,7 +125,7 @@ def fit_ring(
         scatter = math.sqrt(squares / weight_sum) / 0.91
         if gate <= floor_px and np.max(np.abs(step)) < 1e-3:
             break
-        gate = max(min(4.7 * scatter, 0.67 * gate), floor_px)
+        gate = max(min(4.7 * scatter, 0.5 * gate), floor_px)
     inverse = np.linalg.inv(information)
     covariance = np.empty((5, 5))
     for j in range(5):
@@ -196,7 +196,8 @@ def support(
      share of the visible outline ahead that has events, the same behind it, share of the whole outline that is
      visible, events just outside (one to four tolerances beyond), events inside].
     On the outline = within tolerance_px of it, and behind the centre up to early_px inside.
-    The outline is cut into `bins` sectors; sectors that the motion passes at a grazing angle (|cos| < 0.25)
+    The outline is cut into `bins` sectors, which count from two events on, from one where there are fewer than
+    three a sector; sectors that the motion passes at a grazing angle (|cos| < 0.25)
     yield few events and do not count. Shares of nothing are 0.
     """
     counts = np.zeros(bins, np.int64)
@@ -220,6 +221,7 @@ def support(
             behind_on += on[i]
         counts[int((math.atan2(dy, dx) / (2.0 * math.pi) + 1.0) * bins) % bins] += 1
     speed = math.hypot(ring[2], ring[3]) + 1e-9
+    least = 2 if ahead + behind >= 3 * bins else 1
     seen = np.zeros(2)
     visible = np.zeros(2)
     in_view = 0
@@ -237,7 +239,7 @@ def support(
             continue
         side = 0 if across > 0.0 else 1
         visible[side] += 1.0
-        seen[side] += counts[b] >= 2
+        seen[side] += counts[b] >= least
     return np.array(
         [
             float(ahead + behind),

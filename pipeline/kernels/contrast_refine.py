@@ -14,18 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .contrast import CELLS_PER_SIGMA, score
+from .contrast_search import axes_of
 from .contrast_window import Window
 
 Floats = NDArray[np.float64]
 STEP_SIGMAS = 0.5
 OFFSET_STEP_PX = 0.3
+NO_OFFSETS = np.zeros(0)
 
 
 @numba.njit(cache=True, nogil=True)
 def moved_normals(
     normals: Floats, facing: Floats, radius_px: Floats, x_px: float, y_px: float, wider_px: float
 ) -> Floats:
-    """Normals (n, 3) as they are if the ball's centre was at (+x_px, +y_px) of the assumed one and its radius larger.
+    """Normals (n, 3) as they are if the ball's centre is (+x_px, +y_px) off the assumed one and its radius larger.
 
     facing : (n, 3) unit vectors from the camera to the ball's centre
     radius_px : (n,) radius of the ball that the normals were made with
@@ -35,7 +37,7 @@ def moved_normals(
     moved = np.empty((n, 3))
     for i in range(n):
         ux, uy, uz = facing[i, 0], facing[i, 1], facing[i, 2]
-        # The image's axes as seen from the ball's direction: across = x less its part along u, down = u cross across.
+        # The image's axes as seen from the ball: across = x less its part along u, down = u cross across.
         length = math.sqrt(max(1.0 - ux * ux, 1e-12))
         ax, ay, az = (1.0 - ux * ux) / length, -ux * uy / length, -ux * uz / length
         dx, dy, dz = uy * az - uz * ay, uz * ax - ux * az, ux * ay - uy * ax
@@ -43,22 +45,13 @@ def moved_normals(
         down = dx * normals[i, 0] + dy * normals[i, 1] + dz * normals[i, 2]
         shrink = radius_px[i] / (radius_px[i] + wider_px)
         across, down = (across - x_px / radius_px[i]) * shrink, (down - y_px / radius_px[i]) * shrink
-        rim = math.sqrt(across * across + down * down)
-        if rim > 1.0:
-            across, down = across / rim, down / rim
+        rim = max(math.sqrt(across * across + down * down), 1.0)
+        across, down = across / rim, down / rim
         depth = math.sqrt(max(1.0 - across * across - down * down, 0.0))
         moved[i, 0] = across * ax + down * dx - depth * ux
         moved[i, 1] = across * ay + down * dy - depth * uy
         moved[i, 2] = across * az + down * dz - depth * uz
     return moved
-
-
-def axes_of(spin: Floats) -> Floats:
-    """(3, 3) rows: the spin's direction and two directions across it, orthonormal."""
-    along = spin / np.linalg.norm(spin)
-    across = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
-    across /= np.linalg.norm(across)
-    return np.stack([along, across, np.cross(along, across)])
 
 
 def shifted_spin(spin: Floats, axes: Floats, change: Floats) -> Floats:
@@ -74,13 +67,14 @@ def shifted_spin(spin: Floats, axes: Floats, change: Floats) -> Floats:
 
 
 @dataclass(slots=True, eq=False)
-class Slope:
-    """The score as a function of the spin and, if `prior_px` has entries, the ball's offsets.
+class Hill:
+    """The score as a function of the spin and, if `prior_px` has entries, of the ball's offsets.
 
-    part : the events (one window); facing, radius_px : of the same events
+    part : the events, one window; facing, radius_px : of the same events
     sigma, floor : kernel in radians, density floor
-    prior_px : (0,), (2,) or (3,) 1 sigma of the offsets of centre x, y and radius, px
-    trust : factor of the score against the prior (events of one edge repeat each other, so less than 1)
+    prior_px : (0,) or (3,) 1 sigma of the offsets of centre x, y and radius, px
+    trust : weight of the score against the prior
+    ratios : (n,) each event's share of the last value
     """
 
     part: Window
@@ -92,17 +86,19 @@ class Slope:
     trust: float
     ratios: Floats
 
-    def value(self, spin_rad_s: Floats, offsets_px: Floats) -> float:
-        """Score less the prior's cost; each event's share stays in `ratios`."""
+    def score(self, spin_rad_s: Floats, offsets_px: Floats) -> float:
+        """The score alone; each event's share goes to `ratios`."""
         part = self.part
-        cost = 0.0
-        if self.prior_px.size:
-            padded = np.zeros(3)
-            padded[: offsets_px.size] = offsets_px
-            moved = moved_normals(part.normals, self.facing, self.radius_px, padded[0], padded[1], padded[2])
+        if offsets_px.size:
+            x_px, y_px, wider_px = offsets_px
+            moved = moved_normals(part.normals, self.facing, self.radius_px, x_px, y_px, wider_px)
             part = part._replace(normals=moved)
-            cost = 0.5 * float(np.sum((offsets_px / self.prior_px) ** 2))
-        return self.trust * score(self.ratios, spin_rad_s, *part, self.sigma * CELLS_PER_SIGMA, self.floor) - cost
+        return float(score(self.ratios, spin_rad_s, *part, self.sigma * CELLS_PER_SIGMA, self.floor))
+
+    def value(self, spin_rad_s: Floats, offsets_px: Floats) -> float:
+        """Trusted score less the prior's cost."""
+        cost = 0.5 * float(np.sum((offsets_px / self.prior_px) ** 2))
+        return self.trust * self.score(spin_rad_s, offsets_px) - cost
 
     def steps(self, spin_rad_s: Floats) -> Floats:
         """Step of each unknown that moves the events by about half a kernel: rad/s, then px."""
@@ -114,17 +110,18 @@ class Slope:
         return np.concatenate([[along, across, across], np.full(self.prior_px.size, OFFSET_STEP_PX)])
 
 
-def climb(slope: Slope, spin_rad_s: Floats, offsets_px: Floats, iterations: int) -> tuple[Floats, Floats, float]:
+def climb(hill: Hill, spin_rad_s: Floats, offsets_px: Floats, iterations: int) -> tuple[Floats, Floats, float]:
     """Spin, offsets and value after at most so many Newton steps; never lower than at the start."""
     spin, offsets, scale = spin_rad_s, offsets_px, 1.0
-    count = 3 + slope.prior_px.size
+    count = 3 + hill.prior_px.size
     unit = np.eye(count)
-    best = slope.value(spin, offsets)
+    best = hill.value(spin, offsets)
     for _ in range(iterations):
-        axes, steps = axes_of(spin), slope.steps(spin) * scale
+        axes, steps = axes_of(spin), hill.steps(spin) * scale
 
         def at(change: Floats, axes: Floats = axes, steps: Floats = steps, spin: Floats = spin) -> float:
-            return slope.value(shifted_spin(spin, axes, change[:3] * steps[:3]), offsets + change[3:] * steps[3:])
+            moved = change * steps
+            return hill.value(shifted_spin(spin, axes, moved[:3]), offsets + moved[3:])
 
         above = np.array([at(unit[k]) for k in range(count)])
         below = np.array([at(-unit[k]) for k in range(count)])
@@ -136,9 +133,8 @@ def climb(slope: Slope, spin_rad_s: Floats, offsets_px: Floats, iterations: int)
         values = np.maximum(np.abs(values), 0.02 * np.abs(values).max() + 1e-12)
         change = vectors @ ((vectors.T @ ((above - below) / 2.0)) / values)
         length = float(np.linalg.norm(change))
-        if length > 2.0:
-            change *= 2.0 / length
-        candidates = [change, *unit, *-unit]
+        change *= min(1.0, 2.0 / max(length, 1e-12))  # the parabola is not to be believed farther than a kernel
+        changes = [change, *unit, *-unit]
         gains = [at(change), *above, *below]
         pick = int(np.argmax(gains))
         if gains[pick] <= best:
@@ -147,8 +143,63 @@ def climb(slope: Slope, spin_rad_s: Floats, offsets_px: Floats, iterations: int)
             scale *= 0.5
             continue
         best = gains[pick]
-        spin = shifted_spin(spin, axes, candidates[pick][:3] * steps[:3])
-        offsets = offsets + candidates[pick][3:] * steps[3:]
+        offsets = offsets + changes[pick][3:] * steps[3:]
+        spin = shifted_spin(spin, axes, changes[pick][:3] * steps[:3])
         if pick == 0 and length < 0.05:
             break
     return spin, offsets, best
+
+
+def bend_and_noise(hill: Hill, spin_rad_s: Floats, offsets_px: Floats, repeats: float) -> tuple[Floats, Floats]:
+    """Curvature A and covariance M of the score's gradient at the top of the hill, in units of its steps.
+
+    An event's part of the gradient is twice the slope of its own share (it also is the neighbour of its neighbours):
+    M = 4 repeats sum d_i d_i', with `repeats` events of one edge that tell the same. Where the score is a likelihood
+    A is proportional to M; finite differences over a sharp top can break that, even to negative curvature, so A's
+    eigenvalues relative to M are kept within a factor of three of their median.
+    """
+    count = 3 + hill.prior_px.size
+    axes, steps, unit = axes_of(spin_rad_s), hill.steps(spin_rad_s), np.eye(count)
+
+    def at(change: Floats) -> float:
+        moved = change * steps
+        return hill.score(shifted_spin(spin_rad_s, axes, moved[:3]), offsets_px + moved[3:])
+
+    middle = at(np.zeros(count))
+    above, below = np.empty(count), np.empty(count)
+    slopes = np.empty((count, hill.ratios.size))
+    for k in range(count):
+        above[k] = at(unit[k])
+        slopes[k] = hill.ratios
+        below[k] = at(-unit[k])
+        slopes[k] = (slopes[k] - hill.ratios) / 2.0
+    bend = np.diag(2.0 * middle - above - below)
+    for k in range(count):
+        for j in range(k):
+            both = at(unit[j] + unit[k]) + at(-unit[j] - unit[k])
+            bend[j, k] = bend[k, j] = -(both - above[j] - above[k] - below[j] - below[k] + 2.0 * middle) / 2.0
+    noise = 4.0 * repeats * (slopes @ slopes.T)
+    values, vectors = np.linalg.eigh(noise)
+    root = vectors * np.sqrt(np.maximum(values, 1e-6 * values[-1]))
+    inverse = np.linalg.inv(root)
+    values, vectors = np.linalg.eigh(inverse @ bend @ inverse.T)
+    usual = max(float(np.median(values)), 1e-3)
+    values = np.clip(values, usual / 3.0, usual * 3.0)
+    rooted = root @ vectors
+    return rooted @ (values[:, None] * rooted.T), noise
+
+
+def spread_of_estimate(hill: Hill, spin_rad_s: Floats, bend: Floats, noise: Floats) -> Floats:
+    """(3, 3) covariance of the spin, rad^2/s^2, at the top of the hill: the sandwich of curvature and noise.
+
+    With A the score's curvature, M the covariance of its gradient g, P the prior's precision and w the trust, the
+    estimate moves by (w A + P)^-1 (w g + P d) when the ball is d off its assumed place, so its covariance is
+    (w A + P)^-1 (w^2 M + P) (w A + P)^-1.
+    """
+    steps = hill.steps(spin_rad_s)
+    prior = np.diag(np.concatenate([np.zeros(3), (steps[3:] / hill.prior_px) ** 2]))
+    inverse = np.linalg.inv(hill.trust * bend + prior)
+    whole = inverse @ (hill.trust**2 * noise + prior) @ inverse
+    back = axes_of(spin_rad_s).T * steps[:3]
+    covariance: Floats = back @ whole[:3, :3] @ back.T
+    return covariance

@@ -26,9 +26,7 @@ class Window(NamedTuple):
 
 
 @numba.njit(cache=True, nogil=True)
-def exchanged(
-    t_s: Floats, starts: Integers, times_each: int
-) -> tuple[Floats, Integers, Integers]:
+def exchanged(t_s: Floats, starts: Integers, times_each: int) -> tuple[Floats, Integers, Integers]:
     """Times (m,), rows (m,) and segment starts (k + 1,): each event at `times_each` times of its own segment.
 
     The times are those of the segment's events at ranks spread evenly, shifted from event to event by the golden

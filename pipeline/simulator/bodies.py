@@ -62,7 +62,7 @@ class BallBody:
         return spans
 
     def speeds_px_s(self, camera: Camera, start_s: float, stop_s: float) -> tuple[float, float]:
-        """How fast the outline and the ball's surface can move in the image at most."""
+        """How fast the outline and the ball's surface move in the image at most."""
         outline, surface = 0.0, 0.0
         for one in self.paths:
             inside = (one.time_s >= start_s - LOOK_S) & (one.time_s <= stop_s + LOOK_S)
@@ -124,7 +124,7 @@ class BallBody:
         q = position_m[:, 2] ** 2 / distance2 - sin2
         half = camera.focal_px * np.sqrt(sin2 * (1 - sin2)) / q + margin_px  # the longer semi-axis
         if any(camera.distortion):
-            half = 1.1 * half + 2.0
+            half = 1.3 * half + 2.0  # more than a usable lens stretches a ball at the border
         return _clipped(x - half, y - half, x + half, y + half, camera)
 
 
@@ -142,14 +142,14 @@ class ArmBody:
         return list(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True))
 
     def speeds_px_s(self, camera: Camera, start_s: float, stop_s: float) -> tuple[float, float]:
-        """The hand's highest speed, twice."""
+        """How fast elbow and hand move in the image at most."""
         arm = self.arm
         turn = 2 * math.pi * arm.frequency_hz
         swing = np.abs(np.cos(turn * np.linspace(start_s, stop_s, 9) + arm.phase_rad)).max()
         speed = arm.length_m * arm.swing_rad * turn * float(swing)
         near = min(arm.elbow_m[2], arm.elbow_m[2] - arm.length_m) - arm.radius_elbow_m
         speed *= camera.focal_px / max(near, 0.1)
-        return speed, speed
+        return 0.0, speed
 
     def distance_m(self, time_s: Floats) -> float:
         elbow, hand = arm_ends(self.arm, time_s[time_s.size // 2 : time_s.size // 2 + 1])

@@ -90,6 +90,7 @@ def _tails(
     bodies: Bodies,
     physics: Physics,
     row: int,
+    before_us: float,
     now_us: float,
     gain: float,
 ) -> None:
@@ -120,6 +121,8 @@ def _tails(
                 near = True
         if near:
             continue
+        if settled(state, p):  # nothing happened since its last look: a body that vanishes does so now
+            state[p, TIME] = max(state[p, TIME], before_us)
         intensity = background[p] * gain + physics.floor
         advance(state, events, sensor, physics, p, owner[p], intensity, intensity, now_us)
         if physics.flicker_depth == 0.0 and settled(state, p):
@@ -152,9 +155,9 @@ def run(
         start = fresh and row == first
         for k in range(bodies.kind.shape[0]):
             every = int(bodies.kind[k, EVERY])
-            if start or row % every == 0:
+            if start or row % every == 0 or row == time_us.size - 1:
                 _look(pixels, view, bodies, physics, row, k, time_us[max(row - every, 0)], now_us, gain, start)
-        _tails(pixels, view, bodies, physics, row, now_us, gain)
+        _tails(pixels, view, bodies, physics, row, time_us[max(row - 1, 0)], now_us, gain)
         row += 1
     return row
 

@@ -39,7 +39,7 @@ POSE_COLUMNS = 13
     INK_Y,
     SAMPLE,
 ) = range(13)
-BODY_COLUMNS = 13  # SLOWER: so many looks pass while a ball's outline moves as far as its surface in one
+BODY_COLUMNS = 13  # SLOWER: so many looks may pass where a body moves slowest
 
 LOOKS_A_PIXEL = 4  # at least, of any motion
 
@@ -146,7 +146,7 @@ def ball_light(
             looks *= LOOKS_A_PIXEL
         return cover, plain, plain, min(looks, 1.0 + (gap - reach) / pixel * LOOKS_A_PIXEL)
     # Gauss-Hermite, three points an axis: the blur left over from the texture's own.
-    dark, hits = 0.0, 1e-9  # samples beyond the outline see the background, which `cover` accounts for
+    dark = 0.0
     for i in range(-1, 2):
         weight_x = 0.6666666666666666 if i == 0 else 0.16666666666666666
         x = ray_x + i * step
@@ -155,15 +155,10 @@ def ball_light(
             y = ray_y + j * step
             s = x * cx + y * cy + cz
             d2 = x * x + y * y + 1.0
-            deep = s * s - d2 * spare
-            if deep < 0.0:
-                continue
-            far = (s - math.sqrt(deep)) / d2
+            far = (s - math.sqrt(max(s * s - d2 * spare, 0.0))) / d2
             mx, my, mz = far * x - cx, far * y - cy, far - cz
             norm = 1.0 / math.sqrt(mx * mx + my * my + mz * mz)
-            hits += weight
             dark += weight * _ink_at(ink, body, pose, k, row, mx * norm, my * norm, mz * norm)
-    dark /= hits
     return cover, plain + dark * (body[k, ALBEDO_2] - body[k, ALBEDO]) * shade, plain, 1.0
 
 
@@ -177,7 +172,7 @@ def arm_light(body: Floats, pose: Floats, k: int, row: int, x: float, y: float) 
     bx, by, br = pose[row, k, 3] - ax, pose[row, k, 4] - ay, pose[row, k, 5]
     share = ((x - ax) * bx + (y - ay) * by) / max(bx * bx + by * by, 1e-9)
     held = min(max(share, 0.0), 1.0)
-    base = 1.0 / min(max(held, 0.1), 1.0)
+    base = min(1.0 / max(held, 0.01), body[k, SLOWER])
     distance = ar + held * (br - ar) - math.hypot(x - ax - held * bx, y - ay - held * by)
     sigma = pose[row, k, SIGMA]
     if distance <= -SURE_SIGMAS * sigma:

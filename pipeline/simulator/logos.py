@@ -117,7 +117,8 @@ def _ring(a: Floats, b: Floats, centre: tuple[float, float], half: tuple[float, 
     x, y = (a - centre[0]) / half[0], (b - centre[1]) / half[1]
     radius = np.maximum(np.hypot(x, y), 1e-9)
     slope = np.hypot(x / half[0], y / half[1]) / radius
-    return np.abs(radius - 1) / np.maximum(slope, 1e-9)
+    distance: Floats = np.abs(radius - 1) / np.maximum(slope, 1e-9)
+    return distance
 
 
 def _wordmark(a: Floats, b: Floats) -> Floats:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .scene import Air, Arm, Ball, Fixed, Flight, Quaternion, Scene
+from .scene import Air, Arm, Ball, Fixed, Flight, Quaternion, Scene, Vector3
 
 Floats = NDArray[np.float64]
 
@@ -131,36 +131,65 @@ def path(motion: Fixed | Flight, ball: Ball, scene: Scene) -> Path:
 
 
 def _flown(flight: Flight, ball: Ball, scene: Scene) -> Path:
+    """Runge-Kutta of fourth order, in plain numbers: arrays of three are slower."""
     gravity, drag, magnus = accelerations(ball, scene.air, scene.up)
     count = max(int(np.ceil((flight.end_s - flight.start_s) / STEP_S)), 1)
-    time = np.linspace(flight.start_s, flight.end_s, count + 1)
     h = (flight.end_s - flight.start_s) / count
-    position, velocity = np.empty((count + 1, 3)), np.empty((count + 1, 3))
-    spin, rotation = np.empty((count + 1, 3)), np.empty((count + 1, 3, 3))
-    p, v = np.array(flight.position_m, np.float64), np.array(flight.velocity_m_s, np.float64)
-    w, turn = np.array(flight.spin_rps, np.float64), matrix_of(flight.orientation)
     up = np.array(scene.up, np.float64)
+    gx, gy, gz = (float(g) for g in gravity)
+    lift = 2 * math.pi * magnus
 
-    def acceleration(v: Floats, w: Floats) -> Floats:
-        lift = np.array([w[1] * v[2] - w[2] * v[1], w[2] * v[0] - w[0] * v[2], w[0] * v[1] - w[1] * v[0]])
-        result: Floats = gravity - drag * math.sqrt(v @ v) * v + 2 * np.pi * magnus * lift
-        return result
+    def acceleration(v: Vector3, w: Vector3) -> Vector3:
+        (vx, vy, vz), (wx, wy, wz) = v, w
+        brake = drag * math.sqrt(vx * vx + vy * vy + vz * vz)
+        return (
+            gx - brake * vx + lift * (wy * vz - wz * vy),
+            gy - brake * vy + lift * (wz * vx - wx * vz),
+            gz - brake * vz + lift * (wx * vy - wy * vx),
+        )
 
-    for row in range(count + 1):
-        position[row], velocity[row], spin[row], rotation[row] = p, v, w, turn
-        turn = rotations(2 * np.pi * h * w)[0] @ turn
+    p, v, w = flight.position_m, flight.velocity_m_s, flight.spin_rps
+    rows = [(p, v, w)]
+    fade = math.exp(-flight.spin_decay_hz * h)
+    for _ in range(count):
         k1 = acceleration(v, w)
-        k2 = acceleration(v + h / 2 * k1, w)
-        k3 = acceleration(v + h / 2 * k2, w)
-        k4 = acceleration(v + h * k3, w)
-        p = p + h * (v + h / 6 * (k1 + k2 + k3))
-        v = v + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-        w = w * math.exp(-flight.spin_decay_hz * h)
-        height = scene.background.height_m + p @ up  # of the centre above the table
-        if flight.bounces and height < ball.radius_m and v @ up < 0:
-            v, w = bounced(v, w, up, ball.radius_m)
-            p = p + (ball.radius_m - height) * up
-    return Path(time, position, velocity, spin, rotation)
+        k2 = acceleration(_ahead(v, k1, h / 2), w)
+        k3 = acceleration(_ahead(v, k2, h / 2), w)
+        k4 = acceleration(_ahead(v, k3, h), w)
+        p = _ahead(_ahead(p, v, h), _ahead(_ahead(k1, k2, 1.0), k3, 1.0), h * h / 6)
+        v = _ahead(v, _ahead(_ahead(k1, k4, 1.0), _ahead(k2, k3, 1.0), 2.0), h / 6)
+        w = (w[0] * fade, w[1] * fade, w[2] * fade)
+        if flight.bounces:
+            p, v, w = _off_the_table(p, v, w, up, ball.radius_m, scene.background.height_m)
+        rows.append((p, v, w))
+    position, velocity, spin = (np.array(column, np.float64) for column in zip(*rows, strict=True))
+    rotation = np.empty((count + 1, 3, 3))
+    rotation[0] = matrix_of(flight.orientation)
+    for row, turn in enumerate(rotations(2 * np.pi * h * spin[:-1])):
+        rotation[row + 1] = turn @ rotation[row]
+    return Path(np.linspace(flight.start_s, flight.end_s, count + 1), position, velocity, spin, rotation)
+
+
+def _ahead(start: Vector3, slope: Vector3, by: float) -> Vector3:
+    return start[0] + by * slope[0], start[1] + by * slope[1], start[2] + by * slope[2]
+
+
+def _off_the_table(
+    position: Vector3, velocity: Vector3, spin: Vector3, up: Floats, radius_m: float, table_m: float
+) -> tuple[Vector3, Vector3, Vector3]:
+    """The state after a bounce if the ball is in the table and goes down, the same state otherwise."""
+    p, v = np.array(position), np.array(velocity)
+    height = table_m + float(p @ up)  # of the centre above the table
+    if height >= radius_m or v @ up >= 0:
+        return position, velocity, spin
+    v, w = bounced(v, np.array(spin), up, radius_m)
+    p = p + (radius_m - height) * up
+    return _numbers(p), _numbers(v), _numbers(w)
+
+
+def _numbers(vector: Floats) -> Vector3:
+    x, y, z = (float(v) for v in vector)
+    return x, y, z
 
 
 def bounced(velocity_m_s: Floats, spin_rps: Floats, up: Floats, radius_m: float) -> tuple[Floats, Floats]:

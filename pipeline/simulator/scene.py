@@ -147,7 +147,6 @@ class Scene:
     air: Air = Air()
     up: Vector3 = (0.0, 0.0, -1.0)
     description: str = ""
-    extra: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not 0 < self.duration_s <= 3600:

@@ -22,6 +22,7 @@ Floats = NDArray[np.float64]
 SPINNER_BALLS = {1: (90, 0), 2: (45, 0), 3: (45, 90), 4: (45, 45), 5: (4, 0), 6: (90, 90), 7: (90, 45)}
 FLIGHT_KINDS = ("top", "back", "left", "right", "corkscrew", "mixed")
 HEADING_DEG = 8.0  # spread of the direction of shots along the table
+SPREAD = np.array([0.17, 0.3])  # of the middle of a flight, as a share of half the image
 REACH_M = 2.5  # no flight through the image is longer than this to either side
 
 
@@ -107,7 +108,8 @@ class Shots:
         rise = math.copysign(min(abs(rise), 0.5 * speed_m_s), rise)
         ahead = np.array([0.0, 0.0, 1.0])
         depth = (Background().height_m - height) / max(-float(ahead @ up), 0.2)
-        middle = np.append(random.uniform(-0.12, 0.12, 2), depth)
+        half = np.array([self.camera.width_px, self.camera.height_px]) / 2 / self.camera.focal_px * depth
+        middle = np.append(random.uniform(-1.0, 1.0, 2) * SPREAD * half, depth)
         course = np.array([math.cos(math.radians(heading_deg)), math.sin(math.radians(heading_deg)), 0.0])
         course = course - (course @ up) * up
         level = math.sqrt(speed_m_s**2 - rise**2)

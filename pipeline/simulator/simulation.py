@@ -26,9 +26,7 @@ from .sensor import EDGE, LOGO, OTHER, LabelledEvents, Lens, Sensor, noise, read
 
 EDGE_STEP_PX = 0.25  # an outline moves less than this between two looks at it
 LONGEST_STEP_S = 250e-6
-CHUNK_ROWS = 2048  # poses held at a time; a multiple of the largest `every`
-LARGEST_EVERY = 64
-MOST_SLOWER = 8  # how much longer the outline of a fast spinning ball may go without a look than its surface
+CHUNK_ROWS = 2048  # poses held at a time
 TRUTH_STEP_US = 500
 DARK_FLOOR = 1e-3  # dark current as an intensity: lets the logarithm live without light
 NORMALS = 1 << 16
@@ -234,10 +232,10 @@ class _Simulation:
         speeds = [body.speeds_px_s(self.camera, start, stop) for body in there]
         wanted = [min(EDGE_STEP_PX / max(surface, 1e-3), LONGEST_STEP_S) for _, surface in speeds]
         step = min(wanted, default=LONGEST_STEP_S)
-        every = [min(1 << int(math.log2(own / step)), LARGEST_EVERY) for own in wanted]
+        every = [int(own / step + 1e-9) for own in wanted]
         slower = [
-            int(min(EDGE_STEP_PX / max(outline, 1e-3) / own, MOST_SLOWER))
-            for (outline, _), own in zip(speeds, wanted, strict=True)
+            int(min(EDGE_STEP_PX / max(slowest, 1e-3), LONGEST_STEP_S) / own)
+            for (slowest, _), own in zip(speeds, wanted, strict=True)
         ]
         rows = max(math.ceil((stop - start) / step), 1)
         fresh = start == 0.0

@@ -1,14 +1,15 @@
 """Where a ball spinner's ball is, from the events that its turning logo leaves over a whole recording.
 
-In steady light a ball that turns in place shows nothing of its outline: only its logo's path lights up. The path lies
-inside the disc and mostly touches its limb where the logo comes round, so the ball is taken as the circle on which
-the path's outer ends lie. A logo near the axis that points at the camera keeps off the limb: then the circle is too
-small by an amount that nobody can know, which the 1 sigma says.
+In steady light a ball that turns in place shows nothing of its outline: only its logo's path lights up. The path
+lies inside the disc and mostly touches its limb where the logo comes round, so the ball is taken as the circle on
+which the path's outer ends lie. Two things nobody can know from the path: how far a path around the middle keeps
+off the limb, and which chord of the disc a narrow path across it is. The 1 sigma says so, or the ball is refused.
 """
 
 from __future__ import annotations
 
 import math
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +25,14 @@ Floats = NDArray[np.float64]
 GAP_PX = 2
 # A path of fewer events is no basis: the samples' poorest usable one has 1,600 in 100 ms.
 LEAST_EVENTS = 300
-# The directions in which the path's outer end is looked for.
-DIRECTIONS = 72
-# How far inside the limb a path typically ends, as a share of the radius, and its 1 sigma: a wordmark at 45 degrees
-# from the axis reaches 0.94 of it seen from the pole, one that comes round the limb reaches it.
-SHORT_SHARE, SHORT_STD_SHARE = 0.02, 0.03
+# A border within this distance of a circle lies on it; a pixel is off by PIXEL_STD_PX.
+ON_LIMB_PX, PIXEL_STD_PX = 0.8, 0.5
+# How far inside the limb the path ends, as a share of its own radius, and the 1 sigma of that. A path across the
+# ball ends on the limb. One that closes around the middle (seen from the axis) may keep off it: a wordmark at 45
+# degrees from the axis reaches 0.85 to 0.94 of the radius, one at 90 degrees all of it.
+OPEN_SHORT, CLOSED_SHORT, CLOSED_SCORE = (0.0, 0.04), (0.05, 0.1), 0.8
+# A circle known no better than this is none.
+MOST_STD_SHARE = 0.15
 REMEDY = "give the circle instead: --fixed-ball X_PX Y_PX RADIUS_PX"
 
 
@@ -38,11 +42,12 @@ def find_fixed_ball(
     """The ball's circle and its 1 sigma in px (the larger of centre and radius), best effort.
 
     The score is the share of the directions from the centre in which the path reaches the circle.
-    Raises RecordingError when the events draw no path that could be a logo's, or too little of one.
+    Raises RecordingError when the events draw no path that could be a logo's, or one that fits many circles.
     """
     camera = setting.camera
-    counts = np.zeros((camera.height_px, camera.width_px), np.int64)
-    np.add.at(counts, (events.y_px, events.x_px), 1)
+    pixel = events.y_px.astype(np.int64) * camera.width_px + events.x_px
+    counts = np.bincount(pixel, minlength=camera.width_px * camera.height_px)
+    counts = counts.reshape(camera.height_px, camera.width_px)
     rows, columns = _path(counts, radius_max_px)
     drawn = int(counts[rows, columns].sum())
     if drawn < LEAST_EVENTS:
@@ -50,15 +55,16 @@ def find_fixed_ball(
             f"no ball found: the busiest spot has {drawn} events, fewer than the {LEAST_EVENTS} of a turning logo; "
             f"{REMEDY}"
         )
-    circle, std_px = _limb(columns.astype(np.float64), rows.astype(np.float64))
-    if not radius_min_px <= circle.radius_px <= radius_max_px:
+    limb = _limb(columns.astype(np.float64), rows.astype(np.float64), radius_min_px, radius_max_px)
+    if limb is None:
         raise RecordingError(
-            f"no ball found: the busiest spot fits a radius of {circle.radius_px:.1f} px, outside "
-            f"track.radius_min_px = {radius_min_px:g} to track.radius_max_px = {radius_max_px:g}; {REMEDY}"
+            f"no ball found: the busiest spot ({np.ptp(columns) + 1} x {np.ptp(rows) + 1} px) fits no circle with a "
+            f"radius from track.radius_min_px = {radius_min_px:g} to track.radius_max_px = {radius_max_px:g}; {REMEDY}"
         )
-    if std_px > 0.25 * circle.radius_px:
+    circle, std_px = limb
+    if std_px > MOST_STD_SHARE * circle.radius_px:
         raise RecordingError(
-            f"no ball found: the logo shows on one side only, its circle is uncertain by {std_px:.1f} px; {REMEDY}"
+            f"no ball found: the logo's path fits many circles, this one is uncertain by {std_px:.1f} px; {REMEDY}"
         )
     return circle, std_px
 
@@ -88,44 +94,78 @@ def _path(counts: NDArray[np.int64], radius_max_px: float) -> tuple[NDArray[np.i
     return rows, columns
 
 
-def _limb(x_px: Floats, y_px: Floats) -> tuple[Circle, float]:
-    """The circle on which the outer ends of these pixels lie, and its 1 sigma."""
-    from scipy.optimize import least_squares  # 0.3 s to load
+def _limb(x_px: Floats, y_px: Floats, radius_min_px: float, radius_max_px: float) -> tuple[Circle, float] | None:
+    """The circle around all these pixels on which the most of their hull lies, and its 1 sigma; None without one.
 
-    start = _enclosing(x_px, y_px)
+    Every circle through three corners of the convex hull is tried; the best is fitted to what lies on it.
+    """
+    corners, border = _hull(x_px, y_px)
+    if len(corners) < 3:
+        return None
+    threes = np.array(list(combinations(range(len(corners)), 3)))
+    centre, radius = _through(*(corners[threes[:, k]] for k in range(3)))
+    sane = (radius >= radius_min_px) & (radius <= radius_max_px)
+    centre, radius = centre[sane], radius[sane]
+    if radius.size == 0:
+        return None
+    ray = border[None] - centre[:, None]
+    distance = np.hypot(ray[..., 0], ray[..., 1])
+    off = distance - radius[:, None]
+    on_it = (np.abs(off) < ON_LIMB_PX) & (off.max(axis=1) < ON_LIMB_PX)[:, None]
+    # Pieces of border all in one direction would fit any large circle: what counts is how much they surround.
+    pull = np.hypot(*((ray / distance[..., None]) * on_it[..., None]).sum(axis=1).T)
+    lying = on_it.sum(axis=1)
+    best = int(np.argmax(lying - pull**2 / np.maximum(lying, 1)))
+    answer = np.append(centre[best], radius[best])
+    for _ in range(5):
+        ray = border - answer[:2]
+        distance = np.hypot(*ray.T)
+        near = np.abs(distance - answer[2]) < ON_LIMB_PX
+        if np.count_nonzero(near) < 5:
+            return None
+        design = np.column_stack([ray[near] / distance[near, None], np.ones(np.count_nonzero(near))])
+        answer = answer + np.linalg.lstsq(design, distance[near] - answer[2], rcond=None)[0]
+    if not radius_min_px <= answer[2] <= radius_max_px:
+        return None
+    angle = np.arctan2(*(border[near] - answer[:2]).T[::-1]) % (2 * math.pi)
+    score = np.unique((angle * 18 / math.pi).astype(np.int64)).size / 36
+    # Points of a border are not independent: the logo's own shape bends it over about sixteen pixels.
+    spread = 4 * PIXEL_STD_PX * np.sqrt(np.diag(np.linalg.pinv(design.T @ design)))
+    short, short_std = CLOSED_SHORT if score > CLOSED_SCORE else OPEN_SHORT
+    radius_px = float(answer[2]) * (1 + short)
+    std = max(float(spread.max()), short_std * radius_px, PIXEL_STD_PX)
+    return Circle(float(answer[0]), float(answer[1]), radius_px, score), std
 
-    def outer(circle: Floats) -> tuple[Floats, Floats]:
-        """Per direction with pixels: the angle, and how far the outermost one is from the circle (> 0 outside)."""
-        dx, dy = x_px - circle[0], y_px - circle[1]
-        sector = np.floor((np.arctan2(dy, dx) / (2 * math.pi) % 1.0) * DIRECTIONS).astype(np.int64) % DIRECTIONS
-        reach = np.full(DIRECTIONS, -np.inf)
-        np.maximum.at(reach, sector, np.hypot(dx, dy))
-        seen = np.isfinite(reach)
-        return (np.flatnonzero(seen) + 0.5) * 2 * math.pi / DIRECTIONS, reach[seen] - circle[2]
 
-    def cost(circle: Floats) -> Floats:
-        """An end outside is impossible (weight 3); one far inside is no limb and weighs little."""
-        _, off = outer(circle)
-        residual = np.full(DIRECTIONS, 0.0)
-        inside = np.sqrt(np.minimum(-np.minimum(off, 0.0), 2.0))
-        residual[: off.size] = np.where(off > 0, 3.0 * off, inside)
-        return residual
-
-    answer = least_squares(cost, start, x_scale=np.array([1.0, 1.0, 1.0]), diff_step=0.02).x
-    angle, off = outer(answer)
-    on = off > -1.5
-    design = np.stack([np.cos(angle[on]), np.sin(angle[on]), np.ones(int(on.sum()))], axis=1)
-    information = design.T @ design + 1e-6 * np.eye(3)
-    spread = np.sqrt(np.diag(np.linalg.inv(information))) * 1.0
-    radius = answer[2] * (1 + SHORT_SHARE)
-    std = max(float(spread.max()), SHORT_STD_SHARE * radius, 0.5)
-    return Circle(float(answer[0]), float(answer[1]), float(radius), float(on.sum()) / DIRECTIONS), std
+def _hull(x_px: Floats, y_px: Floats) -> tuple[Floats, Floats]:
+    """(n, 2) corners of the convex hull of these points, in order, and (m, 2) points on it, a pixel apart."""
+    points = sorted(set(zip(x_px.tolist(), y_px.tolist(), strict=True)))
+    chains: list[list[tuple[float, float]]] = []
+    for ordered in (points, points[::-1]):
+        chain: list[tuple[float, float]] = []
+        for x, y in ordered:
+            while len(chain) > 1 and _left(chain[-2], chain[-1], (x, y)) <= 0:
+                chain.pop()
+            chain.append((x, y))
+        chains.append(chain[:-1])
+    corners = np.array(chains[0] + chains[1])
+    pieces = []
+    for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        steps = max(1, round(float(np.hypot(*(end - start)))))
+        pieces.append(start + (end - start) * (np.arange(steps) / steps)[:, None])
+    return corners, np.concatenate(pieces)
 
 
-def _enclosing(x_px: Floats, y_px: Floats) -> Floats:
-    """(3,) the smallest circle around all points, by walking towards the farthest (Badoiu and Clarkson)."""
-    centre = np.array([x_px.mean(), y_px.mean()])
-    for step in range(1, 500):
-        far = int(np.argmax((x_px - centre[0]) ** 2 + (y_px - centre[1]) ** 2))
-        centre += (np.array([x_px[far], y_px[far]]) - centre) / (step + 1)
-    return np.append(centre, np.hypot(x_px - centre[0], y_px - centre[1]).max())
+def _left(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def _through(a: Floats, b: Floats, c: Floats) -> tuple[Floats, Floats]:
+    """Centres (n, 2) and radii (n,) of the circles through three points (n, 2) each; infinite on a line."""
+    ab, ac = b - a, c - a
+    twice = 2 * (ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0])
+    b2, c2 = (ab**2).sum(axis=1), (ac**2).sum(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x = (ac[:, 1] * b2 - ab[:, 1] * c2) / twice
+        y = (ab[:, 0] * c2 - ac[:, 0] * b2) / twice
+    return a + np.stack([x, y], axis=1), np.hypot(x, y)

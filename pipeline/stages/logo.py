@@ -19,9 +19,9 @@ from .track import TrackResult
 
 INPUTS = ("packet", "filter", "track")
 
-# A centre moving evenly in the image moves almost evenly in space; over 128 px (f = 1646 px, 20 px ball) taking it
-# as even is wrong by 0.002 px.
-KNOT_SPACING_PX = 128.0
+# A centre that moves evenly in the image moves almost evenly in space: taking it as even over 16 px (f = 1646 px) is
+# wrong by less than 0.01 px across the line of sight.
+KNOT_SPACING_PX = 16.0
 # See _of_outline: from where on, and from which speed on: a slower ball, or the wobble of a ball spinner's, leaves
 # no more than an event every 10 ms in a pixel's width of outline.
 OUTLINE_SHARE, OUTLINE_SPEED_PX_S = 0.66, 100.0

@@ -52,8 +52,9 @@ GOOD, DOUBT = 1.3, 1.6
 # Of the events looked at, so many must lie on lines that drift as one turning ball's do.
 FEWEST_SHARE = 0.4
 SEED = 1
-# The weakest direction of the spin must weigh this much against the strongest, or it is open.
-OPEN = 1e-4
+# The weakest direction of the spin must weigh this much against the strongest, or it is open; and an axis that is not
+# known to OPEN_DEG (1 sigma) is no answer: the paper's errors are as large.
+OPEN, OPEN_DEG = 1e-4, 25.0
 # The event rate's magnitude is not better than one percent: its crossings wander with the view of the logo. Nearer to
 # the axis than 30 degrees the line of sight's turning about it says nothing of when the logo reappears.
 RATE_FLOOR, STEADY_SIGHT = 0.01, 0.5
@@ -262,7 +263,12 @@ class NormalFlowSpin:
         magnitude_rps = float(np.linalg.norm(spin_rps))
         if magnitude_rps > self.setting.max_spin_rps:
             return self._doubted(f"{magnitude_rps:.0f} rps is above spin.max_spin_rps")
-        return SpinEstimate("normal_flow", spin_rps, covariance_rps2, None, len(self.t_us))
+        estimate = SpinEstimate("normal_flow", spin_rps, covariance_rps2, None, len(self.t_us))
+        if estimate.axis_std_deg is None or estimate.axis_std_deg > OPEN_DEG:
+            return self._doubted(
+                f"the logo's place leaves the axis open by {estimate.axis_std_deg or 180.0:.0f} degrees"
+            )
+        return estimate
 
     def _doubted(self, reason: str) -> SpinEstimate:
         """A refusal that keeps the fit: the next tick may start from it."""

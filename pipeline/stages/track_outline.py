@@ -21,7 +21,7 @@ from ..results import Circle
 Floats = NDArray[np.float64]
 
 # Events used for a fit: beyond this the pixels' common errors outweigh the statistical, 0.1 px / sqrt(n).
-MOST_EVENTS = 300
+MOST_EVENTS = 200
 # An event this near the fitted outline supports it: the scatter on clean outlines is 0.1-0.15 px, on a dim or
 # textured scene three times as much.
 ON_OUTLINE_PX = 1.2

@@ -33,6 +33,8 @@ def look(
     found: Found = []
     for circle in candidates(surface, events, limits.radius_min_px, limits.radius_max_px, most):
         first = first or circle
+        if any(np.hypot(circle.x_px - s.ring[0], circle.y_px - s.ring[1]) < s.ring[4] for s, _ in found):
+            continue
         sighting = sight(events, end_us, camera, circle, limits)
         if sighting is not None and (sighting.trusted or sighting.promising):
             found.append((sighting, circle))

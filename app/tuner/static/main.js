@@ -1,15 +1,23 @@
 // The page: opens it on the server and wires settings, controls, viewer and tools together.
 
+import { Ball } from "./ball.js";
 import { Bar } from "./bar.js";
+import { Biases } from "./biases.js";
+import { Coach } from "./coach.js";
 import { Controls } from "./controls.js";
+import { Curve } from "./curve.js";
 import { byId, element, notice } from "./elements.js";
 import { linkOf, wantedByLink } from "./link.js";
 import { Overview } from "./overview.js";
 import { Results } from "./results.js";
 import { Runner } from "./runner.js";
-import { bytes, Connection, Refused } from "./server.js";
+import { Saving } from "./saving.js";
+import { Search } from "./search.js";
+import { bytes, Connection, get, Refused } from "./server.js";
 import { Settings } from "./settings.js";
 import { Viewer } from "./viewer.js";
+
+const MARGIN_US = 20_000; // shown before and after a shot
 
 const connection = new Connection();
 const settings = new Settings();
@@ -38,12 +46,26 @@ async function start() {
   describe(opening);
   app.bar = new Bar(byId("bar"), opening.stages);
   app.overview = new Overview(byId("overview"), recording);
-  app.results = new Results(byId("side"));
+  app.results = new Results(panel("Result", true));
+  app.curve = new Curve(panel("Tuning curve"), app);
+  app.search = new Search(panel("Tune for me"), app);
+  app.ball = new Ball(panel("Fixed ball"), app);
+  app.biases = new Biases(panel("Biases"), app);
+  app.coach = new Coach(app);
+  new Saving(app);
   new Controls(byId("controls"), opening.sections, settings);
   app.runner = new Runner(connection, settings, () => viewer.playhead_us());
   listen(link);
   await viewer.start(opening.viewer, byId("viewer"));
   app.runner.want(true);
+}
+
+function panel(title, open = false) {
+  const body = element("div.body");
+  const made = element("details.section", { open }, element("summary", {}, title), body);
+  made.dataset.title = title;
+  byId("side").append(made);
+  return body;
 }
 
 function describe({ recording, recordings, presets }) {
@@ -90,6 +112,13 @@ function listen(link) {
       if (!(error instanceof Refused) || error.status !== 404) throw error;
     }
   });
+  connection.addEventListener("shots", ({ detail }) => {
+    const { share, shots, error } = detail;
+    if (error) notice(error);
+    const words = share < 1 ? `looking for shots, ${Math.round(100 * share)} %` : `${shots.length} shots: click one`;
+    app.overview.show(settings.clip, shots, words);
+  });
+  app.biases.addEventListener("taken", takenAgain);
   connection.addEventListener("lost", () => {
     app.bar.say("The server does not answer; trying again ...");
     document.body.classList.add("lost");
@@ -108,10 +137,23 @@ function listen(link) {
   byId("preset").onchange = (event) => settings.takePreset(event.target.value, app.opening.presets[event.target.value]);
   app.overview.addEventListener("seek", ({ detail }) => viewer.seek(detail));
   app.overview.addEventListener("choose", ({ detail }) => chooseClip(...detail));
-  app.overview.addEventListener("shot", ({ detail }) => chooseClip(detail[0] - 20_000, detail[1] + 20_000));
+  app.overview.addEventListener("shot", ({ detail }) => chooseClip(detail[0] - MARGIN_US, detail[1] + MARGIN_US));
   document.addEventListener("keydown", shortcuts);
   setInterval(async () => app.overview.move(await viewer.playhead_us()), 200);
   buttons();
+}
+
+// The scene was simulated again: other events, and hence another strip and clip.
+async function takenAgain() {
+  const { recording } = await get(connection.path("recording"));
+  Object.assign(app.opening.recording, recording);
+  const { innerHTML } = byId("about");
+  describe(app.opening);
+  if (byId("about").innerHTML !== innerHTML) notice("The scene was taken again with these biases.", "info", 3);
+  app.overview.take(recording);
+  const [start, end] = settings.clip;
+  if (recording.is_long && start >= recording.start_us && end <= recording.end_us) app.runner.want(true);
+  else settings.takeClip(...recording.clip_us);
 }
 
 function showShots(measures) {

@@ -8,19 +8,23 @@ const HEIGHT = 44;
 export class Overview extends EventTarget {
   constructor(parent, recording) {
     super();
-    this.recording = recording;
-    this.shots = [];
-    this.clip = recording.clip_us;
     this.svg = drawing("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "none" });
     this.chosen = drawing("rect", { class: "chosen", y: 0, height: HEIGHT });
     this.bands = drawing("g");
     this.drag = drawing("rect", { class: "drag", y: 0, height: HEIGHT, width: 0 });
     this.playhead = drawing("line", { class: "playhead", y1: 0, y2: HEIGHT });
-    this.svg.append(this.chosen, this.#curve(), this.bands, this.drag, this.playhead);
+    this.curve = drawing("g");
+    this.svg.append(this.chosen, this.curve, this.bands, this.drag, this.playhead);
     this.words = element("span.words");
     parent.replaceChildren(this.svg, this.words);
     this.#dragging();
-    this.show(this.clip, []);
+    this.take(recording);
+  }
+
+  take(recording) {
+    this.recording = recording;
+    this.curve.replaceChildren(this.#curve());
+    this.show(recording.clip_us, []);
   }
 
   show(clip, shots, words = "") {

@@ -25,12 +25,12 @@ export async function post(path, content = {}) {
   return response.json();
 }
 
-export async function bytes(path) {
-  return new Uint8Array(await (await answered(await fetch(path))).arrayBuffer());
+export async function get(path) {
+  return (await answered(await fetch(path))).json();
 }
 
-export async function text(path) {
-  return (await answered(await fetch(path))).text();
+export async function bytes(path) {
+  return new Uint8Array(await (await answered(await fetch(path))).arrayBuffer());
 }
 
 // The page's connection: opens a page on the server, listens to its messages, opens it anew when the server comes back.

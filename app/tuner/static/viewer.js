@@ -2,7 +2,18 @@
 
 const TIMELINE = "t";
 const POLL_MS = 15;
-const PATIENCE_MS = 15_000;
+const PATIENCE_MS = 120_000; // without a graphics card a picture may take seconds
+const PICTURE_MS = 10_000;
+const APPLICATION = "spinscope";
+
+// The viewer asks elsewhere for its newest version; this page talks to its own server alone.
+function stayAtHome() {
+  const ask = window.fetch;
+  window.fetch = (target, options) => {
+    const { origin } = new URL(target.url ?? target, location.href);
+    return origin === location.origin ? ask(target, options) : Promise.resolve(new Response(null, { status: 404 }));
+  };
+}
 
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
@@ -13,6 +24,7 @@ export class Viewer extends EventTarget {
   #playhead = null;
 
   async start(version, parent) {
+    stayAtHome();
     const { WebViewer } = await import(`/rerun/${version}/widget.js`);
     const viewer = new WebViewer();
     const ready = new Promise((resolve) => viewer.once("ready", resolve));
@@ -70,17 +82,15 @@ export class Viewer extends EventTarget {
     return this.#playhead;
   }
 
-  // Show a recording in place of the present one; at `time_us` when there is none.
+  // Show a recording in place of the present one, at the same playhead; at `time_us` when there is none.
   show(bytes, recordingId, time_us) {
     return this.#next(async () => {
       const before = await this.where();
       this.#channel.send_rrd(bytes);
-      const store = await this.#loaded(recordingId);
-      const time = before?.time ?? BigInt(Math.round(time_us * 1000));
-      const play_state = before?.play ?? "paused";
-      await this.#viewer.set_time({ recording: store, timeline: TIMELINE, duration_nanos: time, play_state });
-      const state = await this.#viewer.get_state();
-      const old = state.recordings.map(({ store_id }) => store_id).filter((id) => id !== store);
+      const duration_nanos = before?.time ?? BigInt(Math.round(time_us * 1000));
+      const recording = `Recording:${APPLICATION}:${recordingId}`;
+      await this.#once_there({ recording, timeline: TIMELINE, duration_nanos, play_state: before?.play ?? "paused" });
+      const old = before?.state.recordings.map(({ store_id }) => store_id).filter((id) => id !== recording) ?? [];
       if (old.length) await this.#viewer.close({ store_ids: old });
       this.dispatchEvent(new CustomEvent("shown", { detail: recordingId }));
     });
@@ -99,15 +109,79 @@ export class Viewer extends EventTarget {
     return this.#next(() => this.#viewer.set_time({ play_state }));
   }
 
-  async #loaded(recordingId) {
+  // The tab of this name without the others and without the time line; returns what `together` needs to undo it.
+  alone(name) {
+    return this.#next(async () => {
+      const where = await this.where();
+      const { blueprint } = await this.#viewer.get_blueprint();
+      const viewport = blueprint["/viewport"].ViewportBlueprint;
+      const all = viewport.root_container;
+      const tab = tabs(blueprint).find(({ title }) => title === name);
+      if (!where || !tab) return null;
+      viewport.root_container = tab.id;
+      await this.#viewer.set_blueprint(blueprint, { kind: "recording", recording: where.store });
+      this.#viewer.override_panel_state("time", "hidden");
+      return all;
+    });
+  }
+
+  together(root) {
+    return this.#next(async () => {
+      this.#viewer.override_panel_state("time", null);
+      const where = await this.where();
+      if (!root || !where) return;
+      const { blueprint } = await this.#viewer.get_blueprint();
+      blueprint["/viewport"].ViewportBlueprint.root_container = root;
+      await this.#viewer.set_blueprint(blueprint, { kind: "recording", recording: where.store });
+    });
+  }
+
+  // The name of the tab in front, and bringing another one there.
+  async tab() {
+    const { blueprint } = await this.#viewer.get_blueprint();
+    return tabs(blueprint).find(({ front }) => front)?.title ?? null;
+  }
+
+  takeTab(name) {
+    return this.#next(async () => {
+      const where = await this.where();
+      const { blueprint } = await this.#viewer.get_blueprint();
+      const found = tabs(blueprint).find(({ title }) => title === name);
+      if (!where || !found) return;
+      rootOf(blueprint).active_tab = `container/${found.id}`;
+      await this.#viewer.set_blueprint(blueprint, { kind: "recording", recording: where.store });
+    });
+  }
+
+  // PNG of what is seen. The canvas keeps its picture until the browser has shown it: it is copied right after it
+  // was drawn, which a change of the playhead to where it is makes happen.
+  picture() {
+    return this.#next(async () => {
+      const { canvas } = this.#viewer;
+      const copy = document.createElement("canvas");
+      [copy.width, copy.height] = [canvas.width, canvas.height];
+      const until = performance.now() + PICTURE_MS;
+      while (performance.now() < until) {
+        canvas.dispatchEvent(new PointerEvent("pointermove", { bubbles: true, clientX: Math.random(), clientY: 1 }));
+        await new Promise((resolve) => requestAnimationFrame(resolve));
+        copy.getContext("2d").drawImage(canvas, 0, 0);
+        if (hasContent(copy)) return new Promise((resolve) => copy.toBlob(resolve, "image/png"));
+      }
+      throw new Error("the browser does not give the picture: take a screenshot instead");
+    });
+  }
+
+  // The viewer takes a recording in with its next picture: until then it knows nothing of it.
+  async #once_there(time) {
     const until = performance.now() + PATIENCE_MS;
-    while (performance.now() < until) {
-      const state = await this.#viewer.get_state();
-      const found = state.recordings.find(({ store_id }) => store_id.endsWith(`:${recordingId}`));
-      if (found?.timelines.some(({ name }) => name === TIMELINE)) return found.store_id;
-      await pause(POLL_MS);
+    for (;;) {
+      try {
+        return await this.#viewer.set_time(time);
+      } catch (error) {
+        if (performance.now() > until) throw error;
+        await pause(POLL_MS);
+      }
     }
-    throw new Error("the viewer did not take the recording");
   }
 
   async state() {
@@ -117,4 +191,24 @@ export class Viewer extends EventTarget {
   get api() {
     return this.#viewer;
   }
+}
+
+function rootOf(blueprint) {
+  const { root_container } = blueprint["/viewport"].ViewportBlueprint;
+  return blueprint[`/container/${root_container}`].ContainerBlueprint;
+}
+
+// The tabs of the layout: [{id, title, front}].
+function tabs(blueprint) {
+  const root = rootOf(blueprint);
+  return (root.contents ?? []).map((path) => {
+    const id = path.split("/").pop();
+    const title = blueprint[`/container/${id}`]?.ContainerBlueprint.display_name;
+    return { id, title, front: root.active_tab === path };
+  });
+}
+
+function hasContent(canvas) {
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, Math.min(canvas.height, 80));
+  return data.some((value, i) => i % 4 < 3 && value > 60);
 }

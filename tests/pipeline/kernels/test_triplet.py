@@ -24,9 +24,7 @@ def moving_edge(speed_px_s: float, angle: float, *, jitter_us: float = 0.0, seed
 
 @settings(max_examples=60)
 @given(
-    events=st.lists(
-        st.tuples(st.integers(0, 60), st.integers(0, 9), st.integers(0, 9), st.booleans()), max_size=60
-    ),
+    events=st.lists(st.tuples(st.integers(0, 60), st.integers(0, 9), st.integers(0, 9), st.booleans()), max_size=60),
     most=st.integers(1, 15),
 )
 def test_equals_its_twin(events: list[tuple[int, int, int, bool]], most: int) -> None:
@@ -57,6 +55,7 @@ def test_a_straight_edge_has_the_flow_across_it(speed: float, angle: float) -> N
 def test_no_flow_of_scattered_events() -> None:
     rng = np.random.default_rng(1)
     t = np.sort(rng.integers(0, 200_000, 60))
-    neighbours = earlier_neighbours(t, rng.uniform(0, 40, 60), rng.uniform(0, 40, 60), rng.random(60) < 0.5, *LIMITS, 12)
-    _, _, triplets = triplet_flow(t, np.zeros(60), np.zeros(60), neighbours, 0.5, 0.2)
+    x, y, on = rng.uniform(0, 40, 60), rng.uniform(0, 40, 60), rng.random(60) < 0.5
+    neighbours = earlier_neighbours(t, x, y, on, *LIMITS, 12)
+    _, _, triplets = triplet_flow(t, x, y, neighbours, 0.5, 0.2)
     assert not triplets.any()

@@ -1,0 +1,91 @@
+"""Results to take away: .rrd, JSON as `spinscope analyze` writes it, CSV, and a picture of the events."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import cv2
+import numpy as np
+
+from app.analyze import report
+from app.viewer import save
+from pipeline.events import EventBatch
+
+from .runs import Finished
+
+
+def as_json(finished: Finished) -> str:
+    """What `spinscope analyze --json` writes for the clip with these settings, on one line."""
+    return json.dumps(_report(finished), allow_nan=False) + "\n"
+
+
+def spins_csv(finished: Finished) -> str:
+    """One row a shot and method."""
+    rows = []
+    for number, shot in enumerate(_report(finished)["shots"]):
+        own = {"shot": number + 1, **{key: shot[key] for key in ("start_us", "end_us", "speed_m_s", "logo_events")}}
+        for method, estimate in shot["spin"].items():
+            x, y, z = estimate["vector_rps"] or (None, None, None)
+            rows.append(
+                {
+                    **own,
+                    "method": method,
+                    "trusted": int(shot["best"] == method),
+                    "status": estimate["status"],
+                    "reason": estimate["reason"],
+                    "x_rps": x,
+                    "y_rps": y,
+                    "z_rps": z,
+                    "magnitude_rps": estimate["magnitude_rps"],
+                    "magnitude_std_rps": estimate["magnitude_std_rps"],
+                    "axis_std_deg": estimate["axis_std_deg"],
+                }
+            )
+    return _csv(rows)
+
+
+def track_csv(finished: Finished) -> str:
+    """One row a shot and tick."""
+    rows = []
+    for number, shot in enumerate(_report(finished)["shots"]):
+        track = shot["track"]
+        for index in range(len(track["t_us"])):
+            rows.append({"shot": number + 1, **{name: column[index] for name, column in track.items()}})
+    return _csv(rows)
+
+
+def as_rrd(finished: Finished) -> bytes:
+    """The run with its layouts, as `spinscope view --save` writes it."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "run.rrd"
+        reason = finished.no_shot_reason
+        save(finished.session, finished.ticks, finished.shots, path, no_shot_reason=reason)
+        return path.read_bytes()
+
+
+def picture_of(events: EventBatch, width_px: int, height_px: int) -> bytes:
+    """PNG of how often each pixel fired, the logarithm as brightness: where a ball in place is to be seen."""
+    counts = np.zeros((height_px, width_px))
+    np.add.at(counts, (events.y_px, events.x_px), 1)
+    bright = np.log1p(counts)
+    # The busiest thousandth are hot pixels and would leave the rest dark.
+    top = max(float(np.quantile(bright, 0.999)), 1e-9)
+    return bytes(cv2.imencode(".png", (255 * np.clip(bright / top, 0, 1)).astype(np.uint8))[1])
+
+
+def _report(finished: Finished) -> dict[str, Any]:
+    return report(finished.session, finished.shots, finished.no_shot_reason)
+
+
+def _csv(rows: list[dict[str, Any]]) -> str:
+    text = io.StringIO()
+    if rows:
+        writer = csv.DictWriter(text, rows[0].keys(), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    return text.getvalue()

@@ -1,0 +1,163 @@
+// Biases of the sensor: take a simulated scene again, and what each bias does to noise and ball.
+
+import { chart } from "./chart.js";
+import { download, element, notice } from "./elements.js";
+import { post } from "./server.js";
+
+const COLOURS = { on: "#ef5350", off: "#4295f5" };
+
+export class Biases extends EventTarget {
+  constructor(parent, { connection, opening }) {
+    super();
+    this.connection = connection;
+    this.state = opening.biases;
+    this.values = { ...this.state.values };
+    this.rows = new Map();
+    this.note = element("p.note");
+    this.progress = element("progress", { hidden: true, max: 1, value: 0 });
+    this.stop = element("button", { hidden: true, onclick: () => this.#cancel() }, "Cancel");
+    const rows = Object.entries(this.state.ranges).map(([name, range]) => this.#row(name, range));
+    this.file = element("input", { type: "file", accept: ".bias", hidden: true, onchange: () => this.#load() });
+    this.which = element("select", { "aria-label": "Bias of the curve" }, ...Object.keys(this.state.ranges).map((name) => element("option", { value: name }, name)));
+    this.draw = element("button", { onclick: () => this.#curve() });
+    this.charts = element("div.charts");
+    parent.append(
+      this.note,
+      ...rows,
+      element("div.row", {}, element("button", { onclick: () => this.file.click() }, "Load .bias"), element("button", { onclick: () => this.#save() }, "Save .bias"), this.stop, this.progress),
+      this.file,
+      element("div.row", {}, this.which, this.draw),
+      this.charts,
+    );
+    connection.addEventListener("biases", ({ detail }) => this.#taken(detail));
+    connection.addEventListener("bias_curve", ({ detail }) => this.#drawn(detail));
+    this.#refresh();
+  }
+
+  #row(name, { low, high, default: start, help }) {
+    const slider = element("input", { type: "range", min: low, max: high, step: 1, "aria-label": `bias_${name}` });
+    const box = element("input.number", { type: "text", "aria-label": `bias_${name}` });
+    const reset = element("button.reset", { title: "Back to the paper's value", onclick: () => this.#put(name, start) }, "↺");
+    slider.addEventListener("input", () => (box.value = slider.value));
+    slider.addEventListener("change", () => this.#put(name, Number(slider.value)));
+    box.addEventListener("change", () => {
+      const value = Math.round(Number(box.value));
+      if (Number.isFinite(value) && low <= value && value <= high) this.#put(name, value);
+      else {
+        notice(`bias_${name} = ${box.value} is not possible: ${low} to ${high}`);
+        this.#refresh();
+      }
+    });
+    const title = `bias_${name}\n${help}.\nAllowed: ${low} to ${high}. Paper: ${start}.`;
+    const row = element("div.control", { title }, element("label", {}, name), slider, box, element("span.unit"), reset);
+    row.dataset.bias = name;
+    this.rows.set(name, { row, slider, box, reset, start });
+    return row;
+  }
+
+  #refresh() {
+    const { locked, known, calibrated } = this.state;
+    for (const [name, { row, slider, box, reset, start }] of this.rows) {
+      const value = this.values[name];
+      slider.value = value;
+      box.value = known || !locked ? value : "";
+      box.placeholder = "?";
+      slider.disabled = box.disabled = reset.disabled = Boolean(locked);
+      row.classList.toggle("differs", !locked && value !== start);
+      row.classList.toggle("locked", Boolean(locked));
+    }
+    this.note.textContent = locked ?? `Moving a slider takes the scene again with the new setting.${calibrated ? "" : " What a bias means in physical units is a model, not calibrated."}`;
+    this.which.hidden = Boolean(locked);
+    this.draw.textContent = locked ? "Rates of this folder's recordings with .bias files" : "Rates against this bias";
+  }
+
+  // Takes values, from a link too.
+  take(values) {
+    this.values = { ...this.values, ...values };
+    this.#refresh();
+    return this.#again();
+  }
+
+  #put(name, value) {
+    this.values[name] = value;
+    this.#refresh();
+    this.#again();
+  }
+
+  async #again() {
+    try {
+      await post(this.connection.path("biases"), { biases: this.values });
+    } catch (error) {
+      notice(error.message);
+    }
+  }
+
+  #taken({ state, share = 0, error, biases }) {
+    this.#working(state === "running", share);
+    if (error) notice(error);
+    if (state === "done") this.dispatchEvent(new CustomEvent("taken", { detail: biases }));
+  }
+
+  #working(running, share) {
+    this.stop.hidden = this.progress.hidden = !running;
+    this.progress.value = share;
+  }
+
+  #cancel() {
+    for (const kind of ["biases", "bias_curve"]) post(this.connection.path("cancel"), { kind });
+  }
+
+  async #curve() {
+    try {
+      await post(this.connection.path("bias_curve"), { biases: this.values, name: this.which.value });
+    } catch (error) {
+      notice(error.message);
+    }
+  }
+
+  #drawn(message) {
+    const { state, points, total, name, error, source } = message;
+    this.#working(state === "running", points && total ? points.length / total : 0);
+    if (error) notice(error);
+    if (!points) return;
+    const good = points.filter((point) => !point.error);
+    const wrong = points.filter((point) => point.error).map((point) => element("p.note", {}, `${point.recording}: ${point.error}`));
+    const names = source === "recorded" ? Object.keys(this.state.ranges).filter((bias) => new Set(good.map(({ biases }) => biases[bias])).size > 1) : [name];
+    const charts = names.flatMap((bias) => this.#charts(bias, good));
+    if (source === "recorded" && good.length && !names.length) wrong.push(element("p.note", {}, "All recordings have the same biases: nothing to draw over."));
+    this.charts.replaceChildren(...charts, ...wrong);
+  }
+
+  #charts(bias, points) {
+    const x = (point) => point.value ?? point.biases[bias];
+    return ["ball", "noise"].map((kind) => chart({
+      title: `${kind === "ball" ? "Ball's events" : "Noise"} [kev/s] against bias_${bias}`,
+      low: 0,
+      present: this.state.locked && !this.state.known ? null : this.values[bias],
+      onpick: this.state.locked ? null : ({ x: value }) => this.#put(bias, value),
+      series: ["on", "off"].map((polarity) => ({
+        name: polarity.toUpperCase(),
+        colour: COLOURS[polarity],
+        points: points.map((point) => ({ x: x(point), y: point[`${kind}_${polarity}_hz`] / 1000, label: point.recording })),
+      })),
+    })).filter(Boolean);
+  }
+
+  async #load() {
+    const [file] = this.file.files;
+    if (!file) return;
+    try {
+      const { biases } = await post("/api/biases/read", { text: await file.text() });
+      if (this.state.locked) notice(this.state.locked, "warning");
+      else await this.take(biases);
+    } catch (error) {
+      notice(error.message);
+    }
+    this.file.value = "";
+  }
+
+  async #save() {
+    const { text } = await post("/api/biases/write", { biases: this.values });
+    download("spinscope.bias", text, "text/plain");
+  }
+}

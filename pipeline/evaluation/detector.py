@@ -1,0 +1,195 @@
+"""Suite `detector`: the ball's place, size and velocity against speed (section 4.2 and its figure)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import BallParameters
+from ..chain import Chain, Tick
+from ..results import Circle, Truth
+from ..simulator import flight
+from ..stages.track_kalman import OBSERVED, BallFilter
+from . import paper
+from .estimating import source_of
+from .rendering import Rendered, rendered
+from .tables import Cell, Row, Summary, Table, distinct, share, summary, where
+from .work import Bench, Task
+
+SEED = 73_000  # of this suite alone: nothing was tuned on these recordings
+SPEEDS_M_S = tuple(float(speed) for speed in range(4, 21, 2))
+SCENES = ("one ball", "two balls", "arm")
+FLIGHTS = 3  # of each speed and scene
+STAGES = ("hough", "hough + kalman", "refined", "refined + kalman")
+
+# The paper's filter, fed with the Hough circle: its error is about a pixel, its start knows nothing of the velocity.
+HOUGH_STD_PX, FASTEST_M_S, ACCELERATION_M_S2, APPROACH_M_S, MOST_SURPRISE = 1.0, 25.0, 15.0, 3.0, 25.0
+MOST_MISSES = 2  # circles in a row that do not fit: the filter follows something else and starts anew
+ASIDE_US = 500  # the truth's velocity is the difference of places so far before and after
+
+Ring = NDArray[np.float64]  # (5,) x, y, vx, vy, radius in px and px/s; NaN where a stage does not say
+
+
+def tasks(quick: bool) -> list[Task]:
+    """One flight a task."""
+    if quick:
+        chosen = [("one ball", 6.0), ("one ball", 16.0), ("two balls", 10.0)]
+    else:
+        chosen = [(scene, speed) for scene in SCENES for speed in SPEEDS_M_S for _ in range(FLIGHTS)]
+    return [
+        Task(measure, {"scene": scene, "speed_m_s": speed, "seed": SEED + number})
+        for number, (scene, speed) in enumerate(chosen)
+    ]
+
+
+def measure(bench: Bench, scene: str, speed_m_s: float, seed: int) -> list[Row]:
+    """Every stage's errors in every tick in which all of the ball is in view."""
+    shown = flight(
+        kind="top",
+        magnitude_rps=40.0,
+        speed_m_s=speed_m_s,
+        second_ball=scene == "two balls",
+        arm=scene == "arm",
+        seed=seed,
+    )
+    recording = rendered(bench, shown, seed=seed)
+    about: Row = {"scene": scene, "speed_m_s": speed_m_s, "seed": seed}
+    chain = Chain(source_of(recording))
+    focal_px = chain.setting(bench.parameters).camera.focal_px
+    follower = HoughKalman(bench.parameters.ball, focal_px)
+    rows: list[Row] = []
+    for tick in chain.run(bench.parameters, forget=("surface",)):
+        found = _found(tick, follower)
+        truth = _truth_at(recording, tick.track.t_us)
+        if truth is not None:
+            rows += [_row({**about, "t_us": tick.track.t_us}, stage, found[stage], truth) for stage in STAGES]
+    return rows
+
+
+class HoughKalman:
+    """The paper's filter, which takes the Hough circle as it is; it starts with the first circle of a track, and
+    again where it has lost the ball."""
+
+    def __init__(self, ball: BallParameters, focal_px: float) -> None:
+        self.radius_m = ball.diameter_mm / 2000.0
+        self.focal_px = focal_px
+        self.filter: BallFilter | None = None
+        self.last_us = 0
+        self.misses = 0
+
+    def step(self, end_us: int, tracked: bool, circle: Circle | None) -> Ring | None:
+        """The filter's state at the end of a tick; None while there is no track."""
+        if not tracked:
+            self.filter = None
+        elif self.filter is None or self.misses >= MOST_MISSES:
+            self.filter = None if circle is None else self._begun(circle)
+            self.misses = 0
+        else:
+            self.filter.predict((end_us - self.last_us) * 1e-6)
+            if circle is not None:
+                seen = np.array([circle.x_px, circle.y_px, circle.radius_px])
+                fits = self.filter.update(seen, np.eye(len(OBSERVED)) * HOUGH_STD_PX**2, MOST_SURPRISE)
+                self.misses = 0 if fits else self.misses + 1
+        self.last_us = end_us
+        return None if self.filter is None else self.filter.mean
+
+    def _begun(self, circle: Circle) -> BallFilter:
+        per_m = circle.radius_px / self.radius_m
+        std = np.array([HOUGH_STD_PX, HOUGH_STD_PX, FASTEST_M_S * per_m, FASTEST_M_S * per_m, HOUGH_STD_PX])
+        return BallFilter(
+            np.array([circle.x_px, circle.y_px, 0.0, 0.0, circle.radius_px]),
+            np.diag(std**2),
+            ACCELERATION_M_S2 * per_m,
+            APPROACH_M_S * per_m * circle.radius_px / self.focal_px,
+        )
+
+
+def _found(tick: Tick, follower: HoughKalman) -> dict[str, Ring | None]:
+    """What every stage says at the end of a tick, None where it says nothing."""
+    track = tick.track
+    return {
+        "hough": _ring(track.hough),
+        "hough + kalman": follower.step(tick.packet.end_us, track.has_ball, track.hough),
+        "refined": _ring(track.measured),
+        "refined + kalman": track.mean if track.has_ball else None,
+    }
+
+
+def _ring(circle: Circle | None) -> Ring | None:
+    return None if circle is None else np.array([circle.x_px, circle.y_px, np.nan, np.nan, circle.radius_px])
+
+
+def _truth_at(recording: Rendered, t_us: float) -> Ring | None:
+    """The true ball at a time; None unless all of it is in the image, and for a while on both sides."""
+    truth = recording.truth
+    around = np.array([t_us - ASIDE_US, t_us, t_us + ASIDE_US])
+    if around[0] < truth.t_us[0] or around[2] > truth.t_us[-1]:
+        return None
+    x, y, radius = (np.interp(around, truth.t_us, column) for column in _silhouette(truth))
+    if min(x.min(), y.min()) < radius.max() or x.max() > recording.width_px - radius.max():
+        return None
+    if y.max() > recording.height_px - radius.max():
+        return None
+    slope = 1e6 / (2 * ASIDE_US)
+    return np.array([x[1], y[1], (x[2] - x[0]) * slope, (y[2] - y[0]) * slope, radius[1]])
+
+
+def _silhouette(truth: Truth) -> tuple[Ring, Ring, Ring]:
+    return truth.x_px, truth.y_px, truth.radius_px
+
+
+def _row(about: Row, stage: str, found: Ring | None, truth: Ring) -> Row:
+    """Errors of one stage in one tick; a circle whose centre lies outside the true ball is another's: not found."""
+    row: Row = {**about, "stage": stage, "found": False}
+    row |= dict.fromkeys(("centre_error_px", "along_px", "across_px", "radius_error_px", "velocity_error_px_s"))
+    if found is None or np.hypot(*(found[:2] - truth[:2])) > truth[4]:
+        return row
+    offset, motion = found[:2] - truth[:2], truth[2:4] / np.hypot(*truth[2:4])
+    row["found"] = True
+    row["centre_error_px"] = float(np.hypot(*offset))
+    row["along_px"] = float(offset @ motion)
+    row["across_px"] = float(offset[0] * -motion[1] + offset[1] * motion[0])
+    row["radius_error_px"] = float(abs(found[4] - truth[4]))
+    if not np.isnan(found[2]):
+        row["velocity_error_px_s"] = float(np.hypot(*(found[2:4] - truth[2:4])))
+    return row
+
+
+def tables(rows: Sequence[Row]) -> list[Table]:
+    """The stages in each scene, and against the speed."""
+    scenes, speeds = distinct(rows, "scene"), distinct(rows, "speed_m_s")
+    columns = ("stage", "ticks", "found", "centre [px]", "along the motion [px]", "radius [px]", "velocity [px/s]")
+    by_scene: list[tuple[Cell, ...]] = [
+        (f"paper ({scene})", "hough + kalman", None, None, paper.DETECTOR, None, None, None) for scene in scenes[:1]
+    ]
+    by_scene += [(scene, *_line(where(rows, scene=scene, stage=stage), stage)) for scene in scenes for stage in STAGES]
+    by_speed = [
+        (speed, *_line(part, stage))
+        for speed in sorted(speeds)
+        for stage in STAGES
+        if (part := where(rows, scene="one ball", speed_m_s=speed, stage=stage))
+    ]
+    return [
+        Table("Ball detector by scene", ("scene", *columns), by_scene, NOTE),
+        Table("Ball detector by speed, one ball", ("speed [m/s]", *columns), by_speed),
+    ]
+
+
+NOTE = (
+    "Absolute errors over all ticks with the whole ball in view, at the end of the tick, as a robot would have them; "
+    "along the motion signed (negative = behind). Found: a circle whose centre lies on the ball."
+)
+
+
+def _line(part: Sequence[Row], stage: str) -> tuple[Cell, ...]:
+    return (
+        stage,
+        len(part),
+        share(part, lambda row: bool(row["found"])),
+        summary(part, "centre_error_px"),
+        summary(part, "along_px"),
+        summary(part, "radius_error_px"),
+        summary(part, "velocity_error_px_s") if "kalman" in stage else Summary.over([]),
+    )

@@ -1,0 +1,108 @@
+"""Suite `filters`: events kept by STC, TRAIL and STC-cut-TRAIL (supplement), and what each does to the spin."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..chain import STAGES, Chain
+from ..events import EventBatch
+from ..results import Packet
+from .estimating import COLUMNS, estimate_rows, method_line, shots_of, source_of
+from .tables import Cell, Row, Table, distinct, summary, where
+from .thrower import about_flight, flight_of, settings
+from .work import Bench, Task
+
+FILTERS = ("stc", "trail", "stc_cut_trail")
+THRESHOLDS_US = (100, 200, 500, 1000, 2000, 5000, 10_000, 20_000)
+SPIN_THRESHOLDS_US = (1000, 5000, 20_000)
+EVERY = 8  # every so many of the thrower's flights are taken
+NOISE, BALL, LOGO = (0, 4), (1, 2), (2,)  # labels of the truth
+
+
+def tasks(quick: bool) -> list[Task]:
+    """One flight and one question a task."""
+    flights = settings(quick)[:1] if quick else settings(quick)[::EVERY]
+    thresholds = SPIN_THRESHOLDS_US[1:2] if quick else SPIN_THRESHOLDS_US
+    kept = [Task(measure_kept, {"setting": list(setting)}) for setting in flights]
+    spin = [
+        Task(measure_spin, {"setting": list(setting), "mode": mode, "threshold_us": threshold_us})
+        for setting in flights
+        for mode, threshold_us in [("off", 1), *((m, t) for m in FILTERS for t in thresholds)]
+    ]
+    return kept + spin
+
+
+def measure_kept(bench: Bench, setting: list[int]) -> list[Row]:
+    """The share of events that each filter keeps at each threshold, by what made them."""
+    velocity, spin, side, seed = setting
+    recording = flight_of(bench, velocity, spin, bool(side), seed)
+    label = recording.truth.label
+    packet = Packet(0, 0, recording.duration_us, recording.events)
+    surroundings = Chain(source_of(recording)).setting(bench.parameters)
+    rows: list[Row] = []
+    for mode in FILTERS:
+        for threshold_us in THRESHOLDS_US:
+            parameters = bench.parameters.filter.with_values(
+                {"mode": mode, "threshold_us": threshold_us, "logo_mode": mode, "logo_threshold_us": threshold_us}
+            )
+            stage = STAGES["filter"]
+            passed = stage.step(parameters, stage.start(parameters, surroundings), packet).surface_events
+            kept = np.isin(_keys(recording.events), _keys(passed))
+            row: Row = {"question": "kept", "seed": seed, "mode": mode, "threshold_us": threshold_us}
+            row["kept_all"] = float(kept.mean())
+            for name, labels in (("noise", NOISE), ("ball", BALL), ("logo", LOGO)):
+                of_these = np.isin(label, labels)
+                row[f"kept_{name}"] = float(kept[of_these].mean()) if of_these.any() else None
+            rows.append(row)
+    return rows
+
+
+def measure_spin(bench: Bench, setting: list[int], mode: str, threshold_us: int) -> list[Row]:
+    """The errors of the spin with this filter before the logo and the outline."""
+    velocity, spin, side, seed = setting
+    recording = flight_of(bench, velocity, spin, bool(side), seed)
+    parameters = bench.parameters.with_values({"filter": {"logo_mode": mode, "logo_threshold_us": threshold_us}})
+    about = about_flight(recording, velocity, spin, bool(side), seed)
+    about |= {"question": "spin", "mode": mode, "threshold_us": threshold_us}
+    return estimate_rows(shots_of(recording, parameters), recording.truth, about)
+
+
+def _keys(events: EventBatch) -> NDArray[np.int64]:
+    """(n,) one number an event, different for different events (pixels up to 2047)."""
+    key: NDArray[np.int64] = events.t_us
+    for column, size in ((events.y_px, 2048), (events.x_px, 2048), (events.on, 2)):
+        key = key * size + column.astype(np.int64)
+    return key
+
+
+def tables(rows: Sequence[Row]) -> list[Table]:
+    """Events kept against the threshold; spin errors against filter and threshold."""
+    kept = where(rows, question="kept")
+    shares = ("kept_all", "kept_ball", "kept_logo", "kept_noise")
+    of_kept: list[tuple[Cell, ...]] = [
+        (mode, threshold_us, *(summary(part, name) for name in shares))
+        for mode in FILTERS
+        for threshold_us in distinct(kept, "threshold_us")
+        if (part := where(kept, mode=mode, threshold_us=threshold_us))
+    ]
+    spin = where(rows, question="spin")
+    of_spin: list[tuple[Cell, ...]] = [
+        (mode, None if mode == "off" else threshold_us, *method_line(where(part, method=method), method))
+        for mode in ("off", *FILTERS)
+        for threshold_us in sorted(distinct(spin, "threshold_us"))
+        if (part := where(spin, mode=mode, threshold_us=threshold_us))
+        for method in distinct(part, "method")
+    ]
+    return [
+        Table(
+            "Events kept by the filters, flying ball",
+            ("filter", "threshold [us]", "all", "ball", "logo", "noise"),
+            of_kept,
+            "Shares of the events that come in. The paper: STC keeps more with a longer threshold, TRAIL fewer, and "
+            "beyond 5,000 us little changes for both together.",
+        ),
+        Table("Spin with each filter before the logo", ("filter", "threshold [us]", *COLUMNS), of_spin),
+    ]

@@ -1,0 +1,101 @@
+"""Suite `runtime`: latency up to the logo's events and time of processing over time of recording (section 4.4)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+from ..chain import STAGES as STAGES
+from ..chain import Chain
+from . import paper
+from .estimating import source_of
+from .tables import Cell, Row, Table, distinct, summary, where
+from .thrower import flight_of, settings
+from .work import Bench, Task
+
+# The paper's "from the moment the events are received": up to the logo's events; the rest is spin estimation.
+LATENCY_STAGES = ("filter", "surface", "track", "logo")
+TICKS_US = (5000, 1000)  # the paper's 200 Hz, and the shortest useful
+EVERY = 8  # every so many of the thrower's flights are taken
+
+
+def tasks(quick: bool) -> list[Task]:
+    """One flight and length of tick a task."""
+    flights = settings(quick)[:1] if quick else settings(quick)[::EVERY]
+    return [
+        Task(measure, {"setting": list(setting), "tick_us": tick_us}, keep=False)
+        for tick_us in TICKS_US
+        for setting in flights
+    ]
+
+
+def measure(bench: Bench, setting: list[int], tick_us: int) -> list[Row]:
+    """Milliseconds of every stage in every tick, the kernels being loaded before."""
+    velocity, spin, side, seed = setting
+    recording = flight_of(bench, velocity, spin, bool(side), seed)
+    parameters = bench.parameters.with_values({"track": {"tick_us": tick_us}})
+    for _ in Chain(source_of(recording)).run(parameters, forget=STAGES):
+        pass
+    chain = Chain(source_of(recording), clock=time.perf_counter)
+    rows: list[Row] = []
+    before = dict.fromkeys(STAGES, 0.0)
+    for tick in chain.run(parameters, forget=STAGES):
+        taken_ms = {name: (chain.seconds[name] - before[name]) * 1e3 for name in STAGES}
+        before = dict(chain.seconds)
+        latency_ms = sum(taken_ms[name] for name in LATENCY_STAGES)
+        row: Row = {
+            "tick_us": tick_us,
+            "seed": seed,
+            "t_us": tick.packet.end_us,
+            "tick_ms": (tick.packet.end_us - tick.packet.start_us) / 1e3,
+            "events": len(tick.packet.events),
+            "has_ball": tick.track.has_ball,
+            "latency_ms": latency_ms,
+            "spin_ms": sum(taken_ms.values()) - latency_ms,
+        }
+        rows.append(row | {f"{name}_ms": value for name, value in taken_ms.items()})
+    return rows
+
+
+def tables(rows: Sequence[Row]) -> list[Table]:
+    """The paper's two numbers, and the stages one by one."""
+    lengths = sorted(distinct(rows, "tick_us"), reverse=True)
+    totals: list[tuple[Cell, ...]] = [("paper, 5000 us", None, paper.LATENCY_MS, None, paper.SPIN_TIME_SHARE, None)]
+    for tick_us in lengths:
+        part = where(rows, tick_us=tick_us)
+        flown = where(part, has_ball=True)
+        flights = [_of_recording(where(part, seed=seed)) for seed in distinct(part, "seed")]
+        totals.append(
+            (
+                f"{tick_us} us",
+                len(part),
+                summary(flown, "latency_ms"),
+                max((row["latency_ms"] for row in flown if isinstance(row["latency_ms"], float)), default=None),
+                summary(flights, "spin_share"),
+                summary(flights, "all_share"),
+            )
+        )
+    stages: list[tuple[Cell, ...]] = [
+        (f"{tick_us} us", name, summary(where(rows, tick_us=tick_us, has_ball=True), f"{name}_ms"))
+        for tick_us in lengths
+        for name in STAGES
+    ]
+    return [
+        Table(
+            "Run time",
+            ("tick", "ticks", "events to logo [ms]", "longest [ms]", "spin / recording", "all / recording"),
+            totals,
+            "Events to logo: filter, surface, track and logo in ticks with a ball. Shares: time of processing over "
+            "time of recording, a flight at a time; below 1 is real time. One core.",
+        ),
+        Table("Run time by stage, ticks with a ball", ("tick", "stage", "time [ms]"), stages),
+    ]
+
+
+def _of_recording(rows: Sequence[Row]) -> Row:
+    def total(name: str) -> float:
+        return sum(value for row in rows if isinstance(value := row[name], float))
+
+    length_ms = total("tick_ms")
+    spin_ms = total("spin_ms")
+    return {"spin_share": spin_ms / length_ms, "all_share": (spin_ms + total("latency_ms")) / length_ms}

@@ -1,0 +1,75 @@
+"""The ball in space: its place, its attitude, its arrows; read back from the file."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.viewer import entities
+from app.viewer.recorded import write_rrd
+from app.viewer.run import Run, shown_estimate
+from app.viewer.still import TEXTURE_PX, turned
+from tests.app.viewer.reading import Rows, read_back
+
+
+@pytest.fixture(scope="module")
+def logged(flight: Run, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Rows]:
+    path = tmp_path_factory.mktemp("rrd") / "flight.rrd"
+    write_rrd(flight, path, "all")
+    return read_back(path)
+
+
+def test_the_ball_is_where_the_tracker_has_it(flight: Run, logged: dict[str, Rows]) -> None:
+    for tick in flight.ticks:
+        if tick.track.has_ball:
+            (place,) = logged[entities.BALL].at("translation", tick.packet.end_us)
+            np.testing.assert_allclose(place, flight.centre_m(tick.track.mean)[0], rtol=1e-5)
+            (on_image,) = logged[entities.BALL_PLACE].at("translation", tick.packet.end_us)
+            np.testing.assert_allclose(on_image[:2], tick.track.mean[:2], rtol=1e-6)
+
+
+def test_the_ball_turns_as_its_spin_says(flight: Run, logged: dict[str, Rows]) -> None:
+    """A millisecond after a tick the logged attitude has turned by the spin shown at that tick."""
+    tick = flight.ticks[len(flight.ticks) // 2]
+    estimate, _ = shown_estimate(tick)
+    assert estimate is not None
+    assert estimate.vector_rps is not None
+    points = np.eye(3)
+
+    def attitude(t_us: int) -> np.ndarray:
+        (rotation,) = logged[entities.BODY].at("rotation_axis_angle", t_us)
+        axis, angle = np.array(rotation["axis"]), rotation["angle"]
+        return turned(points, axis, np.full(3, angle / (2 * np.pi)))
+
+    before, after = attitude(tick.packet.end_us), attitude(tick.packet.end_us + 1000)
+    np.testing.assert_allclose(after, turned(before, estimate.vector_rps, np.full(3, 1e-3)), atol=1e-4)
+
+
+def test_the_shown_arrow_points_along_the_trusted_spin(flight: Run, logged: dict[str, Rows]) -> None:
+    tick = [tick for tick in flight.ticks if tick.spin.best is not None][-1]
+    assert tick.spin.best is not None
+    estimate = tick.spin.estimates[tick.spin.best]
+    (arrow,) = logged[entities.SPIN_SHOWN].at("vectors", tick.packet.end_us)
+    np.testing.assert_allclose(np.array(arrow) / np.linalg.norm(arrow), estimate.axis, atol=1e-5)
+    assert logged[entities.SPIN_SHOWN].at("labels", tick.packet.end_us) == [f"{estimate.magnitude_rps:.1f} rps"]
+    (ring,) = np.array(logged[entities.SPIN_RING].at("strips", tick.packet.end_us))
+    sense = np.cross(ring[0], ring[1]) @ estimate.axis
+    assert sense > 0  # the ring runs the way the ball turns
+
+
+def test_the_path_is_the_ticks_places_in_pieces(flight: Run, logged: dict[str, Rows]) -> None:
+    for before, tick in zip(flight.ticks, flight.ticks[1:], strict=False):
+        if before.track.has_ball and tick.track.has_ball:
+            (piece,) = logged[entities.PATH].at("strips", tick.packet.end_us)
+            means = np.stack([before.track.mean, tick.track.mean])
+            np.testing.assert_allclose(piece, flight.centre_m(means), rtol=1e-5)
+
+
+def test_a_texture_is_painted_for_every_tick_of_200_hz(flight: Run, logged: dict[str, Rows]) -> None:
+    mesh = logged[entities.MESH]
+    width, height = TEXTURE_PX
+    assert len(mesh.values["albedo_texture_buffer"]) == 1 + int(flight.has_ball.sum())
+    assert {len(buffer[0]) for buffer in mesh.values["albedo_texture_buffer"]} == {3 * width * height}
+    first, last = (np.array(mesh.values["albedo_texture_buffer"][i][0]) for i in (0, -1))
+    assert np.ptp(first.reshape(-1, 3), axis=0).max() == 0  # blank
+    assert np.ptp(last) > 100  # the logo, dark on white

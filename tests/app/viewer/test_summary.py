@@ -1,0 +1,99 @@
+"""The run in words: numbers, kinds, reasons; at the right moments."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from app.viewer import entities
+from app.viewer.recorded import write_rrd
+from app.viewer.run import Run
+from app.words import kind_of_spin
+from tests.app.viewer.reading import Rows, read_back
+
+
+def logged_by(run: Run, folder: Path) -> dict[str, Rows]:
+    write_rrd(run, folder / "run.rrd", "coach")
+    return read_back(folder / "run.rrd")
+
+
+def said(logged: dict[str, Rows], t_us: int) -> str:
+    (text,) = logged[entities.SUMMARY].at("text", t_us)
+    return str(text)
+
+
+@pytest.fixture(scope="module")
+def logged(flight: Run, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Rows]:
+    return logged_by(flight, tmp_path_factory.mktemp("rrd"))
+
+
+def test_before_the_ball_it_says_so(flight: Run, logged: dict[str, Rows]) -> None:
+    assert said(logged, flight.start_us).startswith("## No ball yet")
+    assert flight.name in said(logged, flight.start_us)
+
+
+def test_the_shots_end_tells_the_shot(flight: Run, logged: dict[str, Rows]) -> None:
+    (shot,) = flight.shots
+    assert shot.best is not None
+    best = shot.estimates[shot.best]
+    assert best.vector_rps is not None
+    assert best.magnitude_rps is not None
+    velocity = shot.velocity_m_s(flight.camera, flight.ball_radius_m)
+    assert velocity is not None
+    text = said(logged, shot.end_us)
+    kind = kind_of_spin(best.vector_rps, velocity, flight.camera.up).name
+    assert text.startswith(f"## {best.magnitude_rps:.1f} rps · {kind}")
+    speed = np.linalg.norm(velocity)
+    for words in (f"{60 * best.magnitude_rps:.0f} rpm", f"{speed:.1f} m/s", f"{3.6 * speed:.0f} km/h", "shot 1 of 1"):
+        assert words in text
+    for method in shot.estimates:
+        assert method in text
+    assert f"{shot.best} ✔" in text
+    assert "from the truth" in text
+
+
+def test_every_tick_speaks_of_its_own_estimate(flight: Run, logged: dict[str, Rows]) -> None:
+    for tick in flight.ticks[:-1]:
+        text = said(logged, tick.packet.end_us)
+        if tick.spin.best is not None and "so far" in text:
+            assert text.startswith(f"## {tick.spin.estimates[tick.spin.best].magnitude_rps:.1f} rps")
+        for estimate in tick.spin.estimates.values():
+            if tick.track.has_ball and estimate.reason and "so far" in text:
+                assert f"refused: {estimate.reason}" in text
+
+
+def test_a_ball_in_place_has_an_axis_and_no_speed(spinner: Run, tmp_path: Path) -> None:
+    text = said(logged_by(spinner, tmp_path), spinner.end_us)
+    assert "in place" in text
+    assert "m/s" not in text
+    assert "topspin" not in text
+
+
+def test_no_ball_says_why(no_ball: Run, tmp_path: Path) -> None:
+    assert no_ball.no_shot_reason
+    text = said(logged_by(no_ball, tmp_path), no_ball.start_us)
+    assert text.startswith("## No ball in this recording")
+    assert no_ball.no_shot_reason.removeprefix("no ball: ") in text
+    assert "5,000,000 to" in text  # the file's own time
+
+
+def test_doubt_and_warnings_are_said(flight: Run, tmp_path: Path) -> None:
+    ticks = [
+        dataclasses.replace(tick, spin=dataclasses.replace(tick.spin, best=None)) if tick.spin.best else tick
+        for tick in flight.ticks
+    ]
+    doubtful = dataclasses.replace(flight, ticks=ticks, shots=[], warnings=["seven hot pixels"])
+    text = said(logged_by(doubtful, tmp_path), flight.ticks[12].packet.end_us)
+    assert "no method is trusted" in text
+    assert "seven hot pixels" in text
+
+
+def test_the_card_changes_with_the_shot(flight: Run, logged: dict[str, Rows]) -> None:
+    blobs = [logged[entities.COACH].at("blob", t)[0] for t in (flight.start_us, flight.shots[0].end_us)]
+    first, last = (cv2.imdecode(np.array(blob, np.uint8), cv2.IMREAD_GRAYSCALE) for blob in blobs)
+    assert first.shape == last.shape
+    assert (last > 200).sum() > 1.3 * (first > 200).sum()  # letters where dashes were

@@ -1,0 +1,184 @@
+"""Slow twins of the circle and contour kernels: the definitions in a few lines of NumPy and plain loops."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def vote(
+    shape: tuple[int, int, int], x_px: Ints, y_px: Ints, x0_px: int, y0_px: int, radius0_px: int
+) -> NDArray[np.uint16]:
+    """For every centre and radius, how many pixels lie at that distance, rounded half up."""
+    votes = np.zeros(shape, np.uint16)
+    for b in range(shape[0]):
+        for a in range(shape[1]):
+            distance = np.floor(np.hypot(x_px - x0_px - a, y_px - y0_px - b) + 0.5)
+            for k in range(shape[2]):
+                votes[b, a, k] = np.count_nonzero(distance == radius0_px + k)
+    return votes
+
+
+def peak(votes: NDArray[np.uint16], radius0_px: int) -> tuple[float, int, int, int]:
+    """The first largest votes^2 / (2 pi radius), in the order of the array."""
+    radius = np.maximum(radius0_px + np.arange(votes.shape[2]), 1)
+    support = votes.astype(np.float64) ** 2 / (2 * math.pi * radius)
+    if support.max(initial=0.0) == 0.0:
+        return 0.0, 0, 0, 0
+    b, a, k = np.unravel_index(int(np.argmax(support)), votes.shape)
+    return float(support[b, a, k]), int(a), int(b), int(k)
+
+
+def bright_pixels(image: NDArray[np.uint8], least: int, most_pixels: int) -> tuple[Ints, Ints]:
+    """All pixels in reading order, every so many-th of them."""
+    rows, columns = np.nonzero(image >= least)
+    stride = max(1, math.ceil(rows.size / most_pixels))
+    return columns[::stride], rows[::stride]
+
+
+def active_cells(values: NDArray[np.uint8], x_px: Ints, y_px: Ints, least: int, cell_px: int) -> list[tuple[int, int]]:
+    """(column, row) of the cells with a bright pixel and such a neighbour, by row."""
+    cells = {(int(x) // cell_px, int(y) // cell_px) for x, y in zip(x_px, y_px, strict=True) if values[y, x] >= least}
+    around = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
+    kept = [(a, b) for a, b in cells if any((a + i, b + j) in cells for i, j in around)]
+    return sorted(kept, key=lambda cell: (cell[1], cell[0]))
+
+
+def from_centre(ring: Floats, tau_s: Floats, x_px: Floats, y_px: Floats) -> tuple[Floats, Floats]:
+    """Each event relative to the centre at its time."""
+    return x_px - ring[0] - ring[2] * tau_s, y_px - ring[1] - ring[3] * tau_s
+
+
+def residuals(ring: Floats, oval: Floats, tau_s: Floats, x_px: Floats, y_px: Floats) -> Floats:
+    """Distance from the centre less the outline's distance in that direction."""
+    dx, dy = from_centre(ring, tau_s, x_px, y_px)
+    phi = np.arctan2(dy, dx)
+    return np.hypot(dx, dy) - ring[4] * (1 + oval[0] * np.cos(2 * phi) + oval[1] * np.sin(2 * phi))
+
+
+def near_outline(
+    ring: Floats, tau_s: Floats, x_px: Floats, y_px: Floats, gate_px: float, most_events: int, ahead_only: bool
+) -> Ints:
+    """Indices by mask, then every so many-th."""
+    dx, dy = from_centre(ring, tau_s, x_px, y_px)
+    near = np.abs(np.hypot(dx, dy) - ring[4]) <= gate_px
+    if ahead_only:
+        near &= dx * ring[2] + dy * ring[3] >= 0
+    chosen = np.flatnonzero(near)
+    return chosen[:: max(1, math.ceil(chosen.size / most_events))]
+
+
+def fit_ring(
+    start: Floats,
+    prior_std: Floats,
+    oval: Floats,
+    tau_s: Floats,
+    x_px: Floats,
+    y_px: Floats,
+    gate_px: float,
+    floor_px: float,
+    most_rounds: int,
+) -> Floats:
+    """Reweighted least squares with a numerical Jacobian, solved by `lstsq`."""
+    ring, gate = start.astype(np.float64).copy(), gate_px
+    steps = np.array([1e-4, 1e-4, 1e-1, 1e-1, 1e-4])
+    for _ in range(most_rounds):
+        error = residuals(ring, oval, tau_s, x_px, y_px)
+        weight = np.where(np.abs(error) < gate, (1 - (error / gate) ** 2) ** 2, 0.0)
+        slope = np.stack(
+            [
+                (residuals(ring + step, oval, tau_s, x_px, y_px) - residuals(ring - step, oval, tau_s, x_px, y_px))
+                / (2 * step.sum())
+                for step in np.diag(steps)
+            ],
+            axis=1,
+        )
+        held = 1 / np.maximum(prior_std, 1e-9)
+        rows = np.concatenate([np.sqrt(weight)[:, None] * slope, np.diag(held)])
+        target = np.concatenate([-np.sqrt(weight) * error, held * (start - ring)])
+        unit = np.array([1.0, 1.0, 1e3, 1e3, 1.0])
+        change = np.linalg.lstsq(rows * unit, target, rcond=None)[0] * unit
+        ring = ring + change
+        if gate <= floor_px and np.max(np.abs(change / unit)) < 1e-3:
+            break
+        scatter = math.sqrt(float(np.sum(weight * error**2)) / max(float(weight.sum()), 1e-9)) / 0.91
+        gate = max(min(4.7 * scatter, 0.67 * gate), floor_px)
+    return ring
+
+
+def vote_velocity(
+    m: int,
+    ring: Floats,
+    tau_s: Floats,
+    x_px: Floats,
+    y_px: Floats,
+    on: NDArray[np.bool_],
+    step_px_s: float,
+    gate_px: float,
+) -> Floats:
+    """For every velocity of the grid: signed nearness of the events to the outline that moves so."""
+    votes = np.zeros((2 * m + 1, 2 * m + 1))
+    for j in range(-m, m + 1):
+        for i in range(-m, m + 1):
+            if i * i + j * j <= m * m:
+                trial = ring + np.array([0.0, 0.0, i * step_px_s, j * step_px_s, 0.0])
+                dx, dy = from_centre(trial, tau_s, x_px, y_px)
+                near = np.maximum(1 - np.abs(np.hypot(dx, dy) - ring[4]) / gate_px, 0.0)
+                sign = np.sign(dx * trial[2] + dy * trial[3]) * np.where(on, 1, -1)
+                votes[m + j, m + i] = np.sum(near * sign)
+    return votes
+
+
+def support(
+    ring: Floats,
+    oval: Floats,
+    tau_s: Floats,
+    x_px: Floats,
+    y_px: Floats,
+    on: NDArray[np.bool_],
+    width_px: int,
+    height_px: int,
+    tolerance_px: float,
+    early_px: float,
+    bins: int,
+) -> Floats:
+    """The eight numbers of the kernel, by masks."""
+    dx, dy = from_centre(ring, tau_s, x_px, y_px)
+    error = residuals(ring, oval, tau_s, x_px, y_px)
+    ahead = dx * ring[2] + dy * ring[3] > 0
+    inner = np.where(ahead, tolerance_px, max(tolerance_px, early_px))
+    on_it = (error <= tolerance_px) & (error >= -inner)
+    sector = np.floor((np.arctan2(dy, dx) / (2 * math.pi) + 1) * bins).astype(np.int64) % bins
+    counts = np.bincount(sector[on_it], minlength=bins)
+    enough = counts >= (2 if np.count_nonzero(on_it) >= 3 * bins else 1)
+    angle = 2 * math.pi * (np.arange(bins) + 0.5) / bins
+    x, y = ring[0] + ring[4] * np.cos(angle), ring[1] + ring[4] * np.sin(angle)
+    in_view = (x >= 0) & (y >= 0) & (x <= width_px - 1) & (y <= height_px - 1)
+    across = (np.cos(angle) * ring[2] + np.sin(angle) * ring[3]) / (math.hypot(ring[2], ring[3]) + 1e-9)
+
+    def share(part: NDArray[np.bool_], whole: NDArray[np.bool_]) -> float:
+        return float(np.count_nonzero(part & whole)) / max(np.count_nonzero(whole), 1)
+
+    return np.array(
+        [
+            np.count_nonzero(on_it),
+            share(on, on_it & ahead),
+            share(on, on_it & ~ahead),
+            share(enough, in_view & (across >= 0.25)),
+            share(enough, in_view & (across <= -0.25)),
+            in_view.mean(),
+            np.count_nonzero((error > tolerance_px) & (error < 4 * tolerance_px)),
+            np.count_nonzero(error < -inner),
+        ]
+    )
+
+
+def clear_of(ring: Floats, tau_s: Floats, x_px: Floats, y_px: Floats, margin_px: float) -> Ints:
+    """Indices of the events farther out than the ring and the margin."""
+    dx, dy = from_centre(ring, tau_s, x_px, y_px)
+    return np.flatnonzero(np.hypot(dx, dy) > ring[4] + margin_px)

@@ -1,0 +1,152 @@
+"""The contour kernels equal their slow twins, and the fit finds moving circles under noise."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from pipeline.kernels import contour
+from tests import naive_circle
+
+ROUND = np.zeros(2)
+FREE = np.full(5, 1e9)
+Floats = NDArray[np.float64]
+
+
+def on_ring(
+    ring: Floats, count: int, rng: np.random.Generator, scatter_px: float = 0.1, ahead_only: bool = False
+) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
+    """Events on a moving circle during the last 3 ms: seconds, columns, rows, ON ahead and OFF behind."""
+    tau = np.sort(-3e-3 * rng.random(count))
+    heading = math.atan2(ring[3], ring[2])
+    spread = math.pi / 2 if ahead_only else math.pi
+    angle = heading + rng.uniform(-spread, spread, count)
+    distance = ring[4] + scatter_px * rng.standard_normal(count)
+    x = ring[0] + ring[2] * tau + distance * np.cos(angle)
+    y = ring[1] + ring[3] * tau + distance * np.sin(angle)
+    return tau, x, y, np.cos(angle - heading) > 0
+
+
+def scene(seed: int, clutter: int = 40) -> tuple[Floats, Floats, Floats, Floats, NDArray[np.bool_]]:
+    """A random ring, with events on it and anywhere."""
+    rng = np.random.default_rng(seed)
+    speed, heading = rng.uniform(500, 15000), rng.uniform(0, 2 * math.pi)
+    ring = np.array(
+        [
+            rng.uniform(0, 60),
+            rng.uniform(0, 40),
+            speed * math.cos(heading),
+            speed * math.sin(heading),
+            rng.uniform(5, 30),
+        ]
+    )
+    tau, x, y, on = on_ring(ring, 150, rng)
+    noise = rng.random((3, clutter)) * np.array([[-3e-3], [100.0], [80.0]]) - np.array([[0.0], [20.0], [20.0]])
+    order = np.argsort(np.concatenate([tau, noise[0]]))
+    columns = [np.concatenate([a, b])[order] for a, b in zip((tau, x, y), noise, strict=True)]
+    return ring, *columns, np.concatenate([on, rng.random(clutter) < 0.5])[order]
+
+
+@given(seed=st.integers(0, 2**32 - 1), oval=st.tuples(st.floats(-0.05, 0.05), st.floats(-0.05, 0.05)))
+def test_measures_equal_the_twins(seed: int, oval: tuple[float, float]) -> None:
+    ring, tau, x, y, on = scene(seed)
+    bent = np.array(oval)
+    assert np.allclose(
+        contour.residuals(ring, bent, tau, x, y), naive_circle.residuals(ring, bent, tau, x, y), atol=1e-9
+    )
+    args = (ring, bent, tau, x, y, on, 60, 40, 1.2, 3.0, 32)
+    assert np.allclose(contour.support(*args), naive_circle.support(*args))
+    votes = np.zeros((9, 9))
+    contour.vote_velocity(votes, ring, tau, x, y, on, 700.0, 2.5)
+    assert np.allclose(votes, naive_circle.vote_velocity(4, ring, tau, x, y, on, 700.0, 2.5))
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    gate=st.floats(0.5, 12),
+    most=st.integers(1, 200),
+    ahead_only=st.booleans(),
+    margin=st.floats(0, 20),
+)
+def test_choices_of_events_equal_the_twins(seed: int, gate: float, most: int, ahead_only: bool, margin: float) -> None:
+    ring, tau, x, y, _ = scene(seed)
+    t_us = np.rint(tau * 1e6).astype(np.int64) + 7_000_000
+    columns = [np.clip(np.rint(column), 0, 1000).astype(np.uint16) for column in (x, y)]
+    exact = [(t_us - 7_000_000) * 1e-6, *(column.astype(np.float64) for column in columns)]
+    near = contour.near_outline(ring, t_us, *columns, 7_000_000, gate, most, ahead_only)
+    assert np.array_equal(near, naive_circle.near_outline(ring, *exact, gate, most, ahead_only))
+    clear = contour.clear_of(ring, t_us, *columns, 7_000_000, margin)
+    assert np.array_equal(clear, naive_circle.clear_of(ring, *exact, margin))
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    rounds=st.integers(1, 9),
+    held=st.lists(st.sampled_from([0.0, 0.5, 1e9]), min_size=5, max_size=5),
+)
+def test_fit_equals_the_twin(seed: int, rounds: int, held: list[float]) -> None:
+    ring, tau, x, y, _ = scene(seed)
+    start = ring + np.array([0.5, -0.4, 150.0, -100.0, 0.3])
+    prior = np.array(held) * np.array([1, 1, 1000, 1000, 1])
+    args = (start, prior, ROUND, tau, x, y, 2.5, 0.6, rounds)
+    fitted, _, _, _ = contour.fit_ring(*args)
+    assert np.allclose(fitted, naive_circle.fit_ring(*args), atol=np.array([1e-4, 1e-4, 0.1, 0.1, 1e-4]), rtol=0)
+
+
+@given(seed=st.integers(0, 2**32 - 1), ahead_only=st.booleans())
+def test_fit_finds_the_ring_and_knows_how_well(seed: int, ahead_only: bool) -> None:
+    rng = np.random.default_rng(seed)
+    heading, speed = rng.uniform(0, 2 * math.pi), rng.uniform(1500, 16000)
+    ring = np.array([300.0, 200.0, speed * math.cos(heading), speed * math.sin(heading), rng.uniform(7, 40)])
+    tau, x, y, _ = on_ring(ring, 300, rng, ahead_only=ahead_only)
+    x[::10] += rng.uniform(-10, 10, x[::10].size)  # a tenth are the logo's, or noise
+    start = ring + np.array([1.0, -1.0, 300.0, -300.0, 0.8])
+    fitted, covariance, scatter, weight = contour.fit_ring(start, FREE, ROUND, tau, x, y, 3.0, 0.6, 12)
+    off = fitted - ring
+    assert off @ np.linalg.solve(covariance, off) < 45  # five degrees of freedom: 1e-8 by chance
+    assert np.hypot(*off[:2]) < 0.3
+    assert 0.05 < scatter < 0.2
+    assert 150 < weight < 300
+
+
+def test_a_circle_at_rest_is_fitted_with_its_velocity_held() -> None:
+    rng = np.random.default_rng(1)
+    tau, x, y, _ = on_ring(np.array([20.0, 30.0, 1e-9, 0.0, 10.0]), 200, rng)
+    start = np.array([20.5, 29.5, 0.0, 0.0, 9.5])
+    fitted, *_ = contour.fit_ring(start, np.array([1e9, 1e9, 0, 0, 1e9]), ROUND, tau, x, y, 2.0, 0.6, 9)
+    assert np.allclose(fitted, [20, 30, 0, 0, 10], atol=0.05)
+
+
+@pytest.mark.parametrize("bright", [True, False])
+@given(seed=st.integers(0, 2**32 - 1))
+def test_velocity_votes_peak_at_the_velocity(bright: bool, seed: int) -> None:
+    """The sign of the peak says whether the ball is brighter than its background."""
+    rng = np.random.default_rng(seed)
+    step, m = 1000.0, 8
+    i, j = (int(n) for n in rng.integers(-5, 6, 2))
+    if i == 0 and j == 0:
+        return
+    ring = np.array([100.0, 100.0, i * step, j * step, 18.0])
+    tau, x, y, on = on_ring(ring, 200, rng)
+    votes = np.zeros((2 * m + 1, 2 * m + 1))
+    at_rest = ring * np.array([1, 1, 0, 0, 1])
+    contour.vote_velocity(votes, at_rest, tau, x, y, on if bright else ~on, step, 2.0)
+    best = np.unravel_index(int(np.argmax(np.abs(votes))), votes.shape)
+    assert best == (m + j, m + i)
+    assert (votes[best] > 0) == bright
+
+
+def test_an_oval_outline_is_known() -> None:
+    """An ellipse with semi-axes 1 +- 4 % along x and y is fitted as what it is."""
+    angle = np.linspace(0, 2 * math.pi, 240, endpoint=False)
+    x, y = 50 + 20.8 * np.cos(angle), 40 + 19.2 * np.sin(angle)
+    args: tuple[Any, ...] = (np.array([50.3, 39.8, 0, 0, 19.5]), np.array([1e9, 1e9, 0, 0, 1e9]))
+    fitted, _, scatter, _ = contour.fit_ring(*args, np.array([0.04, 0.0]), np.zeros(240), x, y, 3.0, 0.6, 12)
+    assert np.allclose(fitted, [50, 40, 0, 0, 20], atol=0.05)
+    assert scatter < 0.02

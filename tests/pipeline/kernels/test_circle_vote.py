@@ -1,0 +1,86 @@
+"""The Hough vote equals its slow twin, and finds the circles that are there."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from pipeline.kernels import circle
+from tests import naive_circle
+
+
+def pixels_of_circle(x_px: float, y_px: float, radius_px: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    angle = np.linspace(0, 2 * math.pi, 200, endpoint=False)
+    points = np.stack([x_px + radius_px * np.cos(angle), y_px + radius_px * np.sin(angle)], axis=1)
+    drawn = np.unique(np.rint(points).astype(np.int64), axis=0)
+    return drawn[:, 0].copy(), drawn[:, 1].copy()
+
+
+@given(
+    height=st.integers(1, 12),
+    width=st.integers(1, 12),
+    radii=st.integers(1, 6),
+    radius0=st.integers(1, 8),
+    x0=st.integers(-10, 10),
+    y0=st.integers(-10, 10),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_votes_equal_the_twin(height: int, width: int, radii: int, radius0: int, x0: int, y0: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    x, y = rng.integers(-15, 25, (2, rng.integers(0, 25)))
+    votes = np.zeros((height, width, radii), np.uint16)
+    circle.vote(votes, x, y, x0, y0, radius0)
+    assert np.array_equal(votes, naive_circle.vote(votes.shape, x, y, x0, y0, radius0))
+    assert circle.peak(votes, radius0) == naive_circle.peak(votes, radius0)
+
+
+@given(x=st.floats(-3, 33), y=st.floats(-3, 33), radius=st.floats(5, 14))
+def test_the_peak_is_the_circle(x: float, y: float, radius: float) -> None:
+    """Also with a third of it, or more, outside the image."""
+    xs, ys = pixels_of_circle(x, y, radius)
+    seen = (xs >= 0) & (ys >= 0) & (xs < 30) & (ys < 30)
+    if np.count_nonzero(seen) < 0.6 * seen.size:
+        return
+    votes = np.zeros((50, 50, 14), np.uint16)
+    circle.vote(votes, xs[seen], ys[seen], -10, -10, 3)
+    _, a, b, k = circle.peak(votes, 3)
+    fine_a, fine_b, fine_k = circle.refined(votes, a, b, k)
+    assert math.hypot(fine_a - 10 - x, fine_b - 10 - y) < 1.5
+    assert abs(fine_k + 3 - radius) < 1.5
+
+
+def test_the_refined_peak_is_the_centre_of_mass_of_squares() -> None:
+    votes = np.zeros((5, 6, 4), np.uint16)
+    votes[2, 3, 1], votes[2, 4, 1], votes[2, 3, 2], votes[0, 0, 3] = 2, 1, 1, 9
+    a, b, k = circle.refined(votes, 3, 2, 1)
+    assert (a, b, k) == (3 + 1 / 6, 2.0, 1 + 1 / 6)
+    assert circle.refined(np.zeros((3, 3, 3), np.uint16), 1, 1, 1) == (1.0, 1.0, 1.0)
+
+
+@given(height=st.integers(1, 9), width=st.integers(1, 9), most=st.integers(1, 20), seed=st.integers(0, 2**32 - 1))
+def test_bright_pixels_equal_the_twin(height: int, width: int, most: int, seed: int) -> None:
+    image = np.random.default_rng(seed).integers(0, 256, (height, width)).astype(np.uint8)
+    for found, expected in zip(
+        circle.bright_pixels(image, 128, most), naive_circle.bright_pixels(image, 128, most), strict=True
+    ):
+        assert np.array_equal(found, expected)
+
+
+@given(
+    height=st.integers(1, 20),
+    width=st.integers(1, 20),
+    cell=st.integers(1, 5),
+    events=st.integers(0, 30),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_active_cells_equal_the_twin(height: int, width: int, cell: int, events: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    values = rng.integers(0, 256, (height, width)).astype(np.uint8)
+    x = rng.integers(0, width, events).astype(np.uint16)
+    y = rng.integers(0, height, events).astype(np.uint16)
+    columns, rows = circle.active_cells(values, x, y, 100, cell)
+    assert list(zip(columns, rows, strict=True)) == naive_circle.active_cells(values, x, y, 100, cell)

@@ -1,0 +1,33 @@
+"""The logo mask against its slow twin."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.kernels.logo import rows_inside
+from tests.naive_spin import naive_rows_inside
+
+
+@given(
+    seed=st.integers(0, 100_000),
+    velocity=st.tuples(*[st.floats(-9000, 9000)] * 2),
+    radius=st.floats(-3, 40),
+    start_us=st.sampled_from([0, 1_600_000_000_000_000]),
+)
+def test_equals_its_twin(seed: int, velocity: tuple[float, float], radius: float, start_us: int) -> None:
+    rng = np.random.default_rng(seed)
+    t = start_us + np.sort(rng.integers(0, 5000, 100))
+    x, y = (rng.integers(0, 90, 100).astype(np.uint16) for _ in range(2))
+    given_circle = (t, x, y, float(start_us + 4900), (45.3, 44.6), velocity, radius)
+    rows = np.empty(100, np.int64)
+    assert rows[: rows_inside(rows, *given_circle)].tolist() == naive_rows_inside(*given_circle)
+
+
+def test_the_outline_itself_is_outside() -> None:
+    x, y = np.array([13, 10, 12], np.uint16), np.array([14, 15, 14], np.uint16)
+    rows = np.empty(3, np.int64)
+    t = np.zeros(3, np.int64)
+    count = rows_inside(rows, t, x, y, 0.0, (10.0, 10.0), (0.0, 0.0), 5.0)
+    assert rows[:count].tolist() == [2]

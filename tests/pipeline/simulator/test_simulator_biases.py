@@ -1,0 +1,76 @@
+"""Biases: curves, and files."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.biases import CURVES, FACTORY, PAPER, BiasParameters, Curve, physical, read_biases, write_biases
+from pipeline.errors import ParameterError, RecordingError
+
+# Which way the quantity goes as its bias rises.
+RISING = {
+    "threshold_on",
+    "threshold_off",
+    "cutoff_hz",
+    "highpass_hz",
+    "noise_bandwidth_factor",
+    "noise_refractory_factor",
+}
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_curves_are_monotone_over_the_makers_whole_range(name):
+    curve = CURVES[name]
+    declared = BiasParameters.tunables()[curve.bias]
+    assert curve.points[0][0] == declared.low
+    assert curve.points[-1][0] == declared.high
+    values = [curve.at(value) for value in np.linspace(declared.low, declared.high, 200)]
+    change = np.diff(values)
+    assert np.all(change > 0) if name in RISING else np.all(change < 0)
+    for value, quantity in curve.points:
+        assert curve.at(value) == pytest.approx(quantity)
+    assert curve.source
+    assert not curve.calibrated
+
+
+def test_ones_own_curves_replace_ours():
+    mine = Curve("refr", "us", ((-20, 100.0), (235, 10.0)), "measured", calibrated=True)
+    assert physical(PAPER, {**CURVES, "refractory_us": mine}).refractory_us == pytest.approx(mine.at(80))
+    assert physical(PAPER).noise_on == pytest.approx(1.0)
+    assert physical(FACTORY).threshold_on < physical(PAPER).threshold_on
+
+
+def test_files_come_back(tmp_path: Path):
+    file = tmp_path / "mine.bias"
+    write_biases(PAPER, file)
+    assert file.read_text() == ("40 % bias_diff_on\n40 % bias_diff_off\n55 % bias_fo\n0 % bias_hpf\n80 % bias_refr\n")
+    assert read_biases(file) == PAPER
+    file.write_text("\n  -20   %  bias_refr  \n\n")
+    assert read_biases(file) == replace(FACTORY, refr=-20)
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "words"),
+    [
+        ("40 bias_fo\n", RecordingError, "line 1"),
+        ("much % bias_fo\n", RecordingError, "line 1"),
+        ("40 % bias_pr\n", ParameterError, "bias_pr is unknown"),
+        ("900 % bias_fo\n", ParameterError, "out of range"),
+    ],
+)
+def test_bad_files_are_refused_in_words(tmp_path: Path, text: str, error: type[Exception], words: str):
+    file = tmp_path / "bad.bias"
+    file.write_text(text)
+    with pytest.raises(error, match=words):
+        read_biases(file)
+
+
+def test_missing_files_are_refused_in_words(tmp_path: Path):
+    with pytest.raises(RecordingError, match="cannot be read"):
+        read_biases(tmp_path / "missing.bias")
+    with pytest.raises(RecordingError, match="cannot be written"):
+        write_biases(PAPER, tmp_path / "nowhere" / "a.bias")

@@ -1,0 +1,237 @@
+"""The tracker against the truth of the sample flights, and what it must never do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.errors import ParameterError
+from pipeline.events import EventBatch
+from pipeline.stages import track
+from pipeline.stages.track import TrackParameters
+from pipeline.stages.track_calibration import calibrate_latency
+from tests.track_runs import (
+    HEIGHT,
+    WIDTH,
+    disc_events,
+    inputs,
+    merged,
+    run,
+    sample,
+    setting,
+    tracked,
+    transformed,
+    true_ball,
+    wholly_in_view,
+)
+
+FLIGHTS = (
+    "flight_slow_top",
+    "flight_back",
+    "flight_fast_top",
+    "flight_mixed",
+    "flight_two_balls",
+    "flight_side",
+)
+
+
+@pytest.mark.parametrize("tick_us", [1000, 5000, 10_000])
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_flights_are_tracked_to_a_fraction_of_a_pixel(name: str, tick_us: int) -> None:
+    """Found within 10 ms of being wholly in view, never lost before it leaves, with an honest 1 sigma."""
+    _, truth = sample(name)
+    results = tracked(name, tick_us)
+    ball = true_ball(truth, np.array([result.t_us for result in results]))
+    whole = wholly_in_view(ball)
+    mean = np.stack([result.mean for result in results])
+    near = np.hypot(*(mean[:, :2] - ball[:, :2]).T) < 20
+    first = int(np.argmax(near))
+    dense_us = np.arange(truth.t_us[0], truth.t_us[-1], 100.0)
+    in_view_us = dense_us[np.argmax(wholly_in_view(true_ball(truth, dense_us)))]
+    assert results[first].t_us - in_view_us <= 10_000
+
+    judged = np.flatnonzero(whole & (np.arange(len(results)) >= first))
+    assert all(results[i].status == "tracking" for i in judged)
+    assert len({results[i].shot for i in judged}) == 1
+    off = mean[judged][:, [0, 1, 4]] - ball[judged]
+    assert np.hypot(off[:, 0], off[:, 1]).mean() <= 0.2
+    assert np.abs(off[:, 2]).mean() <= 0.2
+    surprise = [
+        e @ np.linalg.solve(results[i].covariance[np.ix_([0, 1, 4], [0, 1, 4])], e) / 3
+        for i, e in zip(judged, off, strict=True)
+    ]
+    assert 0.3 < np.sqrt(np.mean(surprise)) < 1.5
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_the_velocity_is_the_truths(name: str) -> None:
+    _, truth = sample(name)
+    for result in tracked(name)[3:]:
+        if result.status == "tracking" and result.shot == tracked(name)[8].shot:
+            before, after = true_ball(truth, np.array([result.t_us - 2500, result.t_us + 2500]))[:, :2]
+            if np.isfinite(before + after).all() and wholly_in_view(true_ball(truth, np.array([result.t_us])))[0]:
+                assert np.hypot(*(result.mean[2:4] - (after - before) / 5e-3)) < 200
+
+
+def test_reasons_and_fields_fit_the_status() -> None:
+    for name in FLIGHTS:
+        for result in tracked(name):
+            assert (result.reason is None) == result.has_ball
+            assert (result.shot is None) == (not result.has_ball)
+            assert (result.measured is not None) == (result.status == "tracking")
+            assert (result.candidate is not None) == (result.status == "starting")
+            assert np.isnan(result.mean).all() != result.has_ball
+            if result.status == "tracking":
+                assert result.hough is not None
+    ends = [result.reason for result in tracked("flight_back") if result.status == "lost"]
+    assert ends == ["the ball left the view"]
+
+
+def test_a_slow_second_ball_never_takes_over() -> None:
+    """It crosses in front of the first one: from the first sighting on the fast ball is the only one."""
+    results = tracked("flight_two_balls")
+    _, truth = sample("flight_two_balls")
+    ball = true_ball(truth, np.array([result.t_us for result in results]))
+    first = next(i for i, r in enumerate(results) if r.has_ball and abs(r.mean[0] - ball[i, 0]) < 2)
+    assert first <= 2
+    for result, there in zip(results[first:], ball[first:], strict=True):
+        if result.has_ball and np.isfinite(there[0]):
+            assert np.hypot(*(result.mean[:2] - there[:2])) < 2
+
+
+def test_shots_one_after_another_are_numbered() -> None:
+    parts, later_us = [], 0
+    for name in ("flight_back", "flight_mixed", "flight_fast_top"):
+        parts.append(transformed(sample(name)[0], t_us=later_us))
+        later_us += 200_000
+    results = run(inputs(EventBatch.concatenate(parts)))
+    shots = [result.shot for result in results if result.shot is not None]
+    assert shots == sorted(shots)
+    assert set(shots) == {0, 1, 2}
+    for number, since_us in enumerate((0, 200_000, 400_000)):
+        mine = [r.t_us for r in results if r.shot == number]
+        assert since_us < min(mine) < max(mine) < since_us + 130_000
+
+
+def noise(rate_hz: float, seed: int) -> EventBatch:
+    rng = np.random.default_rng(seed)
+    count = int(rate_hz * 0.1)
+    return EventBatch(
+        np.sort(rng.integers(0, 100_000, count)),
+        rng.integers(0, WIDTH, count).astype(np.uint16),
+        rng.integers(0, HEIGHT, count).astype(np.uint16),
+        rng.random(count) < 0.5,
+    )
+
+
+def edges(speed_px_s: float, seed: int) -> EventBatch:
+    """Eight slanted edges that move to the right, ON and OFF in turn."""
+    rng = np.random.default_rng(seed)
+    t_us = np.sort(rng.integers(0, 100_000, 60_000))
+    number = rng.integers(0, 8, t_us.size)
+    y = rng.integers(100, 600, t_us.size)
+    x = (60 * number + speed_px_s * t_us * 1e-6) % WIDTH + 0.2 * y + rng.normal(0, 0.7, t_us.size)
+    seen = (x >= 0) & (x < WIDTH)
+    return EventBatch(t_us[seen], x[seen].astype(np.uint16), y[seen].astype(np.uint16), (number % 2 == 0)[seen])
+
+
+@pytest.mark.parametrize(
+    "events",
+    [
+        pytest.param(noise(1e5, 1), id="noise"),
+        pytest.param(noise(3e6, 2), id="much noise"),
+        pytest.param(edges(1000.0, 3), id="slow edges"),
+        pytest.param(edges(6000.0, 4), id="fast edges"),
+        pytest.param(sample("spinner_ball2_side")[0], id="ball spinner"),
+        pytest.param(sample("spinner_ball1_top")[0], id="ball spinner, top"),
+    ],
+)
+def test_no_ball_where_there_is_none(events: EventBatch) -> None:
+    for tick_us in (1000, 5000):
+        results = run(inputs(events, tick_us))
+        assert not any(result.has_ball for result in results)
+        assert all((result.reason or "").startswith("no ball") for result in results)
+
+
+def test_noise_and_hot_pixels_do_not_disturb() -> None:
+    rng = np.random.default_rng(5)
+    hot = EventBatch(
+        np.sort(rng.integers(0, 95_000, 20_000)),
+        rng.integers(400, 700, 20).astype(np.uint16)[rng.integers(0, 20, 20_000)],
+        rng.integers(0, 700, 20).astype(np.uint16)[rng.integers(0, 20, 20_000)],
+        rng.random(20_000) < 0.5,
+    )
+    events, truth = sample("flight_fast_top")
+    results = run(inputs(merged(events, hot, noise(1e6, 6))))
+    ball = true_ball(truth, np.array([result.t_us for result in results]))
+    judged = [i for i in np.flatnonzero(wholly_in_view(ball)) if i >= 2]
+    assert all(results[i].status == "tracking" for i in judged)
+    off = [np.hypot(*(results[i].mean[:2] - ball[i, :2])) for i in judged]
+    assert np.mean(off) < 0.3
+
+
+def test_a_ball_that_stops_sending_is_coasted_then_lost() -> None:
+    results = run(inputs(sample("flight_slow_top")[0].between(0, 80_000)))
+    assert results[-1].status == "tracking"
+    silent = EventBatch.concatenate(
+        [sample("flight_slow_top")[0].between(0, 80_000), noise(1e3, 7).between(0, 100_000)]
+    )
+    results = run(inputs(merged(silent, transformed(noise(1e3, 8), t_us=80_000))))
+    after = [result.status for result in results[16:22]]
+    assert after == ["coasting", "coasting", "coasting", "coasting", "lost", "searching"]
+    widths = [np.sqrt(result.covariance[0, 0]) for result in results[15:20]]
+    assert widths == sorted(widths)
+    assert results[20].reason == "the ball was not seen for 20 ms"
+
+
+@pytest.mark.parametrize("bright", [True, False])
+@pytest.mark.parametrize("radius_px", [7.0, 18.0, 38.0])
+def test_ideal_balls_of_any_size_bright_or_dark(bright: bool, radius_px: float) -> None:
+    """No latency, no lag, no width, and so long a lens that the outline is round: 2 to 20 m/s of a 40 mm ball."""
+    place = setting(focal_length_mm=500.0)
+    ideal = TrackParameters(latency_us=0.0, lag_px=0.0, outline_px=0.0)
+    for speed_m_s in (2.0, 8.0, 20.0):
+        speed_px_s = speed_m_s * radius_px / 0.02
+        ring = np.array([620.3, 360.4, 0.8 * speed_px_s, -0.6 * speed_px_s, radius_px])
+        rows = inputs(disc_events(ring, 0, 15_000, bright=bright), surface_mode="off")
+        results = run(rows, ideal, place)
+        for result in results[1:]:
+            assert result.status == "tracking"
+            expected = ring + np.array([ring[2], ring[3], 0, 0, 0]) * result.t_us * 1e-6
+            assert np.hypot(*(result.mean - expected)[:2]) < 0.15
+            assert abs(result.mean[4] - radius_px) < 0.15
+
+
+def test_calibration_finds_the_defaults_again() -> None:
+    """From all flights together: what TrackParameters says, within its stated 1 sigma."""
+    runs = [(TrackParameters(), tracked(name), sample(name)[1]) for name in FLIGHTS]
+    found = calibrate_latency(runs, WIDTH, HEIGHT)
+    default = TrackParameters()
+    assert found.outlines > 100
+    assert abs(found.latency_us - default.latency_us) < track.LATENCY_STD_US
+    assert abs(found.lag_px - default.lag_px) < track.PLACE_STD_PX
+    assert abs(found.outline_px - default.outline_px) < track.RADIUS_STD_PX
+    assert found.along_std_px < 0.1
+    alone = calibrate_latency(runs[2:3], WIDTH, HEIGHT)
+    assert alone.lag_px == default.lag_px
+    with pytest.raises(ParameterError, match="10 or more"):
+        calibrate_latency([(default, tracked(FLIGHTS[0])[:5], sample(FLIGHTS[0])[1])], WIDTH, HEIGHT)
+
+
+def test_a_fixed_ball_is_where_it_is_said_to_be() -> None:
+    fixed = TrackParameters(ball="fixed", fixed_x_px=528.0, fixed_y_px=427.0, fixed_radius_px=16.5, fixed_std_px=0.4)
+    rows = inputs(sample("spinner_ball2_side")[0].between(0, 20_000))
+    for (packet, _, _), result in zip(rows, run(rows, fixed), strict=True):
+        assert result.status == "tracking"
+        assert result.shot == 0
+        assert result.t_us == packet.end_us - fixed.latency_us
+        assert result.mean.tolist() == [528.0, 427.0, 0.0, 0.0, 16.5]
+        assert np.allclose(np.diag(result.covariance), [0.16, 0.16, 0, 0, 0.16])
+        assert result.hough is None
+
+
+def test_parameters_that_cannot_work_are_refused() -> None:
+    with pytest.raises(ParameterError, match="--fixed-ball"):
+        track.start(TrackParameters(ball="fixed", fixed_x_px=1.0, fixed_y_px=1.0), setting())
+    with pytest.raises(ParameterError, match="20 must be below"):
+        track.start(TrackParameters(radius_min_px=20.0, radius_max_px=10.0), setting())
