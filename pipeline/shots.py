@@ -75,15 +75,19 @@ class Shot:
 class ShotLog:
     """Gathers shots from ticks in order of time, keeping of each tick only what a shot needs.
 
+    A ball that was followed for a single tick of several, before a faster one took over, is no shot.
+
     shots : the shots that have ended
     """
 
     shots: list[Shot] = field(default_factory=list)
     _last_reason: str | None = None
+    _ticks: int = 0
     _rows: list[_Row] = field(default_factory=list)
 
     def add(self, tick: Tick) -> None:
         """Take the next tick."""
+        self._ticks += 1
         if self._rows and tick.track.shot != self._rows[-1].track.shot:
             self.close()
         if tick.track.has_ball:
@@ -100,8 +104,10 @@ class ShotLog:
 
     def close(self) -> None:
         """End the present shot, if there is one."""
-        if self._rows:
+        if len(self._rows) > 1 or (self._rows and self._ticks == 1):
             self.shots.append(_shot(len(self.shots), self._rows))
+        elif self._rows:
+            self._last_reason = "no shot: a ball was seen for a single tick only"
         self._rows = []
 
 

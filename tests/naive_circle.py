@@ -42,7 +42,9 @@ def bright_pixels(image: NDArray[np.uint8], least: int, most_pixels: int) -> tup
 
 
 def active_cells(values: NDArray[np.uint8], x_px: Ints, y_px: Ints, least: int, cell_px: int) -> list[tuple[int, int]]:
-    """(column, row) of the cells with a bright pixel and such a neighbour, by row."""
+    """(column, row) of the cells with a bright pixel and such a neighbour, by row; from eight events on."""
+    if np.count_nonzero(values[y_px, x_px] >= least) < 8:
+        return []
     cells = {(int(x) // cell_px, int(y) // cell_px) for x, y in zip(x_px, y_px, strict=True) if values[y, x] >= least}
     around = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
     kept = [(a, b) for a, b in cells if any((a + i, b + j) in cells for i, j in around)]
@@ -107,7 +109,7 @@ def fit_ring(
         if gate <= floor_px and np.max(np.abs(change / unit)) < 1e-3:
             break
         scatter = math.sqrt(float(np.sum(weight * error**2)) / max(float(weight.sum()), 1e-9)) / 0.91
-        gate = max(min(4.7 * scatter, 0.67 * gate), floor_px)
+        gate = max(min(4.7 * scatter, 0.5 * gate), floor_px)
     return ring
 
 

@@ -34,10 +34,11 @@ RING_RADII, RING_POINTS = 1.18, 51  # of the ring that shows which way the ball 
 
 @dataclass(frozen=True)
 class _Painted:
-    """The logo events of a shot up to one tick, in the body frame."""
+    """The logo events of a shot up to one tick, in the body frame: their mean direction, ON's and OFF's densities."""
 
-    normals: Floats
-    on: NDArray[np.bool_]
+    direction: Floats
+    on: NDArray[np.float32]
+    off: NDArray[np.float32]
 
 
 def ball_chunks(run: Run) -> list[Chunk]:
@@ -265,7 +266,8 @@ def _turned_back(run: Run, parts: list[int], start_us: int, spin_rps: Floats) ->
     normals = np.concatenate([logo.normals for logo in logos])[-EVENTS_PAINTED:]
     t_us = np.concatenate([logo.events.t_us for logo in logos])[-EVENTS_PAINTED:]
     on = np.concatenate([logo.events.on for logo in logos])[-EVENTS_PAINTED:]
-    return _Painted(turned(normals, spin_rps, (start_us - t_us) * 1e-6), on)
+    normals = turned(normals, spin_rps, (start_us - t_us) * 1e-6)
+    return _Painted(normals.sum(axis=0), density(normals[on]), density(normals[~on]))
 
 
 def _densest(run: Run, shot: int) -> Floats:
@@ -273,8 +275,7 @@ def _densest(run: Run, shot: int) -> Floats:
     parts = [i for i, tick in enumerate(run.ticks) if tick.track.shot == shot]
     start_us = run.ticks[parts[0]].packet.start_us
     painted = _turned_back(run, parts, start_us, _vector(shown_estimate(run.ticks[parts[-1]])[0]))
-    middle = painted.normals.sum(axis=0)
-    return middle if np.linalg.norm(middle) > 0 else np.array([0.0, 0.0, -1.0])
+    return painted.direction if np.linalg.norm(painted.direction) > 0 else np.array([0.0, 0.0, -1.0])
 
 
 def _full(counts: Floats) -> float:
@@ -284,7 +285,7 @@ def _full(counts: Floats) -> float:
 
 
 def _texture(painted: _Painted, sampler: Sampler) -> NDArray[np.uint8]:
-    counts = sampler(density(painted.normals))
+    counts = sampler(painted.on + painted.off)
     strength = tone(counts, _full(counts))[..., None]
     texture: NDArray[np.uint8] = (WHITE + strength * (PAINT - WHITE)).astype(np.uint8)
     return texture
@@ -307,8 +308,8 @@ class _Discs:
         """PNG with ON and OFF in their colours."""
         picture = np.where(self.mask[..., None], DISC, at.BACKGROUND).astype(np.float64)
         if painted is not None:
-            for polarity, colour in ((True, at.ON), (False, at.OFF)):
-                counts = self.sampler(density(painted.normals[painted.on == polarity]))
+            for density_of, colour in ((painted.on, at.ON), (painted.off, at.OFF)):
+                counts = self.sampler(density_of)
                 picture[self.mask] += tone(counts, _full(counts))[:, None] * (np.array(colour) - DISC)
         rgb = picture.clip(0, 255).astype(np.uint8)
         return bytes(cv2.imencode(".png", rgb[..., ::-1])[1])

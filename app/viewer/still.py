@@ -31,14 +31,19 @@ def turned(vectors: Floats, spin_rps: Floats, seconds: Floats) -> Floats:
     return turned_vectors
 
 
-def density(normals: Floats) -> Floats:
-    """How often the unit vectors (n, 3) fall in each cell of the cube, smoothed: (CELLS**3,) float64."""
+def density(normals: Floats) -> NDArray[np.float32]:
+    """How often the unit vectors (n, 3) fall in each cell of the cube, smoothed: (CELLS**3,) float32."""
     cells = (_place(normals) + 0.5).astype(np.int64)
     flat = (cells[:, 0] * CELLS + cells[:, 1]) * CELLS + cells[:, 2]
-    counts = np.bincount(flat, minlength=CELLS**3).astype(np.float64).reshape(CELLS, CELLS, CELLS)
-    for axis in range(3):  # weights 1 2 1 along each side; the outermost cells are empty, nothing wraps around
-        counts = 2 * counts + np.roll(counts, 1, axis) + np.roll(counts, -1, axis)
-    return (counts / 64).ravel()
+    counts = np.bincount(flat, minlength=CELLS**3).astype(np.float32).reshape(CELLS, CELLS, CELLS)
+    for axis in range(3):  # weights 1 2 1 along each side
+        earlier, later = np.moveaxis(counts, axis, 0)[:-1], np.moveaxis(counts, axis, 0)[1:]
+        smooth = 2 * counts
+        np.moveaxis(smooth, axis, 0)[1:] += earlier
+        np.moveaxis(smooth, axis, 0)[:-1] += later
+        counts = smooth
+    whole: NDArray[np.float32] = counts.ravel() / np.float32(64)
+    return whole
 
 
 def _place(directions: Floats) -> Floats:
@@ -60,7 +65,7 @@ class Sampler:
             self._corners.append((at[..., 0] * CELLS + at[..., 1]) * CELLS + at[..., 2])
             self._weights.append(np.prod(np.where(np.array(corner), part, 1 - part), axis=-1))
 
-    def __call__(self, smooth: Floats) -> Floats:
+    def __call__(self, smooth: NDArray[np.float32]) -> Floats:
         """(...) the density in every direction."""
         found = np.zeros(self._weights[0].shape)
         for corner, weight in zip(self._corners, self._weights, strict=True):

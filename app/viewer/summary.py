@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import io
 from functools import lru_cache
 
+import cv2
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
@@ -200,9 +200,7 @@ def _card(big: tuple[str, str, str], small: tuple[str, str, str]) -> bytes:
         draw.text((left, top), first, TEXT, font=_font(size))
         font = _font(_fitting(draw, second, SMALL_PX))
         draw.text((left + 4, top + 1.2 * size), second, FAINT, font=font)
-    file = io.BytesIO()
-    picture.save(file, "PNG")
-    return file.getvalue()
+    return bytes(cv2.imencode(".png", np.asarray(picture))[1])  # five times as fast as Pillow's
 
 
 @lru_cache

@@ -1,8 +1,8 @@
 """Spin from frames, after Tebbe 2020 in outline: find the ball, take the logo off it, match its orientations.
 
 Every frame gives the ink on the visible side of the ball. The spin is the one that turns the ink of each frame best
-onto that of the following ones: neighbours first, which leave no doubt about whole turns, then frames farther apart,
-which make it exact.
+onto that of the following ones: neighbours suggest spins, frames farther apart choose among them and make the choice
+exact.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ POINTS = 160  # of a frame that are matched
 COARSE_RPS, COARSE_BLUR = 8.0, 0.1  # grid, 7.6 degrees a frame, and the blur (of the radius) that bridges it
 MAX_RPS = 160.0  # beyond 190 rps neighbours are more than half a turn apart
 BEST_STARTS, PEAK_RPS = 20, 12.0  # peaks that are climbed, and how far apart they are at least
-GAPS = (1, 2, 4, 8)
+FARTHEST, FINALISTS = 8, 8  # frames that are compared lie so far apart at most; spins compared in all of them
 LEAST_MATCH = 0.35  # of the ink must find its like, or there is no answer
 
 
@@ -55,22 +55,21 @@ def spin_from_frames(
     seen: Sequence[Frame], camera: Camera, radius_m: float, rate_hz: float
 ) -> tuple[Floats | None, str]:
     """(3,) spin in rps, camera frame, or None, and what happened in words."""
-    inked = [one for one in _inks(seen, camera, radius_m) if one.ink.mean() >= LEAST_INK]
+    inked = _inks(seen, camera, radius_m)
     near = _pairs(inked, 1, rate_hz)
-    if len(near) < 2:
-        return None, f"the logo is seen in {len(inked)} frames, not in three in a row"
+    follow = sum(min(inked[i].ink.mean(), inked[j].ink.mean()) >= LEAST_INK for i, j in near)
+    if follow < 2:
+        return None, f"the logo is seen in two frames in a row {follow} times only"
     level = float(np.mean([one.ink.mean() for one in inked]))
     score = _Score(inked, camera, radius_m, level)
-    starts = score.coarse(near)
-    found, value = starts[0], -math.inf
-    both = near + _pairs(inked, 2, rate_hz)
-    for start in starts:
-        better = _climbed(score, start, near, 3.0)
-        if (reached := score(better, both)) > value:
-            found, value = better, reached
-    for gap in GAPS[1:]:
-        farther = near + [pair for g in GAPS if 1 < g <= gap for pair in _pairs(inked, g, rate_hz)]
-        found = _climbed(score, found, farther, 1.0 / gap)
+    climbed = [_climbed(score, start, near, 3.0) for start in score.coarse(near)]
+    climbed.sort(key=lambda spin: -score(spin, near))
+    pairs = list(near)
+    for gap in range(2, FARTHEST + 1):
+        pairs += _pairs(inked, gap, rate_hz)
+        if gap in (2, 4, FARTHEST):
+            climbed = [_climbed(score, spin, pairs, 1.0 / gap) for spin in climbed[:FINALISTS]]
+    found = max(climbed, key=lambda spin: score(spin, pairs))
     match = score(found, near)
     if match < LEAST_MATCH:
         return None, f"the logo's orientations match to {match:.2f} only"
@@ -87,7 +86,7 @@ def _pairs(inked: Sequence[Ink], gap: int, rate_hz: float) -> list[tuple[int, in
 def _climbed(score: _Score, start: Floats, pairs: list[tuple[int, int]], step_rps: float) -> Floats:
     """The best spin near a start (Nelder-Mead)."""
     corners = np.vstack([start, start + step_rps * np.eye(3)])
-    options = {"initial_simplex": corners, "xatol": 0.01, "fatol": 1e-5, "maxiter": 150}
+    options = {"initial_simplex": corners, "xatol": 0.01, "fatol": 1e-5, "maxiter": 80}
     best: Floats = minimize(lambda spin: -score(spin, pairs), start, method="Nelder-Mead", options=options).x
     return best
 

@@ -190,16 +190,17 @@ def bend_and_noise(hill: Hill, spin_rad_s: Floats, offsets_px: Floats, repeats: 
 
 
 def spread_of_estimate(hill: Hill, spin_rad_s: Floats, bend: Floats, noise: Floats) -> Floats:
-    """(3, 3) covariance of the spin, rad^2/s^2, at the top of the hill: the sandwich of curvature and noise.
+    """(3, 3) covariance of the spin, rad^2/s^2, at the top of the hill: sandwich plus the ball's place.
 
-    With A the score's curvature, M the covariance of its gradient g, P the prior's precision and w the trust, the
-    estimate moves by (w A + P)^-1 (w g + P d) when the ball is d off its assumed place, so its covariance is
-    (w A + P)^-1 (w^2 M + P) (w A + P)^-1.
+    With A the score's curvature and M the covariance of its gradient, the events' noise gives A_ww^-1 M_ww A_ww^-1
+    (w: the spin). A ball that is d off its assumed place moves the top by -A_ww^-1 A_wp d; d has the prior's
+    covariance, although offsets were refined with the spin: refining improves the spin, but the refined offsets are
+    themselves no nearer to the truth (they absorb what the model lacks), so no certainty is drawn from them.
     """
     steps = hill.steps(spin_rad_s)
-    prior = np.diag(np.concatenate([np.zeros(3), (steps[3:] / hill.prior_px) ** 2]))
-    inverse = np.linalg.inv(hill.trust * bend + prior)
-    whole = inverse @ (hill.trust**2 * noise + prior) @ inverse
+    inverse = np.linalg.inv(bend[:3, :3])
+    lever = inverse @ bend[:3, 3:] * (hill.prior_px / steps[3:])
+    whole = inverse @ noise[:3, :3] @ inverse + lever @ lever.T
     back = axes_of(spin_rad_s).T * steps[:3]
-    covariance: Floats = back @ whole[:3, :3] @ back.T
+    covariance: Floats = back @ whole @ back.T
     return covariance

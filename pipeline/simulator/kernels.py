@@ -9,17 +9,20 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
 from .kernels_light import EVERY, Bodies, Floats, Physics, light
 from .kernels_pixel import (
+    IN_BOX,
     LIGHT,
-    LISTED,
     PLAIN,
     RESTING,
     SIGNAL,
     SIGNAL_PLAIN,
+    TAIL,
     TIME,
+    Ints,
     Pixels,
     View,
     advance,
@@ -43,13 +46,7 @@ def _look(
 ) -> None:
     """Go over the pixels in the box of body k."""
     box, kind, pose, ink = bodies.box, bodies.kind, bodies.pose, bodies.ink
-    state, role, owner, listing, cursor = (
-        pixels.state,
-        pixels.role,
-        pixels.owner,
-        pixels.listing,
-        pixels.cursor,
-    )
+    state, role, owner, cursor = pixels.state, pixels.role, pixels.owner, pixels.cursor
     looked, resting, rest_body = pixels.looked, pixels.rest, pixels.rest_body
     events = (cursor, pixels.event_us, pixels.event_word)
     sensor = (view.threshold_on, view.threshold_off, view.normals)
@@ -65,16 +62,16 @@ def _look(
                 owner, background, box, kind, pose, ink, physics, row, x, y, ray_x[p], ray_y[p]
             )
             looked[p] = row
-            listed = role[p] == LISTED
-            if covered or listed:
+            at_work = role[p] == IN_BOX or role[p] == TAIL
+            if covered or at_work:
                 intensity = intensity * gain + floor
                 plain = plain * gain + floor
                 if fresh:
-                    begin(state, role, listing, cursor, sensor, physics, p, intensity, plain, now_us)
+                    begin(state, role, cursor, sensor, physics, p, intensity, plain, now_us)
                     continue
-                if not listed:
+                if not at_work:
                     before = background[p] * gain + floor
-                    begin(state, role, listing, cursor, sensor, physics, p, before, before, since_us)
+                    begin(state, role, cursor, sensor, physics, p, before, before, since_us)
                 advance(state, events, sensor, physics, p, owner[p], intensity, plain, now_us)
                 if looks > base and not settled(state, p):  # its events want their times right
                     looks = base
@@ -96,13 +93,7 @@ def _tails(
 ) -> None:
     """Go on with the pixels that bodies have left, and let go those that have come to rest."""
     box, state, width = bodies.box, pixels.state, physics.width_px
-    cursor, listing, role, owner, looked = (
-        pixels.cursor,
-        pixels.listing,
-        pixels.role,
-        pixels.owner,
-        pixels.looked,
-    )
+    cursor, listing, role, owner = pixels.cursor, pixels.listing, pixels.role, pixels.owner
     events = (cursor, pixels.event_us, pixels.event_word)
     sensor = (view.threshold_on, view.threshold_off, view.normals)
     background = view.background
@@ -111,26 +102,51 @@ def _tails(
     i = 0
     while i < cursor[0]:
         p = listing[i]
-        i += 1
-        if looked[p] == row or now_us - state[p, TIME] < pause_us:
-            continue
         y, x = p // width, p % width
-        near = False
+        new_role = TAIL
         for k in range(box.shape[1]):
             if box[row, k, 0] <= x < box[row, k, 2] and box[row, k, 1] <= y < box[row, k, 3]:
-                near = True
-        if near:
-            continue
-        if settled(state, p):  # nothing happened since its last look: a body that vanishes does so now
-            state[p, TIME] = max(state[p, TIME], before_us)
-        intensity = background[p] * gain + physics.floor
-        advance(state, events, sensor, physics, p, owner[p], intensity, intensity, now_us)
-        if physics.flicker_depth == 0.0 and settled(state, p):
-            state[p, SIGNAL], state[p, SIGNAL_PLAIN] = state[p, LIGHT], state[p, PLAIN]
-            role[p] = RESTING
-            i -= 1
+                new_role = IN_BOX
+        if new_role == TAIL and now_us - state[p, TIME] >= pause_us:
+            if settled(state, p):  # nothing happened since its last look: a body that vanishes does so now
+                state[p, TIME] = max(state[p, TIME], before_us)
+            intensity = background[p] * gain + physics.floor
+            advance(state, events, sensor, physics, p, owner[p], intensity, intensity, now_us)
+            if physics.flicker_depth == 0.0 and settled(state, p):
+                state[p, SIGNAL], state[p, SIGNAL_PLAIN] = state[p, LIGHT], state[p, PLAIN]
+                new_role = RESTING
+        if new_role == TAIL:
+            i += 1
+        else:
+            role[p] = new_role
             cursor[0] -= 1
             listing[i] = listing[cursor[0]]
+
+
+@njit(cache=True, nogil=True)
+def _leave(pixels: Pixels, box: Ints, old: int, new: int, k: int, width: int) -> None:
+    """Make tails of the pixels that were in the box of body k in row `old` and are not in row `new`."""
+    role, listing, cursor = pixels.role, pixels.listing, pixels.cursor
+    for y in range(box[old, k, 1], box[old, k, 3]):
+        row_stays = box[new, k, 1] <= y < box[new, k, 3]
+        x = box[old, k, 0]
+        while x < box[old, k, 2]:
+            if row_stays and box[new, k, 0] <= x < box[new, k, 2]:
+                x = box[new, k, 2]
+                continue
+            p = y * width + x
+            if role[p] == IN_BOX:
+                role[p] = TAIL
+                listing[cursor[0]] = p
+                cursor[0] += 1
+            x += 1
+
+
+@njit(cache=True, nogil=True)
+def leave_all(pixels: Pixels, box: Ints, width: int) -> None:
+    """Make tails of all pixels in these boxes (k, 4), into `pixels`: their bodies may come no more."""
+    for k in range(box.shape[0]):
+        _leave(pixels, np.stack((box, np.zeros_like(box))), 0, 1, k, width)
 
 
 @njit(cache=True, nogil=True)
@@ -157,6 +173,8 @@ def run(
             every = int(bodies.kind[k, EVERY])
             if start or row % every == 0 or row == time_us.size - 1:
                 _look(pixels, view, bodies, physics, row, k, time_us[max(row - every, 0)], now_us, gain, start)
+            if row > 0:
+                _leave(pixels, bodies.box, row - 1, row, k, physics.width_px)
         _tails(pixels, view, bodies, physics, row, time_us[max(row - 1, 0)], now_us, gain)
         row += 1
     return row
@@ -165,17 +183,10 @@ def run(
 @njit(cache=True, nogil=True)
 def begin_all(pixels: Pixels, view: View, physics: Physics) -> None:
     """Put every pixel of `pixels` to work on its background at time 0."""
+    sensor = (view.threshold_on, view.threshold_off, view.normals)
     for p in range(view.background.size):
         intensity = view.background[p] * physics.brightness + physics.floor
-        begin(
-            pixels.state,
-            pixels.role,
-            pixels.listing,
-            pixels.cursor,
-            (view.threshold_on, view.threshold_off, view.normals),
-            physics,
-            p,
-            intensity,
-            intensity,
-            0.0,
-        )
+        begin(pixels.state, pixels.role, pixels.cursor, sensor, physics, p, intensity, intensity, 0.0)
+        pixels.role[p] = TAIL
+        pixels.listing[p] = p
+    pixels.cursor[0] = view.background.size

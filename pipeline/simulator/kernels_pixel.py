@@ -19,7 +19,8 @@ Singles = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int32]
 
-NEW, LISTED, RESTING = 0, 1, 2  # a pixel's role; the list holds the pixels at work
+# A pixel's role: untouched so far, in the box of a body, still answering to a body that has left, at rest again.
+NEW, IN_BOX, TAIL, RESTING = 0, 1, 2, 3
 
 # Columns of a pixel's state: it lies in one or two cache lines.
 LIGHT, PLAIN = 0, 1  # log intensity at TIME
@@ -33,7 +34,7 @@ STATE_COLUMNS = 11
 
 
 class Pixels(NamedTuple):
-    """What `run` writes: the state of every pixel, the list of those at work, the events."""
+    """What `run` writes: the state of every pixel, the list of tails, the events."""
 
     state: Floats  # (n, STATE_COLUMNS)
     role: Bytes  # (n,)
@@ -41,8 +42,8 @@ class Pixels(NamedTuple):
     looked: Ints  # (n,) row of the last look
     rest: Ints  # (n,) the body below needs no look up to and including this row
     rest_body: Bytes  # (n,)
-    listing: Ints  # (n,) the pixels at work, in front
-    cursor: NDArray[np.int64]  # [pixels at work, events written, normals used]
+    listing: Ints  # (n,) the tails, in front
+    cursor: NDArray[np.int64]  # [tails, events written, normals used]
     event_us: Floats
     event_word: NDArray[np.int64]  # pixel << 16 | owner << 8 | logo << 1 | on
 
@@ -163,7 +164,6 @@ def _draw_thresholds(
 def begin(
     state: Floats,
     role: Bytes,
-    listing: Ints,
     cursor: NDArray[np.int64],
     sensor: Thresholds,
     physics: Physics,
@@ -172,7 +172,7 @@ def begin(
     plain_intensity: float,
     now_us: float,
 ) -> None:
-    """Put pixel p on the list, at rest at now_us under this light."""
+    """Put pixel p to work, at rest at now_us under this light."""
     light, plain = math.log(intensity), math.log(plain_intensity)
     rest = 0.0  # how far the signal at rest lies from the reference
     if role[p] == NEW:
@@ -186,10 +186,8 @@ def begin(
     state[p, PLAIN], state[p, SIGNAL_PLAIN], state[p, REFERENCE_PLAIN] = plain, plain, plain - rest
     state[p, TIME] = now_us
     state[p, FREE] = math.inf
-    if role[p] != LISTED:
-        role[p] = LISTED
-        listing[cursor[0]] = p
-        cursor[0] += 1
+    if role[p] != TAIL:
+        role[p] = IN_BOX
 
 
 @njit(cache=True, nogil=True)

@@ -189,6 +189,7 @@ class _Simulation:
             width_px=camera.width_px,
         )
         self.pixels = self._at_rest(count)
+        self.boxes = np.zeros((0, 4), np.int32)  # of the bodies at the end of the last segment
         self.found: list[LabelledEvents] = []
 
     def _at_rest(self, count: int) -> kernels_pixel.Pixels:
@@ -216,6 +217,8 @@ class _Simulation:
             there = [
                 body for body, spans in zip(self.bodies, visible, strict=True) if any(a <= middle < b for a, b in spans)
             ]
+            kernels.leave_all(self.pixels, self.boxes, self.camera.width_px)
+            self.boxes = np.zeros((0, 4), np.int32)
             if there or self.pixels.cursor[0] or self.scene.light.flicker_depth:
                 self._segment(there, start, stop, progress)
         if not self.found:
@@ -249,6 +252,7 @@ class _Simulation:
             self.pixels.looked[:] = -1
             self.pixels.rest[:] = -1
             packed = _packed(there, every, slower, self.camera, self.lens, time_s)
+            self.boxes = packed.box[-1].copy()
             row = 0 if fresh and first == 0 else 1
             while row <= count:
                 row = kernels.run(

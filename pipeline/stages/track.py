@@ -105,6 +105,9 @@ PLACE_STD_PX, RADIUS_STD_PX = 0.06, 0.1
 # A second ball takes the track over only when this much faster (a slower one rolls back), or while the first
 # is out of sight and when not much slower (a ball that was hit).
 RIVAL_SPEED, RIVAL_SPEED_UNSEEN = 1.5, 0.7
+# Shots come in across the border, within so many radii of it when first seen. A slow ball that turns up in the
+# middle rather rolls about: it is watched for a while, in which a real shot may come.
+COMING_IN, SLOW_M_S, WATCH_US = 5.0, 3.0, 20_000
 FREE = np.full(5, 1e9)
 
 
@@ -172,11 +175,11 @@ def _search(parameters: TrackParameters, state: TrackState, packet: Packet, surf
         reason = "no ball: no circle in the surface" if hough is None else "no ball: no circle moves like a ball"
         return _no_ball(parameters, packet, "searching", reason, hough)
     best, hough = found[0]
-    # A second look counts when it shares no events with the first.
     since_us, first = pending or (packet.end_us, best)
     apart_us = packet.end_us - since_us
     same = agree(first, best, apart_us)
-    if best.trusted or (same and apart_us >= parameters.contour_us):
+    wait_us = _wait_us(parameters, state, best)
+    if wait_us == 0 or (same and apart_us >= wait_us):
         return _begin(parameters, state, packet, best, hough, state.shots)
     state.pending = (since_us, first) if same else (packet.end_us, best)
     return _no_ball(
@@ -187,6 +190,16 @@ def _search(parameters: TrackParameters, state: TrackState, packet: Packet, surf
         hough,
         _circle(parameters, best),
     )
+
+
+def _wait_us(parameters: TrackParameters, state: TrackState, sighting: Sighting) -> int:
+    """How long such a sighting must have been there before it is a shot."""
+    camera, (x, y, _, _, radius) = state.setting.camera, sighting.ring
+    inside = min(x, y, camera.width_px - 1 - x, camera.height_px - 1 - y)
+    if sighting.speed_px_s / radius * state.setting.ball_radius_m < SLOW_M_S and inside > COMING_IN * radius:
+        return WATCH_US
+    # What is not trusted at once counts when seen again in events that it does not share with the first time.
+    return 0 if sighting.trusted else parameters.contour_us
 
 
 def _follow(

@@ -126,9 +126,9 @@ def test_the_table_for_people_names_units_and_methods(samples: Path) -> None:
     ("arguments", "says"),
     [
         (["missing.h5"], "missing.h5"),
-        (["{samples}"], "directory"),
+        (["{samples}"], "folder"),
         (["{samples}/flight_back.h5", "--set", "logo.pad_px=-1"], "0 to 100 px"),
-        (["{samples}/flight_back.h5", "--set", "logo.padding=1"], "did you mean pad_px"),
+        (["{samples}/flight_back.h5", "--set", "logo.pad=1"], "did you mean pad_px"),
         (["{samples}/flight_back.h5", "--preset", "best"], "default, paper"),
         (["{samples}/flight_back.h5", "--window", 5, 5], "START_US must be below END_US"),
         (["{samples}/flight_back.h5", "--fixed-ball", "here"], "auto"),

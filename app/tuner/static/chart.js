@@ -9,13 +9,13 @@ const BOTTOM = 17;
 const TOP = 6;
 
 // series: [{name, colour, points: [{x, y, low, high}]}]; x is a number, or the index into `categories`.
-export function chart({ title, series, present = null, logarithmic = false, categories = null, low = null, onpick = null }) {
+export function chart({ title, series, present = null, scale = "linear", categories = null, low = null, onpick = null }) {
   const all = series.flatMap(({ points }) => points).filter(({ y }) => y !== null && y !== undefined && Number.isFinite(y));
   if (!all.length) return null;
   const known = series.flatMap(({ points }) => points.map(({ x }) => x));
-  const place = placing(known, logarithmic);
+  const place = placing(known, scale);
   const values = all.flatMap(({ y, low: a, high: b }) => [y, a ?? y, b ?? y]);
-  const spread = scaleOf(low === null ? values : [...values, low]);
+  const spread = scaleOf(low === null ? usual(values) : [...usual(values), low]);
   const y = (value) => HEIGHT - BOTTOM - (HEIGHT - BOTTOM - TOP) * Math.min(Math.max((value - spread.low) / (spread.high - spread.low), -0.05), 1.05);
   const svg = drawing("svg", { class: "chart", viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": title });
   for (const tick of spread.ticks) {
@@ -57,11 +57,21 @@ function curve({ name, colour, points, band = true }, place, y, onpick) {
   return parts;
 }
 
-function placing(xs, logarithmic) {
+const SPREADS = { linear: (v) => v, logarithmic: (v) => Math.log(Math.max(v, 1e-12)), cubic: Math.cbrt };
+
+function placing(xs, scale) {
   const [first, last] = [Math.min(...xs), Math.max(...xs)];
-  const to = logarithmic && first > 0 ? Math.log : (v) => v;
+  const to = scale === "logarithmic" && first <= 0 ? SPREADS.linear : SPREADS[scale];
   const width = to(last) - to(first) || 1;
-  return (x) => LEFT + 6 + (WIDTH - LEFT - 16) * Math.min(Math.max((to(Math.max(x, logarithmic ? 1e-12 : -Infinity)) - to(first)) / width, -0.02), 1.02);
+  return (x) => LEFT + 6 + (WIDTH - LEFT - 16) * Math.min(Math.max((to(x) - to(first)) / width, -0.02), 1.02);
+}
+
+// The values without the few that are so far off that nothing else could be seen; they are drawn at the border.
+function usual(values) {
+  const sorted = [...values].sort((a, b) => a - b);
+  const at = (share) => sorted[Math.round(share * (sorted.length - 1))];
+  const reach = 4 * (at(0.75) - at(0.25)) || Infinity;
+  return sorted.filter((value) => value >= at(0.25) - reach && value <= at(0.75) + reach);
 }
 
 // Round numbers around the values, three or four of them marked.

@@ -66,8 +66,7 @@ export class Curve {
     const categories = described.kind === "choice" ? described.choices : described.kind === "switch" ? ["off", "on"] : null;
     const x = (value) => (described.kind === "choice" ? described.choices.indexOf(value) : Number(value));
     const good = points.filter(({ error }) => !error);
-    const spans = good.length > 1 && good[0].value > 0 && good[good.length - 1].value / good[0].value >= 100;
-    const common = { present: x(this.settings.get(name)), categories, logarithmic: !categories && spans, onpick: ({ value }) => this.settings.set(name, value) };
+    const common = { present: x(this.settings.get(name)), categories, scale: categories ? "linear" : described.scale, onpick: ({ value }) => this.settings.set(name, value) };
     const methods = [...new Set(good.flatMap(({ spin }) => Object.keys(spin)))];
     const series = (make) => methods.map((method) => ({
       name: method.replace("_", " "),

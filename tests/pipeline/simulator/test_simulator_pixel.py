@@ -42,18 +42,8 @@ def events_of(knots_us, light, physics=IDEAL, on=0.25, off=0.25, step_us=2.0, se
     normals = np.random.default_rng(seed).standard_normal(1024)
     sensor = (np.full(1, on, np.float32), np.full(1, off, np.float32), normals)
     first = math.exp(light[0])
-    kernels_pixel.begin(
-        state,
-        np.zeros(1, np.uint8),
-        np.zeros(1, np.int32),
-        cursor,
-        sensor,
-        physics,
-        0,
-        first,
-        first,
-        knots_us[0],
-    )
+    role = np.zeros(1, np.uint8)
+    kernels_pixel.begin(state, role, cursor, sensor, physics, 0, first, first, knots_us[0])
     for now in np.arange(knots_us[0] + step_us, knots_us[-1] + step_us / 2, step_us):
         intensity = math.exp(np.interp(now, knots_us, light))
         kernels_pixel.advance(state, events, sensor, physics, 0, 0, intensity, intensity, now)

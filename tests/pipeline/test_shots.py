@@ -1,0 +1,83 @@
+"""Shots: ticks gathered by the track's number, speed from silhouettes, honest when there is none."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline.camera import Camera, CameraParameters
+from pipeline.results import SpinEstimate, Truth
+from pipeline.shots import Shot, ShotLog
+
+CAMERA = Camera.of(CameraParameters(), 1280, 720)
+
+
+def tick(number: int, shot: int | None, x_px: float = 100.0, reason: str | None = None) -> Any:
+    """A tick with what a shot needs of it."""
+    track = SimpleNamespace(
+        shot=shot,
+        has_ball=shot is not None,
+        reason=reason,
+        t_us=5000.0 * (number + 1) - 100,
+        mean=np.array([x_px, 50.0, 1000.0, 0.0, 16.0]),
+        covariance=np.eye(5),
+        measured=None if number % 2 else object(),
+    )
+    spin = SimpleNamespace(estimates={"triplet": SpinEstimate.refused("triplet", f"tick {number}")}, best=None)
+    packet = SimpleNamespace(start_us=5000 * number, end_us=5000 * (number + 1))
+    return SimpleNamespace(packet=packet, track=track, logo=SimpleNamespace(events=[0] * number), spin=spin)
+
+
+def gathered(*ticks: Any) -> ShotLog:
+    log = ShotLog()
+    for one in ticks:
+        log.add(one)
+    log.close()
+    return log
+
+
+def test_ticks_of_one_number_are_one_shot() -> None:
+    log = gathered(tick(0, None), tick(1, 0), tick(2, 0), tick(3, None), tick(4, 1), tick(5, 1), tick(6, 2), tick(7, 2))
+    assert [(shot.start_us, shot.end_us) for shot in log.shots] == [(5000, 15000), (20000, 30000), (30000, 40000)]
+    assert [shot.logo_events for shot in log.shots] == [3, 9, 13]
+    assert log.shots[0].estimates["triplet"].reason == "tick 2", "the last tick's estimate is the whole shot's"
+    assert log.shots[1].measured.tolist() == [True, False]
+    assert log.no_shot_reason is None
+
+
+def test_a_single_tick_of_several_is_no_shot() -> None:
+    assert [shot.start_us for shot in gathered(tick(0, 0), tick(1, 1), tick(2, 1)).shots] == [5000]
+    assert "single tick" in str(gathered(tick(0, 0), tick(1, None)).no_shot_reason)
+    assert len(gathered(tick(0, 0)).shots) == 1
+
+
+def test_the_last_reason_is_told_where_there_is_no_ball() -> None:
+    assert gathered(tick(0, None, reason="dark"), tick(1, None, reason="darker")).no_shot_reason == "darker"
+    assert "no events" in str(gathered().no_shot_reason)
+
+
+def flight(velocity_m_s: tuple[float, float, float]) -> Shot:
+    """A straight flight seen through the true camera."""
+    t_us = np.arange(0, 100_000, 5000.0)
+    places = np.array([0.1, -0.2, 1.9]) + t_us[:, None] * 1e-6 * np.array(velocity_m_s)
+    x, y, radius = CAMERA.silhouette(places, 0.02)
+    state = np.stack([x, y, 0 * x, 0 * x, radius], axis=1)
+    estimate = SpinEstimate("triplet", np.array([0.0, 40.0, 0.0]), np.eye(3), None)
+    return Shot(0, 0, 100_000, t_us, state, 0 * state, t_us >= 0, 0, {"triplet": estimate}, "triplet")
+
+
+def test_velocity_is_the_flights() -> None:
+    assert flight((1.0, 6.0, -0.5)).velocity_m_s(CAMERA, 0.02) == pytest.approx([1.0, 6.0, -0.5], abs=1e-6)
+
+
+def test_errors_against_truth_keep_the_axis_signed() -> None:
+    def truth(*spin: float) -> Truth:
+        many = np.tile(spin, (2, 1))
+        return Truth(np.array([0, 10**6]), *np.zeros((3, 2)), many, many, many, np.zeros(0, np.uint8))
+
+    assert flight((0, 5, 0)).error_against(truth(0, 50, 0), "triplet") == pytest.approx((10, 0))
+    assert flight((0, 5, 0)).error_against(truth(0, -50, 0), "triplet") == pytest.approx((10, 180))
+    assert flight((0, 5, 0)).error_against(truth(50, 0, 0), "triplet") == pytest.approx((10, 90))
