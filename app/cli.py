@@ -21,28 +21,19 @@ LAYOUTS = ("all", "tracker", "logo", "spin", "coach")
 RECORDING = click.Path(path_type=Path)
 
 
-class SensorSize(click.ParamType):
+class SensorSize(click.ParamType[tuple[int, int]]):
     """WIDTHxHEIGHT in pixels."""
 
     name = "WxH"
 
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[int, int]:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
         width, _, height = str(value).lower().partition("x")
-        if not (
-            width.isdecimal()
-            and height.isdecimal()
-            and 1 <= int(width) <= 65536
-            and 1 <= int(height) <= 65536
-        ):
-            self.fail(
-                f"{value!r} is not a sensor size: write WIDTHxHEIGHT in pixels, like 1280x720", param, ctx
-            )
+        if not (width.isdecimal() and height.isdecimal() and 1 <= int(width) <= 65536 and 1 <= int(height) <= 65536):
+            self.fail(f"{value!r} is not a sensor size: write WIDTHxHEIGHT in pixels, like 1280x720", param, ctx)
         return int(width), int(height)
 
 
-class FixedBall(click.ParamType):
+class FixedBall(click.ParamType[tuple[float, float, float] | str]):
     """`auto`, or three numbers (the command line's are joined by commas before click sees them)."""
 
     name = "X_PX Y_PX RADIUS_PX | auto"
@@ -102,9 +93,7 @@ def _choices(command: Callable[..., None]) -> Callable[..., None]:
         **rest: Any,
     ) -> None:
         if window and window[0] >= window[1]:
-            raise click.UsageError(
-                f"--window {window[0]} {window[1]} is empty: START_US must be below END_US"
-            )
+            raise click.UsageError(f"--window {window[0]} {window[1]} is empty: START_US must be below END_US")
         command(choices=Choices(preset, assignments, window, fixed_ball, sensor), **rest)
 
     with_choices.__name__, with_choices.__doc__ = command.__name__, command.__doc__
@@ -146,12 +135,8 @@ def cli(context: click.Context) -> None:
 
 @cli.command()
 @click.argument("recording", type=RECORDING)
-@click.option(
-    "--sensor", type=SensorSize(), help="Size of the sensor in pixels, where the file does not say it."
-)
-@click.option(
-    "--json", "output", type=click.File("w"), help="Write JSON to this file, - for standard output."
-)
+@click.option("--sensor", type=SensorSize(), help="Size of the sensor in pixels, where the file does not say it.")
+@click.option("--json", "output", type=click.File("w"), help="Write JSON to this file, - for standard output.")
 def info(recording: Path, sensor: tuple[int, int] | None, output: IO[str] | None) -> None:
     """Say what a recording holds: format, sensor, events, duration, rates, hot pixels, triggers, damage."""
     from .info import information, print_information
@@ -213,9 +198,7 @@ def analyze(recordings: tuple[Path, ...], output: str | None, method: str, choic
     help="Write an .rrd file instead of opening the viewer.",
 )
 @click.option("--native", is_flag=True, help="Open Rerun's own window instead of the browser.")
-@click.option(
-    "--layout", type=click.Choice(LAYOUTS), default="all", show_default=True, help="Which tab is in front."
-)
+@click.option("--layout", type=click.Choice(LAYOUTS), default="all", show_default=True, help="Which tab is in front.")
 @_choices
 def view(recording: Path, save: Path | None, native: bool, layout: str, choices: Choices) -> None:
     """Show every stage of a recording in the viewer."""
@@ -225,9 +208,7 @@ def view(recording: Path, save: Path | None, native: bool, layout: str, choices:
 @cli.command()
 @click.argument("source", type=RECORDING)
 @click.argument("target", type=RECORDING)
-@click.option(
-    "--sensor", type=SensorSize(), help="Size of the sensor in pixels, where the file does not say it."
-)
+@click.option("--sensor", type=SensorSize(), help="Size of the sensor in pixels, where the file does not say it.")
 def convert(source: Path, target: Path, sensor: tuple[int, int] | None) -> None:
     """Write a recording in another format, chosen by the suffix of TARGET (.h5, .npz, .raw)."""
     from pipeline.recordings import convert as converted
@@ -300,7 +281,8 @@ def simulate(
     for warning in written.warnings:
         note(f"warning: {warning}")
     note(
-        f"wrote {written.path}: {written.events:,} events, {written.logo_events:,} of the logo, in {written.duration_us / 1000:.1f} ms"
+        f"wrote {written.path}: {written.events:,} events, {written.logo_events:,} of the logo, "
+        f"in {written.duration_us / 1000:.1f} ms"
     )
 
 
@@ -316,13 +298,9 @@ def _view(recording: Path, save: Path | None, native: bool, layout: str, choices
         if save:
             viewer.save(session, ticks, log.shots, save, layout=layout, no_shot_reason=log.no_shot_reason)
     if save:
-        note(
-            f"saved {save} ({save.stat().st_size / 1e6:.1f} MB): `uv run rerun {save}` opens it"
-        )
+        note(f"saved {save} ({save.stat().st_size / 1e6:.1f} MB): `uv run rerun {save}` opens it")
     else:
-        viewer.show(
-            session, ticks, log.shots, layout=layout, native=native, no_shot_reason=log.no_shot_reason
-        )
+        viewer.show(session, ticks, log.shots, layout=layout, native=native, no_shot_reason=log.no_shot_reason)
 
 
 def _join_fixed_ball(arguments: list[str]) -> list[str]:

@@ -56,7 +56,7 @@ def announce_compilation() -> None:
     """Say once, in one line, when kernels are being compiled rather than loaded from the cache."""
     from numba.core import event
 
-    class Announce(event.Listener):  # type: ignore[misc]  # numba has no types
+    class Announce(event.Listener):
         said = False
 
         def on_start(self, _: object) -> None:
@@ -69,7 +69,7 @@ def announce_compilation() -> None:
         def on_end(self, _: object) -> None:
             pass
 
-    event.register("numba:compile", Announce())
+    event.register("numba:compile", Announce())  # type: ignore[no-untyped-call]
 
 
 def print_reports(reports: list[dict[str, Any]]) -> None:

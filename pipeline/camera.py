@@ -123,12 +123,14 @@ class Camera:
         ray = self.rays(x_px, y_px)
         offset = np.hypot(ray[:, 0], ray[:, 1])
         size = np.atleast_1d(np.asarray(radius_px, np.float64)) / self.focal_px
-        tan_theta, sin2_alpha = offset.copy(), size**2
-        for _ in range(12):
+        tan_theta, sin2_alpha = offset, size**2
+        for _ in range(30):
             cos2_theta = 1 / (1 + tan_theta**2)
             q = np.maximum(cos2_theta - sin2_alpha, 1e-6)
-            sin2_alpha = np.minimum(size**2 * q**1.5 / np.sqrt(1 - sin2_alpha), 0.9)
+            before, sin2_alpha = sin2_alpha, np.minimum(size**2 * q * np.sqrt(q / (1 - sin2_alpha)), 0.9)
             tan_theta = offset * (1 - sin2_alpha / cos2_theta)
+            if np.all(np.abs(sin2_alpha - before) <= 1e-14 * sin2_alpha):
+                break
         distance = ball_radius_m / np.sqrt(sin2_alpha)
         shrink = np.divide(tan_theta, offset, out=np.ones_like(offset), where=offset > 0)
         ray[:, :2] *= shrink[:, None]

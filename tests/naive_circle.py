@@ -37,7 +37,7 @@ def peak(votes: NDArray[np.uint16], radius0_px: int) -> tuple[float, int, int, i
 def bright_pixels(image: NDArray[np.uint8], least: int, most_pixels: int) -> tuple[Ints, Ints]:
     """All pixels in reading order, every so many-th of them."""
     rows, columns = np.nonzero(image >= least)
-    stride = max(1, math.ceil(rows.size / most_pixels))
+    stride = max(1, math.ceil(rows.size / most_pixels)) | 1
     return columns[::stride], rows[::stride]
 
 
@@ -72,7 +72,7 @@ def near_outline(
     if ahead_only:
         near &= dx * ring[2] + dy * ring[3] >= 0
     chosen = np.flatnonzero(near)
-    return chosen[:: max(1, math.ceil(chosen.size / most_events))]
+    return chosen[:: max(1, math.ceil(chosen.size / most_events)) | 1]
 
 
 def fit_ring(

@@ -120,7 +120,7 @@ def _page_routes(app: FastAPI, workshop: Workshop, version: str, page_of: PageOf
         return Response(found, media_type="application/octet-stream", headers={"cache-control": "no-store"})
 
     @app.get("/api/pages/{page_id}/layout")
-    async def layout(page_id: str, tab: str = "all") -> Response:
+    async def layout(page_id: str, tab: str = "") -> Response:
         page = page_of(page_id)
         if page.finished is None:
             raise HTTPException(409, "nothing has been computed yet")

@@ -39,6 +39,13 @@ def save(
     write_rrd(Run.of(session, ticks, shots, no_shot_reason), path, layout)
 
 
+def require_display() -> None:
+    """Raise SpinscopeError where Rerun's own window cannot open: to be asked before the work is done."""
+    from .native import require_display as require
+
+    require()
+
+
 def show(
     session: Session,
     ticks: Sequence[Tick],

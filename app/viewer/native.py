@@ -26,11 +26,8 @@ def show_native(run: Run, layout: str, *, window: tuple[str, ...] = ()) -> None:
     window : more arguments for Rerun's program
     Raises SpinscopeError where no window can open.
     """
-    if sys.platform.startswith("linux") and not window and not _has_display():
-        raise SpinscopeError(
-            "there is no display for Rerun's window: leave out --native to get an address for the browser, "
-            "or use --save FILE.rrd"
-        )
+    if not window:
+        require_display()
     with tempfile.TemporaryDirectory(prefix="spinscope-") as folder:
         path = Path(folder) / "recording.rrd"
         write_rrd(run, path, layout)
@@ -69,5 +66,11 @@ def _place_playhead(run: Run, port: int, process: subprocess.Popen[bytes]) -> No
         time.sleep(0.2)
 
 
-def _has_display() -> bool:
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+def require_display() -> None:
+    """Raise SpinscopeError where no window can open."""
+    linux = sys.platform.startswith("linux")
+    if linux and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise SpinscopeError(
+            "there is no display for Rerun's window: leave out --native to get an address for the browser, "
+            "or use --save FILE.rrd"
+        )

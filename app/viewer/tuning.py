@@ -79,7 +79,8 @@ class Drawings:
 
 def compared(a: Sequence[Chunk]) -> list[Chunk]:
     """The chunks of run A beside those of run B: under the prefix /A, paler, and named "A: ..." in plots."""
-    moved = [chunk.with_entity_path(A + chunk.entity_path) for chunk in a]
+    own = [chunk for chunk in a if not (chunk.entity_path.startswith(at.PLOT) and "truth" in chunk.entity_path)]
+    moved = [chunk.with_entity_path(A + chunk.entity_path) for chunk in own]
     return [
         *moved,
         *(_pale(chunk) for chunk in moved if chunk.is_static and chunk.entity_path.startswith(f"{A}/plots")),
@@ -107,14 +108,16 @@ def rrd_bytes(chunks: Sequence[Chunk], recording_id: str) -> bytes:
         return path.read_bytes()
 
 
-def layout_bytes(run: Run, layout: str = "all") -> bytes:
-    """The blueprint of the page's viewer: the tabs of every viewer, and one for A beside B."""
-    made = blueprint(run, layout)
+def layout_bytes(run: Run, tab: str) -> bytes:
+    """The blueprint of the page's viewer: the tabs of every viewer, and one for A beside B.
+
+    tab : the name of the one in front; the first one when there is none of that name
+    """
+    made = blueprint(run, "all")
     tabs = list(made.root_container.contents)
     tabs.insert(len(tabs) - 1, _compare(run))
     made.root_container.contents = tabs
-    if layout == "coach":
-        made.root_container.active_tab = len(tabs) - 1
+    made.root_container.active_tab = tab_names().index(tab) if tab in tab_names() else 0
     with TemporaryDirectory() as folder:
         path = Path(folder) / "page.rbl"
         made.save(at.APPLICATION, path)

@@ -34,7 +34,7 @@ def measure(bench: Bench, velocity: int, spin: int, side: bool, seed: int) -> li
     scene = thrown(velocity, spin, side=side, seed=seed)
     rival = FrameCamera()
     found, reason = spin_from_frames(
-        list(frames(scene, rival, seed)), rival.camera, scene.balls[0].radius_m, rival.rate_hz
+        list(frames(scene, rival, seed)), rival.camera, scene.balls[0].radius_m, rival.rate_hz, scene.balls[0].logo
     )
     row = thrower.about_flight(recording, velocity, spin, side, seed)
     row |= {"method": FRAME, "magnitude_error_rps": None, "axis_error_deg": None, "reason": reason}

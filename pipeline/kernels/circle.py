@@ -68,7 +68,7 @@ def bright_pixels(
         for x in range(image.shape[1]):
             if image[y, x] >= least:
                 count += 1
-    stride = max(1, -(-count // max(most_pixels, 1)))
+    stride = max(1, -(-count // max(most_pixels, 1))) | 1  # odd: even ones would pick out whole columns
     xs = np.empty(-(-count // stride), np.int64)
     ys = np.empty(xs.size, np.int64)
     seen = 0

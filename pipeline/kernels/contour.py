@@ -28,7 +28,7 @@ def near_outline(
     most_events: int,
     ahead_only: bool,
 ) -> NDArray[np.int64]:
-    """(m,) int64 indices of events within gate_px of the moving outline, thinned evenly to about most_events.
+    """(m,) int64 indices of events within gate_px of the moving outline, thinned evenly to most_events.
 
     With ahead_only, only those on the half of the outline that moves outwards.
     """
@@ -44,7 +44,7 @@ def near_outline(
         if inner <= square <= outer and not (ahead_only and dx * ring[2] + dy * ring[3] < 0.0):
             near[m] = i
             m += 1
-    stride = max(1, -(-m // max(most_events, 1)))
+    stride = max(1, -(-m // max(most_events, 1))) | 1  # odd: symmetric motion brings events in pairs
     return near[:m:stride].copy()
 
 

@@ -107,7 +107,7 @@ PLACE_STD_PX, RADIUS_STD_PX = 0.06, 0.1
 RIVAL_SPEED, RIVAL_SPEED_UNSEEN = 1.5, 0.7
 # Shots come in across the border, within so many radii of it when first seen. A slow ball that turns up in the
 # middle rather rolls about: it is watched for a while, in which a real shot may come.
-COMING_IN, SLOW_M_S, WATCH_US = 5.0, 3.0, 20_000
+COMING_IN, SLOW_M_S, WATCH_US = 5.0, 3.5, 20_000
 FREE = np.full(5, 1e9)
 
 

@@ -110,13 +110,17 @@ class Sighting:
 
     @property
     def trusted(self) -> bool:
-        """Whether this outline alone is enough to start a track: both halves, each of its own polarity."""
+        """Whether this outline alone is enough to start a track.
+
+        Both halves, each of its own polarity, hardly anything around them, and a speed known to a tenth.
+        """
         return (
             self.ahead >= 0.8
             and self.behind >= 0.6
             and abs(self.contrast) >= 0.8
             and self.visible >= 0.6
             and self.clutter <= 0.3
+            and self.covariance[2, 2] + self.covariance[3, 3] <= (0.1 * self.speed_px_s) ** 2
         )
 
     @property
@@ -215,7 +219,7 @@ def sight(events: EventBatch, end_us: int, camera: Camera, circle: Circle, limit
     recent = events.between(end_us - VOTE_US, end_us)
     reach = 1.3 * radius + fastest * VOTE_US * 1e-6
     chosen = np.flatnonzero((np.abs(recent.x_px - circle.x_px) <= reach) & (np.abs(recent.y_px - circle.y_px) <= reach))
-    chosen = chosen[:: max(1, chosen.size // MOST_VOTERS)]
+    chosen = chosen[:: max(1, chosen.size // MOST_VOTERS) | 1]
     if chosen.size < 12:
         return None
     columns = _columns(recent, chosen, end_us)

@@ -78,6 +78,11 @@ export class Biases extends EventTarget {
     return this.#again();
   }
 
+  // The server was started anew and knows the recording as it is on disk.
+  restore() {
+    if (JSON.stringify(this.values) !== JSON.stringify(this.state.values)) this.#again();
+  }
+
   #put(name, value) {
     this.values[name] = value;
     this.#refresh();

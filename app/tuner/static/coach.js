@@ -4,6 +4,7 @@ import { byId, element } from "./elements.js";
 
 export class Coach {
   #before = null;
+  #playhead = null;
 
   constructor({ viewer }) {
     this.viewer = viewer;
@@ -24,6 +25,7 @@ export class Coach {
     document.body.classList.add("coach");
     this.end.hidden = false;
     await byId("middle").requestFullscreen?.().catch(() => {});
+    this.#playhead = await this.viewer.playhead_us();
     this.#before = await this.viewer.alone("Coach");
     await this.viewer.play("playing");
   }
@@ -34,6 +36,6 @@ export class Coach {
     this.end.hidden = true;
     if (document.fullscreenElement) await document.exitFullscreen().catch(() => {});
     await this.viewer.together(this.#before);
-    await this.viewer.play("paused");
+    if (this.#playhead !== null) await this.viewer.seek(this.#playhead);
   }
 }

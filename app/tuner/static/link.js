@@ -1,6 +1,6 @@
-// The page's address: recording, what differs from how it was opened, clip, playhead.
+// The page's address: recording, what differs from how it was opened, biases, clip, playhead and tab.
 
-export async function linkOf({ connection, settings, viewer, opening }) {
+export async function linkOf({ connection, settings, viewer, opening, biases }, withTab = false) {
   const words = new URLSearchParams();
   words.set("recording", connection.recording);
   for (const text of assignments(settings.parameters, opening.presets.opened)) words.append("set", text);
@@ -11,6 +11,9 @@ export async function linkOf({ connection, settings, viewer, opening }) {
   if (String(settings.clip) !== String(opening.recording.clip_us)) words.set("clip", settings.clip.join("-"));
   const time = await viewer.playhead_us();
   if (time !== null) words.set("t", Math.round(time));
+  const changed = Object.entries(biases.values).filter(([name, value]) => value !== opening.biases.values[name]);
+  for (const [name, value] of changed) words.append("bias", `${name}:${value}`);
+  if (withTab) words.set("tab", await viewer.tab());
   return `#${words}`;
 }
 
@@ -22,6 +25,7 @@ export function wantedByLink() {
     clip: clip && [Number(clip[1]), Number(clip[2])],
     time: Number(words.get("t")) || null,
     tab: words.get("tab"),
+    biases: Object.fromEntries(words.getAll("bias").map((text) => text.split(":")).map(([name, value]) => [name, Number(value)])),
     parameters: (opened) => applied(opened, words.getAll("set")),
     pinnedBy: (opened) => (words.get("pinned") ? applied(opened, words.getAll("a")) : null),
   };

@@ -57,6 +57,7 @@ async function start() {
   app.runner = new Runner(connection, settings, () => viewer.playhead_us());
   listen(link);
   await viewer.start(opening.viewer, byId("viewer"));
+  if (Object.keys(link.biases).length) app.biases.take(link.biases);
   app.runner.want(true);
 }
 
@@ -104,7 +105,7 @@ function listen(link) {
     try {
       const picture = await bytes(connection.path(`pictures/${detail.recording}`));
       if (latest !== detail.recording) return;
-      if (first) await viewer.layout(await bytes(connection.path(`layout?tab=${link.tab ?? "all"}`)));
+      if (first) await viewer.layout(await bytes(connection.path(`layout?tab=${encodeURIComponent(link.tab ?? "")}`)));
       await viewer.show(picture, detail.recording, (first && link.time) || detail.first_sight_us);
       first = false;
       document.body.dataset.shown = detail.serial;
@@ -126,6 +127,7 @@ function listen(link) {
   connection.addEventListener("back", () => {
     document.body.classList.remove("lost");
     notice("The server is back.", "info", 3);
+    app.biases.restore();
     app.runner.want(true);
   });
   byId("undo").onclick = () => settings.undo();

@@ -42,7 +42,7 @@ export class Saving {
   }
 
   async #copyLink() {
-    await copied(new URL(await linkOf(this.app), location.href).toString(), "The link");
+    await copied(new URL(await linkOf(this.app, true), location.href).toString(), "The link");
   }
 
   async #copyCommand() {

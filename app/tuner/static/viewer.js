@@ -109,31 +109,29 @@ export class Viewer extends EventTarget {
     return this.#next(() => this.#viewer.set_time({ play_state }));
   }
 
-  // The tab of this name without the others and without the time line; returns what `together` needs to undo it.
+  // The tab of this name without the others and without the time line; returns what `together` takes to undo it.
   alone(name) {
     return this.#next(async () => {
       const where = await this.where();
       const { blueprint } = await this.#viewer.get_blueprint();
-      const viewport = blueprint["/viewport"].ViewportBlueprint;
-      const all = viewport.root_container;
       const tab = tabs(blueprint).find(({ title }) => title === name);
       if (!where || !tab) return null;
-      viewport.root_container = tab.id;
-      await this.#viewer.set_blueprint(blueprint, { kind: "recording", recording: where.store });
+      await this.#take(only(blueprint, tab.id), where);
       this.#viewer.override_panel_state("time", "hidden");
-      return all;
+      return blueprint;
     });
   }
 
-  together(root) {
+  together(blueprint) {
     return this.#next(async () => {
       this.#viewer.override_panel_state("time", null);
       const where = await this.where();
-      if (!root || !where) return;
-      const { blueprint } = await this.#viewer.get_blueprint();
-      blueprint["/viewport"].ViewportBlueprint.root_container = root;
-      await this.#viewer.set_blueprint(blueprint, { kind: "recording", recording: where.store });
+      if (blueprint && where) await this.#take(blueprint, where);
     });
+  }
+
+  #take(blueprint, { store }) {
+    return this.#viewer.set_blueprint(blueprint, { kind: "recording", recording: store });
   }
 
   // The name of the tab in front, and bringing another one there.
@@ -149,7 +147,7 @@ export class Viewer extends EventTarget {
       const found = tabs(blueprint).find(({ title }) => title === name);
       if (!where || !found) return;
       rootOf(blueprint).active_tab = `container/${found.id}`;
-      await this.#viewer.set_blueprint(blueprint, { kind: "recording", recording: where.store });
+      await this.#take(blueprint, where);
     });
   }
 
@@ -206,6 +204,20 @@ function tabs(blueprint) {
     const title = blueprint[`/container/${id}`]?.ContainerBlueprint.display_name;
     return { id, title, front: root.active_tab === path };
   });
+}
+
+// The layout with one container for its root: panels, and what can be reached from there.
+function only(blueprint, root) {
+  const kept = {};
+  for (const [path, content] of Object.entries(blueprint)) if (!/^\/(container|view)\//.test(path)) kept[path] = content;
+  const keep = (path) => {
+    for (const [name, content] of Object.entries(blueprint)) if (name === path || name.startsWith(`${path}/`)) kept[name] = content;
+    for (const inner of blueprint[path]?.ContainerBlueprint?.contents ?? []) keep(`/${inner}`);
+  };
+  keep(`/container/${root}`);
+  kept["/viewport"] = structuredClone(blueprint["/viewport"]);
+  kept["/viewport"].ViewportBlueprint.root_container = root;
+  return kept;
 }
 
 function hasContent(canvas) {

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.simulator import kernels_pixel
+from pipeline.simulator import Light, kernels_pixel
 from pipeline.simulator.kernels_light import Physics
 from tests.naive_simulator import naive_pixel
 
@@ -23,8 +23,8 @@ IDEAL = Physics(
     up_x=0.0,
     up_y=0.0,
     up_z=-1.0,
-    sky=0.7,
-    bounce=0.12,
+    sky=Light().sky,
+    bounce=Light().bounce,
     brightness=1.0,
     floor=0.0,
     flicker_depth=0.0,

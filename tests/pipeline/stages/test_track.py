@@ -192,7 +192,7 @@ def test_ideal_balls_of_any_size_bright_or_dark(bright: bool, radius_px: float) 
     ideal = TrackParameters(latency_us=0.0, lag_px=0.0, outline_px=0.0)
     for speed_m_s in (2.0, 8.0, 20.0):
         speed_px_s = speed_m_s * radius_px / 0.02
-        ring = np.array([620.3, 360.4, 0.8 * speed_px_s, -0.6 * speed_px_s, radius_px])
+        ring = np.array([1.5 * radius_px, 360.4, 0.8 * speed_px_s, -0.6 * speed_px_s, radius_px])
         rows = inputs(disc_events(ring, 0, 15_000, bright=bright), surface_mode="off")
         results = run(rows, ideal, place)
         for result in results[1:]:
@@ -200,6 +200,16 @@ def test_ideal_balls_of_any_size_bright_or_dark(bright: bool, radius_px: float) 
             expected = ring + np.array([ring[2], ring[3], 0, 0, 0]) * result.t_us * 1e-6
             assert np.hypot(*(result.mean - expected)[:2]) < 0.15
             assert abs(result.mean[4] - radius_px) < 0.15
+
+
+def test_a_slow_ball_in_the_middle_is_watched_before_it_is_a_shot() -> None:
+    """Across the border it is one at once (the test above); here a fast one would be."""
+    place = setting(focal_length_mm=500.0)
+    for speed_m_s, ticks in ((2.0, 4), (4.0, 0)):
+        speed_px_s = speed_m_s * 18.0 / 0.02
+        events = disc_events(np.array([600.0, 350.0, speed_px_s, 0.0, 18.0]), 0, 40_000)
+        statuses = [result.status for result in run(inputs(events, surface_mode="off"), place=place)]
+        assert statuses == ["starting"] * ticks + ["tracking"] * (8 - ticks)
 
 
 def test_calibration_finds_the_defaults_again() -> None:

@@ -1,0 +1,93 @@
+"""The tracking part of the chain, filter to logo: events a second, and the slowest of the 5 ms packets.
+
+The dense stream is one real flight with more events of a moving table edge's kind laid over it: `DENSITY_MEV_S` in all.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from pytest_benchmark.fixture import BenchmarkFixture
+
+from pipeline.chain import STAGES, Chain, EventSource, Parameters
+from pipeline.events import EventBatch
+from pipeline.results import Packet
+
+SAMPLES = Path(__file__).parents[2] / "sample_recordings"
+TRACKING = ("filter", "surface", "track", "logo")
+DENSITY_MEV_S = 5.0
+
+
+def flight(name: str) -> EventBatch:
+    """The events of a sample."""
+    with h5py.File(SAMPLES / f"{name}.h5") as file:
+        t, x, y, p = (file[f"events/{key}"][:] for key in "txyp")
+    return EventBatch.checked(t, x, y, p == 1, width_px=1280, height_px=720)
+
+
+def dense() -> EventBatch:
+    """The default flight, and in the left third of the image a vertical edge that sweeps to and fro."""
+    ball = flight("flight_fast_top")
+    duration_us = int(ball.t_us[-1]) + 1
+    count = int(DENSITY_MEV_S * duration_us) - len(ball)
+    rng = np.random.default_rng(5)
+    t = np.sort(rng.integers(0, duration_us, count))
+    sweep = 150 + 100 * np.sin(2 * np.pi * t / 100_000)
+    x = np.clip(np.round(sweep + rng.normal(0, 0.7, count)), 0, 400)
+    y = rng.integers(0, 720, count)
+    on = np.cos(2 * np.pi * t / 100_000) > 0
+    order = np.argsort(np.concatenate([ball.t_us, t]), kind="stable")
+    return EventBatch.checked(
+        np.concatenate([ball.t_us, t])[order],
+        np.concatenate([ball.x_px, x])[order],
+        np.concatenate([ball.y_px, y])[order],
+        np.concatenate([ball.on, on])[order],
+        width_px=1280,
+        height_px=720,
+    )
+
+
+def packets(events: EventBatch, tick_us: int = 5000) -> list[Packet]:
+    """The stream cut on the grid of ticks."""
+    count = int(events.t_us[-1]) // tick_us + 1
+    return [
+        Packet(n, n * tick_us, (n + 1) * tick_us, events.between(n * tick_us, (n + 1) * tick_us)) for n in range(count)
+    ]
+
+
+def track(events: EventBatch, parts: list[Packet]) -> list[float]:
+    """Thread seconds of each packet from filter to logo."""
+    parameters = Parameters()
+    source = EventSource("bench", events, 1280, 720, 0, parts[-1].end_us)
+    setting = Chain(source).setting(parameters)
+    states = {name: STAGES[name].start(parameters.group(name), setting) for name in TRACKING}
+    seconds = []
+    for packet in parts:
+        begin = time.thread_time()
+        results = {"packet": packet}
+        for name in TRACKING:
+            inputs = [results[other] for other in STAGES[name].INPUTS]
+            results[name] = STAGES[name].step(parameters.group(name), states[name], *inputs)
+        seconds.append(time.thread_time() - begin)
+    return seconds
+
+
+@pytest.mark.parametrize("kind", ["flight", "dense"])
+def test_filter_to_logo(benchmark: BenchmarkFixture, kind: str) -> None:
+    events = flight("flight_fast_top") if kind == "flight" else dense()
+    parts = packets(events)
+    track(events, parts)  # compile and warm up
+    runs = benchmark.pedantic(lambda: track(events, parts), rounds=10, iterations=1)
+    all_runs = np.array([track(events, parts) for _ in range(10)] + [runs])
+    per_run = np.median(all_runs.sum(axis=1))
+    benchmark.extra_info |= {
+        "Mev_s": round(len(events) / per_run / 1e6, 1),
+        "share_of_duration": round(per_run / (parts[-1].end_us * 1e-6), 3),
+        "packet_p50_ms": round(float(np.percentile(all_runs, 50)) * 1e3, 2),
+        "packet_p99_ms": round(float(np.percentile(all_runs, 99)) * 1e3, 2),
+    }
+    print(f"\n{kind}: {len(events):,} events, {benchmark.extra_info}")
