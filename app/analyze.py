@@ -28,9 +28,7 @@ def analyze(path: Path, choices: Choices, method: str, on_progress: Progress | N
     return made
 
 
-def report(
-    session: Session, shots: Sequence[Shot], no_shot_reason: str | None, method: str = "all"
-) -> dict[str, Any]:
+def report(session: Session, shots: Sequence[Shot], no_shot_reason: str | None, method: str = "all") -> dict[str, Any]:
     """The report on the shots found in a session; its total is what reading and the stages took."""
     seconds = session.chain.seconds
     return {

@@ -16,9 +16,7 @@ SHOWN = 60  # characters of an attribute; a simulation's scene is a page long
 
 def information(path: Path, sensor_px: tuple[int, int] | None, on_progress: Progress) -> RecordingInfo:
     """One pass over the recording; raises RecordingError."""
-    recording = open_recording(
-        path, sensor=sensor_px, on_progress=lambda share: on_progress(share, "reading")
-    )
+    recording = open_recording(path, sensor=sensor_px, on_progress=lambda share: on_progress(share, "reading"))
     return summary(recording, on_progress=lambda share: on_progress(share, "reading"))
 
 

@@ -161,9 +161,7 @@ class Session:
         if fixed_ball == "auto":
             track = self.parameters.track
             setting = self.chain.setting(self.parameters)
-            circle, std_px = find_fixed_ball(
-                self.source.events, setting, track.radius_min_px, track.radius_max_px
-            )
+            circle, std_px = find_fixed_ball(self.source.events, setting, track.radius_min_px, track.radius_max_px)
             values |= {
                 "fixed_x_px": circle.x_px,
                 "fixed_y_px": circle.y_px,
@@ -192,9 +190,7 @@ def preset(name: str | Path) -> Parameters:
         values = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         known = ", ".join(sorted(file.stem for file in PRESETS.glob("*.toml")))
-        raise ParameterError(
-            f"there is no preset {str(name)!r}: use {known} or the path of a .toml file"
-        ) from None
+        raise ParameterError(f"there is no preset {str(name)!r}: use {known} or the path of a .toml file") from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise ParameterError(f"the preset cannot be read ({error}): {path}") from None
     return Parameters().with_values(values)

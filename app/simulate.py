@@ -44,9 +44,7 @@ class SimulateParameters(ParameterGroup):
         None, 1.0, 600_000.0, 10.0, "ms", "none = spinner 100, rally 20000, flight until the ball is gone"
     )
     ball: float | None = tunable(None, 1, 7, 1, "", "how the logo sits; none = 1 (flight: any way)")
-    heading_deg: float | None = tunable(
-        None, -360.0, 360.0, 5.0, "deg", "0 = to the right, 90 = down; none = along"
-    )
+    heading_deg: float | None = tunable(None, -360.0, 360.0, 5.0, "deg", "0 = to the right, 90 = down; none = along")
     spin_decay_hz: float = tunable(0.0, 0.0, 10.0, 0.1, "Hz", "the spin falls as exp(-spin_decay_hz t)")
     shots: int = tunable(8, 1, 1000, 1, "", "shots of a rally")
     second_ball: bool = switch(False, "another ball crosses")
@@ -66,8 +64,7 @@ ALWAYS = {"seed", "background", "texture", "light_lux", "flicker_depth", "flicke
 ALWAYS |= {"width_px", "height_px", "focal_length_mm", "duration_ms", "magnitude_rps"}
 USED = {
     "spinner": ALWAYS | {"spin", "ball"},
-    "flight": ALWAYS
-    | {"spin", "ball", "speed_m_s", "heading_deg", "spin_decay_hz", "second_ball", "arm", "bounce"},
+    "flight": ALWAYS | {"spin", "ball", "speed_m_s", "heading_deg", "spin_decay_hz", "second_ball", "arm", "bounce"},
     "rally": ALWAYS | {"speed_m_s", "shots", "arm"},
 }
 
@@ -146,9 +143,7 @@ def simulate_again_to_file(
     return _write(made, out, biases)
 
 
-def _scene(
-    kind: str, chosen: SimulateParameters, spin_rps: Sequence[float] | None, logo: str, camera: Camera
-) -> Scene:
+def _scene(kind: str, chosen: SimulateParameters, spin_rps: Sequence[float] | None, logo: str, camera: Camera) -> Scene:
     """The scene of these choices."""
     plain = {"auto": kind == "spinner", "plain": True, "table": False}[str(chosen.background)]
     values: dict[str, Any] = {

@@ -62,9 +62,7 @@ def announce_compilation() -> None:
         def on_start(self, _: object) -> None:
             if not Announce.said:
                 Announce.said = True
-                note(
-                    "compiling the kernels, once on this machine: half a minute or so, cached afterwards ..."
-                )
+                note("compiling the kernels, once on this machine: half a minute or so, cached afterwards ...")
 
         def on_end(self, _: object) -> None:
             pass

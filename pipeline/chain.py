@@ -160,9 +160,7 @@ class Chain:
             parameters.spin.max_spin_rps,
         )
 
-    def run(
-        self, parameters: Parameters, *, ticks: int | None = None, forget: Collection[str] = ()
-    ) -> Iterator[Tick]:
+    def run(self, parameters: Parameters, *, ticks: int | None = None, forget: Collection[str] = ()) -> Iterator[Tick]:
         """Yield the first `ticks` ticks (all there are so far by default), computing only what is not yet known.
 
         Stop iterating to abandon the run: everything computed so far stays. Results of stages named in `forget`

@@ -35,9 +35,7 @@ class EventBatch:
     @classmethod
     def empty(cls) -> EventBatch:
         """A batch without events."""
-        return cls(
-            np.empty(0, np.int64), np.empty(0, np.uint16), np.empty(0, np.uint16), np.empty(0, np.bool_)
-        )
+        return cls(np.empty(0, np.int64), np.empty(0, np.uint16), np.empty(0, np.uint16), np.empty(0, np.bool_))
 
     @classmethod
     def checked(

@@ -152,8 +152,7 @@ class ParameterGroup:
     def as_dict(self) -> dict[str, Any]:
         """Field names and values, ready for JSON or TOML (tuples as lists)."""
         return {
-            name: list(value) if isinstance(value := getattr(self, name), tuple) else value
-            for name in self.tunables()
+            name: list(value) if isinstance(value := getattr(self, name), tuple) else value for name in self.tunables()
         }
 
 
@@ -163,9 +162,8 @@ class ParameterSet:
 
     def group(self, name: str) -> ParameterGroup:
         """One group by name; raises ParameterError when there is none."""
-        names = [field.name for field in dataclasses.fields(self)]
-        if name not in names:
-            raise ParameterError(f"there is no stage {name!r}{_did_you_mean(name, names)}")
+        if name not in self.__dataclass_fields__:
+            raise ParameterError(f"there is no stage {name!r}{_did_you_mean(name, self.__dataclass_fields__)}")
         group: ParameterGroup = getattr(self, name)
         return group
 
@@ -175,9 +173,7 @@ class ParameterSet:
         for name, fields in values.items():
             group = self.group(name)
             if not isinstance(fields, Mapping):
-                raise ParameterError(
-                    f"{name} = {fields!r} is not a table of fields: write {name}.field = value"
-                )
+                raise ParameterError(f"{name} = {fields!r} is not a table of fields: write {name}.field = value")
             changed[name] = group.with_values(fields)
         return dataclasses.replace(self, **changed)
 

@@ -66,9 +66,7 @@ class Shot:
         spin = np.array([np.interp(middle, truth.t_us, truth.spin_rps[:, axis]) for axis in range(3)])
         magnitude = float(np.linalg.norm(spin))
         cosine = float(np.clip(estimate.axis @ spin / magnitude, -1, 1)) if magnitude > 0 else 1.0
-        return abs(float(np.linalg.norm(estimate.vector_rps)) - magnitude), float(
-            np.degrees(np.arccos(cosine))
-        )
+        return abs(float(np.linalg.norm(estimate.vector_rps)) - magnitude), float(np.degrees(np.arccos(cosine)))
 
 
 @dataclass(slots=True)

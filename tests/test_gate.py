@@ -18,9 +18,7 @@ BIN = Path(sys.executable).parent
     ids=["ruff", "format", "types", "layers"],
 )
 def test_tool_is_content(command: list[str]) -> None:
-    done = subprocess.run(
-        [BIN / command[0], *command[1:]], cwd=ROOT, capture_output=True, text=True, check=False
-    )
+    done = subprocess.run([BIN / command[0], *command[1:]], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
@@ -31,12 +29,8 @@ def test_the_layer_check_would_notice_a_forbidden_import(tmp_path: Path) -> None
             target = tmp_path / source.relative_to(ROOT)
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_text(source.read_text(encoding="utf-8"), encoding="utf-8")
-    (tmp_path / "pyproject.toml").write_text(
-        (ROOT / "pyproject.toml").read_text(encoding="utf-8"), encoding="utf-8"
-    )
-    (tmp_path / "pipeline/kernels/forbidden.py").write_text(
-        "from ..stages import logo as logo\n", encoding="utf-8"
-    )
+    (tmp_path / "pyproject.toml").write_text((ROOT / "pyproject.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    (tmp_path / "pipeline/kernels/forbidden.py").write_text("from ..stages import logo as logo\n", encoding="utf-8")
     done = subprocess.run(
         [BIN / "lint-imports"],
         cwd=tmp_path,
@@ -52,8 +46,6 @@ def test_the_layer_check_would_notice_a_forbidden_import(tmp_path: Path) -> None
 def test_nothing_but_the_design_card_stands_at_the_top() -> None:
     allowed = {"app", "pipeline", "sample_recordings", "tests", "docs", "pyproject.toml", "README.md"}
     allowed |= {"CHANGELOG.md", "CONTRIBUTING.md", "LICENSE"}
-    tracked = subprocess.run(
-        ["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False
-    ).stdout
+    tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False).stdout
     tops = {line.split("/")[0] for line in tracked.splitlines() if not line.startswith(".")}
     assert tops <= allowed

@@ -101,10 +101,14 @@ class Workshop:
         now = time.monotonic()
         for page in list(self._pages.values()):
             if page.listeners == 0 and now - page.last_sign_of_life > ALONE_S:
-                self._pages.pop(page.id, None)
-                page.close()
-                for finder in self._finders.values():
-                    finder.remove(page.outbox)
+                self.close_page(page)
+
+    def close_page(self, page: Page) -> None:
+        """End a page: its run, its work and its connection."""
+        self._pages.pop(page.id, None)
+        page.close()
+        for finder in list(self._finders.values()):
+            finder.remove(page.outbox)
 
     def close(self) -> None:
         """Close all pages, wait for all threads, and leave nothing behind."""

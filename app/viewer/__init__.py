@@ -5,11 +5,14 @@ Nothing here loads Rerun before `save` or `show` is called: the other commands m
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline.chain import Tick
+from pipeline.errors import SpinscopeError
 from pipeline.shots import Shot
 
 if TYPE_CHECKING:
@@ -41,9 +44,12 @@ def save(
 
 def require_display() -> None:
     """Raise SpinscopeError where Rerun's own window cannot open: to be asked before the work is done."""
-    from .native import require_display as require
-
-    require()
+    linux = sys.platform.startswith("linux")
+    if linux and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise SpinscopeError(
+            "there is no display for Rerun's window: leave out --native to get an address for the browser, "
+            "or use --save FILE.rrd"
+        )
 
 
 def show(

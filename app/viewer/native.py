@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -12,6 +10,7 @@ from pathlib import Path
 from pipeline.errors import SpinscopeError
 
 from ..terminal import note
+from . import require_display
 from .recorded import write_rrd
 from .rerun_api import place_playhead, program, quiet_environment
 from .run import Run
@@ -64,13 +63,3 @@ def _place_playhead(run: Run, port: int, process: subprocess.Popen[bytes]) -> No
         if place_playhead(HOST, port, run.first_sight_us):
             return
         time.sleep(0.2)
-
-
-def require_display() -> None:
-    """Raise SpinscopeError where no window can open."""
-    linux = sys.platform.startswith("linux")
-    if linux and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise SpinscopeError(
-            "there is no display for Rerun's window: leave out --native to get an address for the browser, "
-            "or use --save FILE.rrd"
-        )

@@ -21,6 +21,8 @@ from rerun.chunk import Chunk as Chunk  # for the stages
 
 from .entities import APPLICATION, TIMELINE, Colour
 
+VERSION: str = rr.__version__
+
 
 class _NoPandas:
     """A finder of modules that says there is no pandas."""

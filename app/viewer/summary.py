@@ -113,10 +113,14 @@ def _headline(run: Run, tick: Tick, velocity: Vector | None, said: str) -> list[
         doubt = "" if trusted else " (no method is trusted)"
         lines += [f"## {estimate.magnitude_rps:.1f} rps · {kind.name}{doubt}", ""]
         turns = f"**{rpm(estimate.magnitude_rps or 0):.0f} rpm**"
-        lines += [f"{kind.sentence}. {turns}, {speed_words(velocity)}; {said}.", ""]
+        lines += [f"{_sentence(kind.sentence)}. {turns}, {speed_words(velocity)}; {said}.", ""]
     else:
-        lines += ["## Spin not known", "", f"{speed_words(velocity)}; {said}.", ""]
+        lines += ["## Spin not known", "", f"{_sentence(speed_words(velocity))}; {said}.", ""]
     return lines
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def _table(run: Run, tick: Tick) -> list[str]:
@@ -165,7 +169,7 @@ def _evidence(run: Run, tick: Tick) -> list[str]:
         f"Tracker {tick.track.status}: centre ({mean[0]:.1f}, {mean[1]:.1f}) ± {deviation[:2].max():.1f} px, "
         f"radius {mean[4]:.1f} ± {deviation[4]:.1f} px; {len(tick.logo.events)} logo events in this tick.",
         "",
-        f"{rhythm[0].upper()}{rhythm[1:]}{slices}.",
+        f"{_sentence(rhythm)}{slices}.",
         "",
         *_origin(run),
     ]

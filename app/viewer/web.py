@@ -25,7 +25,7 @@ from pipeline.errors import SpinscopeError
 
 from ..terminal import note
 from .recorded import write_rrd
-from .rerun_api import playhead_request, program, quiet_environment
+from .rerun_api import VERSION, playhead_request, program, quiet_environment
 from .run import Run
 
 HOST = "127.0.0.1"
@@ -63,7 +63,7 @@ def show_web(run: Run, layout: str) -> None:
 def served(run: Run, layout: str) -> Iterator[tuple[http.server.ThreadingHTTPServer, str]]:
     """A server ready to run (`serve_forever`) and its address; closed at the end."""
     files = {f"/{path.name}": path.read_bytes() for path in PAGE.iterdir()}
-    files["/"] = files.pop("/index.html")
+    files["/"] = files.pop("/index.html").replace(b"VERSION", VERSION.encode())
     files |= _rerun_files()
     files["/playhead"] = playhead_request(run.first_sight_us)
     with tempfile.TemporaryDirectory(prefix="spinscope-") as folder:
@@ -104,7 +104,9 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         self.send_header("Content-Type", TYPES.get(suffix, "application/octet-stream"))
         self.send_header("Content-Length", str(len(content)))
         self.send_header("Content-Security-Policy", POLICY)
-        self.send_header("Cache-Control", "no-store")
+        # Rerun's files carry its version in their address: the browser keeps them, compiled.
+        lasting = self.path.endswith(f"?{VERSION}")
+        self.send_header("Cache-Control", "max-age=31536000, immutable" if lasting else "no-store")
         self.end_headers()
         try:
             self.wfile.write(content)

@@ -35,7 +35,7 @@ Ring = NDArray[np.float64]  # (5,) x, y, vx, vy, radius in px and px/s; NaN wher
 def tasks(quick: bool) -> list[Task]:
     """One flight a task."""
     if quick:
-        chosen = [("one ball", 6.0), ("one ball", 16.0), ("two balls", 10.0)]
+        chosen = [("one ball", 8.0), ("two balls", 16.0)]
     else:
         chosen = [(scene, speed) for scene in SCENES for speed in SPEEDS_M_S for _ in range(FLIGHTS)]
     return [

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 Figure = Any  # matplotlib's; it has no business here before it is needed
 WIDTH_IN, HEIGHT_IN, DPI = 5.0, 3.4, 120  # of one panel
 BIN_RPS = 20.0  # errors against the spin are averaged over so much of it
+STYLES = ("-", "--", "-.", ":")
 ERRORS = (("magnitude_error_rps", "magnitude error [rps]"), ("axis_error_deg", "axis error [deg]"))
 
 
@@ -57,7 +58,7 @@ def _panels(rows: int, columns: int) -> tuple[Figure, Any]:
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
-def _curve(axes: Any, rows: Sequence[Row], x: str, y: str, label: str, style: str = "-") -> None:
+def _curve(axes: Any, rows: Sequence[Row], x: str, y: str, label: str, style: str = "-", color: int = 0) -> None:
     """Mean of y at each x with a band of one standard deviation, as in the paper's figures."""
     points = [(value, summary(where(rows, **{x: value}), y)) for value in sorted(distinct(rows, x))]
     points = [(value, errors) for value, errors in points if errors.mean is not None]
@@ -66,8 +67,8 @@ def _curve(axes: Any, rows: Sequence[Row], x: str, y: str, label: str, style: st
     place = [value for value, _ in points]
     mean = np.array([errors.mean for _, errors in points])
     sd = np.array([errors.sd or 0.0 for _, errors in points])
-    (line,) = axes.plot(place, mean, style, marker="o", markersize=3, label=label)
-    axes.fill_between(place, np.maximum(mean - sd, 0.0), mean + sd, color=line.get_color(), alpha=0.12)
+    axes.plot(place, mean, style, color=f"C{color}", marker="o", markersize=3, label=label)
+    axes.fill_between(place, np.maximum(mean - sd, 0.0), mean + sd, color=f"C{color}", alpha=0.12)
 
 
 def _finish(axes: Any, title: str, x: str, y: str) -> None:
@@ -87,9 +88,9 @@ def _spinner(rows: Sequence[Row]) -> dict[str, Figure]:
     for column, window_ms in enumerate(windows):
         for line, (name, label) in enumerate(ERRORS):
             for group, style in (("top/back", "-"), ("side", "--")):
-                for method in distinct(rows, "method"):
+                for color, method in enumerate(distinct(rows, "method")):
                     part = [r for r in where(chosen, window_ms=window_ms, method=method) if group_of(r) == group]
-                    _curve(axes[line, column], part, "rps", name, f"{method}, {group}", style)
+                    _curve(axes[line, column], part, "rps", name, f"{method}, {group}", style, color)
             _finish(axes[line, column], f"ball spinner, {window_ms} ms", "spin [rps]", label)
     return {"errors": figure}
 
@@ -100,13 +101,14 @@ def _flights(rows: Sequence[Row]) -> dict[str, Figure]:
         row | {"bin_rps": (row["rps"] // BIN_RPS + 0.5) * BIN_RPS} for row in rows if isinstance(row["rps"], float)
     ]
     figure, axes = _panels(1, 3)
-    for method in distinct(rows, "method"):
+    for color, method in enumerate(distinct(rows, "method")):
         part = where(binned, method=method)
         for column, (name, _) in enumerate(ERRORS):
-            _curve(axes[0, column], part, "bin_rps", name, method)
+            _curve(axes[0, column], part, "bin_rps", name, method, color=color)
         bins = sorted(distinct(part, "bin_rps"))
         success = [summary(where(part, bin_rps=b), "axis_error_deg").success for b in bins]
-        axes[0, 2].plot(bins, success, marker="o", markersize=3, label=method)
+        axes[0, 2].plot(bins, success, color=f"C{color}", marker="o", markersize=3, label=method)
+    axes[0, 2].set_ylim(0.0, 1.05)
     for column, (_, label) in enumerate((*ERRORS, ("success", "success rate"))):
         _finish(axes[0, column], "flying balls", "spin [rps]", label)
     return {"errors": figure}
@@ -123,8 +125,9 @@ def _detector(rows: Sequence[Row]) -> dict[str, Figure]:
     figure, axes = _panels(len(scenes), len(names))
     for line, scene in enumerate(scenes):
         for column, (name, label) in enumerate(names):
-            for stage in detector.STAGES:
-                _curve(axes[line, column], where(rows, scene=scene, stage=stage), "speed_m_s", name, stage)
+            for color, stage in enumerate(detector.STAGES):
+                part = where(rows, scene=scene, stage=stage)
+                _curve(axes[line, column], part, "speed_m_s", name, stage, color=color)
             axes[line, column].set_yscale("log")
             _finish(axes[line, column], scene, "speed [m/s]", label)
     return {"errors": figure}
@@ -137,8 +140,8 @@ def _biases(rows: Sequence[Row]) -> dict[str, Figure]:
     for column, sweep in enumerate(sweeps):
         for line, what in enumerate(("noise", "ball")):
             part = where(rows, sweep=sweep, what=what)
-            for name, label in (("on_hz", "ON"), ("off_hz", "OFF")):
-                _curve(axes[line, column], part, "value", name, label)
+            for color, (name, label) in enumerate((("on_hz", "ON"), ("off_hz", "OFF"))):
+                _curve(axes[line, column], part, "value", name, label, color=color)
             for paper in sorted(distinct(where(part, paper=True), "value")):
                 axes[line, column].axvline(paper, color="green", linewidth=1)
             _finish(axes[line, column], f"{what}, bias_{sweep}", "bias (green: the paper's)", "events [1/s]")
@@ -159,14 +162,14 @@ def _filters(rows: Sequence[Row]) -> dict[str, Figure]:
     """Events kept against the threshold (the supplement's figure), and the spin's errors."""
     figure, axes = _panels(1, 3)
     kept, spin = where(rows, question="kept"), where(rows, question="spin")
-    for mode in filters.FILTERS:
+    for color, mode in enumerate(filters.FILTERS):
         for name, style in (("kept_ball", "-"), ("kept_noise", ":")):
             label = f"{mode}, {name.removeprefix('kept_')}"
-            _curve(axes[0, 0], where(kept, mode=mode), "threshold_us", name, label, style)
+            _curve(axes[0, 0], where(kept, mode=mode), "threshold_us", name, label, style, color)
         for column, (name, _) in enumerate(ERRORS, start=1):
-            for method in distinct(spin, "method"):
+            for method, style in zip(distinct(spin, "method"), STYLES, strict=False):
                 part = where(spin, mode=mode, method=method)
-                _curve(axes[0, column], part, "threshold_us", name, f"{mode}, {method}")
+                _curve(axes[0, column], part, "threshold_us", name, f"{mode}, {method}", style, color)
     for column, label in enumerate(("share of events kept", *(label for _, label in ERRORS))):
         axes[0, column].set_xscale("log")
         _finish(axes[0, column], "flying ball", "threshold [us]", label)
@@ -179,14 +182,16 @@ def _runtime(rows: Sequence[Row]) -> dict[str, Figure]:
     figure, axes = _panels(1, 2)
     for number, tick_us in enumerate(lengths):
         flown = where(rows, tick_us=tick_us, has_ball=True)
-        axes[0, 0].hist([row["latency_ms"] for row in flown], bins=40, alpha=0.6, label=f"tick of {tick_us} us")
+        latency_ms = [row["latency_ms"] for row in flown]
+        weights = np.full(len(flown), 1 / max(len(flown), 1))
+        axes[0, 0].hist(latency_ms, bins=40, weights=weights, alpha=0.6, label=f"tick of {tick_us} us")
         bottom = 0.0
         for color, name in enumerate(runtime.STAGES):
             mean = summary(flown, f"{name}_ms").mean or 0.0
             label = name if number == 0 else None
             axes[0, 1].bar(f"{tick_us} us", mean, bottom=bottom, color=f"C{color}", label=label)
             bottom += mean
-    _finish(axes[0, 0], "events to logo", "latency [ms]", "ticks")
+    _finish(axes[0, 0], "events to logo", "latency [ms]", "share of ticks")
     _finish(axes[0, 1], "stages, ticks with a ball", "tick", "mean time [ms]")
     return {"times": figure}
 

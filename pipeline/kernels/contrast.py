@@ -32,31 +32,63 @@ Integers = NDArray[np.int64]
 COINCIDENCE = 0.55 * 0.55
 # Paint and reading are each smeared by the spline (variance 1/4 cell^2): kernel of 1 sigma = cell / sqrt(2).
 CELLS_PER_SIGMA = math.sqrt(2.0)
+# The map's pole need not be exact: so many events are enough for the mean of the turned points.
+POLE_EVENTS = 64
 
 
 @numba.njit(cache=True, nogil=True)
-def turn_back(turned: Floats, spin_rad_s: Floats, t_s: Floats, normals: Floats, rows: Integers) -> None:
-    """Write normals[rows] (m, 3) turned by -spin * t_s (m,) into `turned` (m, 3) (Rodrigues)."""
+def turn_back(turned: Floats, spin_rad_s: Floats, t_s: Floats, normals: Floats) -> None:
+    """Write the normals (3, n), each turned by -spin t_s (Rodrigues), into `turned` (3, n).
+
+    Sine and cosine of half the angle come from their series on [-pi/2, pi/2], whose terms left out are below 1e-6:
+    plain arithmetic, so that the compiler handles several events at once (3 times as fast as the library's).
+    """
     wx, wy, wz = spin_rad_s[0], spin_rad_s[1], spin_rad_s[2]
     speed = math.sqrt(wx * wx + wy * wy + wz * wz)
     ax, ay, az = 0.0, 0.0, 1.0
     if speed > 0.0:
         ax, ay, az = wx / speed, wy / speed, wz / speed
+    turns_per_s = -speed / (2.0 * math.pi)
+    xs, ys, zs = normals[0], normals[1], normals[2]
+    to_x, to_y, to_z = turned[0], turned[1], turned[2]
     for k in range(t_s.size):
-        i = rows[k]
-        x, y, z = normals[i, 0], normals[i, 1], normals[i, 2]
-        angle = -speed * t_s[k]
-        c, s = math.cos(angle), math.sin(angle)
-        along = (ax * x + ay * y + az * z) * (1.0 - c)
-        turned[k, 0] = x * c + (ay * z - az * y) * s + ax * along
-        turned[k, 1] = y * c + (az * x - ax * z) * s + ay * along
-        turned[k, 2] = z * c + (ax * y - ay * x) * s + az * along
+        turns = t_s[k] * turns_per_s
+        half = math.pi * (turns - math.floor(turns + 0.5))
+        h2 = half * half
+        s = half * (
+            1.0 + h2 * (-1 / 6 + h2 * (1 / 120 + h2 * (-1 / 5040 + h2 * (1 / 362880 - h2 * (1 / 39916800)))))
+        )
+        c = 1.0 + h2 * (
+            -1 / 2 + h2 * (1 / 24 + h2 * (-1 / 720 + h2 * (1 / 40320 + h2 * (-1 / 3628800 + h2 / 479001600))))
+        )
+        sine, versine = 2.0 * s * c, 2.0 * s * s
+        x, y, z = xs[k], ys[k], zs[k]
+        along = (ax * x + ay * y + az * z) * versine
+        cosine = 1.0 - versine
+        to_x[k] = x * cosine + (ay * z - az * y) * sine + ax * along
+        to_y[k] = y * cosine + (az * x - ax * z) * sine + ay * along
+        to_z[k] = z * cosine + (ax * y - ay * x) * sine + az * along
 
 
 @numba.njit(cache=True, nogil=True)
-def _to_map(points: Floats, px: float, py: float, pz: float, per_cell: float, middle: float) -> None:
-    """Replace the first two columns of unit vectors `points` by their places on the map around (px, py, pz)."""
-    # An orthonormal pair across the pole, built on the axis that is farthest from it.
+def _pole(spin_rad_s: Floats, t_s: Floats, normals: Floats) -> tuple[float, float, float]:
+    """Mean direction of the turned normals, of about POLE_EVENTS of them."""
+    stride = max(1, t_s.size // POLE_EVENTS)
+    some = np.ascontiguousarray(normals[:, ::stride])
+    turned = np.empty_like(some)
+    turn_back(turned, spin_rad_s, t_s[::stride], some)
+    px, py, pz = 0.0, 0.0, 1e-9
+    for k in range(turned.shape[1]):
+        px, py, pz = px + turned[0, k], py + turned[1, k], pz + turned[2, k]
+    length = math.sqrt(px * px + py * py + pz * pz)
+    return px / length, py / length, pz / length
+
+
+@numba.njit(cache=True, nogil=True)
+def _to_map(points: Floats, pole: tuple[float, float, float], per_cell: float, middle: float) -> None:
+    """Replace the first two rows of unit vectors `points` (3, n) by their places on the map around the pole."""
+    px, py, pz = pole
+    # An orthonormal pair across the pole, built on the axis that is not near it.
     if abs(px) < 0.6:
         ux, uy, uz = 0.0, -pz, py
     else:
@@ -64,12 +96,13 @@ def _to_map(points: Floats, px: float, py: float, pz: float, per_cell: float, mi
     length = math.sqrt(ux * ux + uy * uy + uz * uz)
     ux, uy, uz = ux / length, uy / length, uz / length
     vx, vy, vz = py * uz - pz * uy, pz * ux - px * uz, px * uy - py * ux
-    for k in range(points.shape[0]):
-        x, y, z = points[k, 0], points[k, 1], points[k, 2]
+    xs, ys, zs = points[0], points[1], points[2]
+    for k in range(xs.size):
+        x, y, z = xs[k], ys[k], zs[k]
         near = 1.0 + px * x + py * y + pz * z  # 2 at the pole, 0 at its antipode, whose place is anywhere on the rim
-        scale = math.sqrt(2.0 / max(near, 1e-9)) * per_cell
-        points[k, 0] = (ux * x + uy * y + uz * z) * scale + middle
-        points[k, 1] = (vx * x + vy * y + vz * z) * scale + middle
+        scale = per_cell * math.sqrt(2.0 / max(near, 1e-6))
+        xs[k] = (ux * x + uy * y + uz * z) * scale + middle
+        ys[k] = (vx * x + vy * y + vz * z) * scale + middle
 
 
 @numba.njit(cache=True, nogil=True, inline="always")
@@ -79,10 +112,12 @@ def _spline(offset: float) -> tuple[float, float, float]:
 
 
 @numba.njit(cache=True, nogil=True)
-def _paint(image: NDArray[np.float32], places: Floats, layers: Integers, size: int, weight: float) -> None:
-    """Add one splat of this weight a place to the flat maps `image`, one map of size x size a layer."""
-    for k in range(places.shape[0]):
-        x, y = places[k, 0], places[k, 1]
+def _paint(
+    image: NDArray[np.float32], places: Floats, layers: Integers, first: int, last: int, size: int, weight: float
+) -> None:
+    """Add one splat of this weight a place [first, last) to the flat maps `image`, size x size cells a layer."""
+    for k in range(first, last):
+        x, y = places[0, k], places[1, k]
         column, row = int(x + 0.5), int(y + 0.5)
         x0, x1, x2 = _spline(x - column)
         y0, y1, y2 = _spline(y - row)
@@ -103,37 +138,32 @@ def score(
     layers: Integers,
     starts: Integers,
     other_t_s: Floats,
-    other_rows: Integers,
+    other_normals: Floats,
+    other_layers: Integers,
     other_starts: Integers,
     cell: float,
     floor: float,
 ) -> float:
     """Score of one spin (3,); each event's log((I + floor) / (B + floor)) goes into `ratios` (n,).
 
-    t_s, normals, layers : (n,), (n, 3), (n,) int64, the events: time from the reference, outward unit normal,
+    t_s, normals, layers : (n,), (3, n), (n,) int64, the events: time from the reference, outward unit normal,
         polarity (0 or 1)
     starts : (k + 1,) rows at which segments start: each segment has a map of its own, so only pairs of events within
         a segment count
-    other_t_s, other_rows, other_starts : the same events (rows) at other times of their segment; these draw B
+    other_t_s, other_normals, other_layers, other_starts : the same events at other times of their segment; they
+        draw B
     cell : width of the map's cells, radians near its middle
     floor : density in units of coinciding events that is added to both, against ratios of small numbers
     """
-    n = t_s.size
     size = int(4.0 / cell) + 5
     middle = 0.5 * (size - 1)
     added = floor * COINCIDENCE
-    turned, blurred = np.empty((n, 3)), np.empty((other_t_s.size, 3))
-    own, others = np.arange(n), np.empty(other_rows.size, np.int64)
-    turn_back(turned, spin_rad_s, t_s, normals, own)
-    turn_back(blurred, spin_rad_s, other_t_s, normals, other_rows)
-    px, py, pz = 0.0, 0.0, 1e-9
-    for i in range(n):
-        px, py, pz = px + turned[i, 0], py + turned[i, 1], pz + turned[i, 2]
-    length = math.sqrt(px * px + py * py + pz * pz)
-    _to_map(turned, px / length, py / length, pz / length, 1.0 / cell, middle)
-    _to_map(blurred, px / length, py / length, pz / length, 1.0 / cell, middle)
-    for k in range(other_rows.size):
-        others[k] = layers[other_rows[k]]
+    turned, blurred = np.empty_like(normals), np.empty_like(other_normals)
+    turn_back(turned, spin_rad_s, t_s, normals)
+    turn_back(blurred, spin_rad_s, other_t_s, other_normals)
+    pole = _pole(spin_rad_s, t_s, normals)
+    _to_map(turned, pole, 1.0 / cell, middle)
+    _to_map(blurred, pole, 1.0 / cell, middle)
     sharp, blur = np.zeros(2 * size * size, np.float32), np.zeros(2 * size * size, np.float32)
     total = 0.0
     for segment in range(starts.size - 1):
@@ -142,11 +172,11 @@ def score(
         if segment > 0:
             sharp[:] = 0.0
             blur[:] = 0.0
-        _paint(sharp, turned[first:last], layers[first:last], size, 1.0)
+        _paint(sharp, turned, layers, first, last, size, 1.0)
         # An event has no share in the density that it is compared with: count - 1 others.
-        _paint(blur, blurred[begin:end], others[begin:end], size, (last - first - 1) / max(end - begin, 1))
+        _paint(blur, blurred, other_layers, begin, end, size, (last - first - 1) / max(end - begin, 1))
         for i in range(first, last):
-            x, y = turned[i, 0], turned[i, 1]
+            x, y = turned[0, i], turned[1, i]
             column, row = int(x + 0.5), int(y + 0.5)
             x0, x1, x2 = _spline(x - column)
             y0, y1, y2 = _spline(y - row)
@@ -171,7 +201,8 @@ def scores(
     layers: Integers,
     starts: Integers,
     other_t_s: Floats,
-    other_rows: Integers,
+    other_normals: Floats,
+    other_layers: Integers,
     other_starts: Integers,
     cell: float,
     floor: float,
@@ -187,7 +218,8 @@ def scores(
             layers,
             starts,
             other_t_s,
-            other_rows,
+            other_normals,
+            other_layers,
             other_starts,
             cell,
             floor,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .contrast_refine import NO_OFFSETS, Hill, bend_and_noise, climb, spread_of_estimate
 from .contrast_search import TURN, bursts, distinct, narrowed, scored, search, spread_directions
-from .contrast_window import window
+from .contrast_window import segmented, whole
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -35,8 +35,8 @@ class Settings:
 class LogoEvents:
     """The logo's events of one stretch of time.
 
-    t_s : (n,) float64 rising, any origin; normals : (n, 3) float64, outward unit normals; layers : (n,) int64,
-    polarity 0 or 1; facing : (n, 3) float64, unit vectors camera to ball; radius_px : (n,) float64
+    t_s : (n,) float64 rising, any origin; normals : (3, n) float64, outward unit normals; layers : (n,) int64,
+    polarity 0 or 1; facing : (3, n) float64, unit vectors camera to ball; radius_px : (n,) float64
     """
 
     t_s: Floats
@@ -48,9 +48,9 @@ class LogoEvents:
     def at(self, rows: Integers | NDArray[np.bool_]) -> LogoEvents:
         return LogoEvents(
             self.t_s[rows],
-            np.ascontiguousarray(self.normals[rows]),
+            np.ascontiguousarray(self.normals[:, rows]),
             self.layers[rows],
-            np.ascontiguousarray(self.facing[rows]),
+            np.ascontiguousarray(self.facing[:, rows]),
             self.radius_px[rows],
         )
 
@@ -129,34 +129,11 @@ def estimate_spin(
     )
 
 
-def _hill(
-    events: LogoEvents,
-    settings: Settings,
-    sigma: float,
-    centre_std_px: float = 0.0,
-    radius_std_px: float = 0.0,
-    segment_s: float = math.inf,
-) -> Hill:
+def _hill(events: LogoEvents, settings: Settings, sigma: float) -> Hill:
     n = events.t_s.size
-    part = window(
-        events.t_s,
-        events.normals,
-        events.layers,
-        segment_s=segment_s,
-        most=n,
-        most_each=n,
-        times_each=max(1, round(2000 / n)),
-    )
-    prior = np.array([centre_std_px, centre_std_px, radius_std_px]) if centre_std_px else NO_OFFSETS
+    part, others = whole(events.t_s, events.normals, events.layers, max(1, round(600 / n)))
     return Hill(
-        part,
-        events.facing,
-        events.radius_px,
-        sigma,
-        settings.floor,
-        prior,
-        settings.trust if centre_std_px else 1.0,
-        np.empty(n),
+        part, others, events.facing, events.radius_px, sigma, settings.floor, NO_OFFSETS, 1.0, np.empty(n)
     )
 
 
@@ -169,8 +146,9 @@ def _followed(events: LogoEvents, spins: Floats, settings: Settings) -> Floats:
         climbed, values = [], []
         last = turns * TURN > span_s * np.linalg.norm(spins[0])
         for spin in spins:
-            segment_s = math.inf if last else turns * TURN / float(np.linalg.norm(spin))
-            hill = _hill(events, settings, 1.5 * settings.sigma, segment_s=segment_s)
+            hill = _hill(events, settings, 1.5 * settings.sigma)
+            if not last:
+                hill.part = segmented(events.t_s, events.normals, events.layers, segment_s=turns * TURN / float(np.linalg.norm(spin)), most=10**9, most_each=10**9)
             spin, _, value = climb(hill, spin, NO_OFFSETS, 4 if last else 2)
             climbed.append(spin)
             values.append(value)
@@ -189,7 +167,7 @@ def _scanned(events: LogoEvents, spins: Floats, settings: Settings) -> tuple[Flo
     for spin in spins[:3]:
         magnitude = float(np.linalg.norm(spin))
         step = min(0.8 * sigma / spread_s / magnitude, 0.1)
-        factors = np.exp(np.arange(math.log(0.55), math.log(1.8), step))
+        factors = np.exp(np.arange(math.log(0.45), math.log(2.2), step))
         values = scored(spin * factors[:, None], part, sigma, settings.floor)
         padded = np.concatenate([[-np.inf], values, [-np.inf]])
         peaks = np.flatnonzero((values >= padded[:-2]) & (values >= padded[2:]))

@@ -18,6 +18,7 @@ from .contrast_search import axes_of
 from .contrast_window import Window
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 STEP_SIGMAS = 0.5
 OFFSET_STEP_PX = 0.3
 NO_OFFSETS = np.zeros(0)
@@ -27,30 +28,30 @@ NO_OFFSETS = np.zeros(0)
 def moved_normals(
     normals: Floats, facing: Floats, radius_px: Floats, x_px: float, y_px: float, wider_px: float
 ) -> Floats:
-    """Normals (n, 3) as they are if the ball's centre is (+x_px, +y_px) off the assumed one and its radius larger.
+    """Normals (3, n) as they are if the ball's centre is (+x_px, +y_px) off the assumed one and its radius larger.
 
-    facing : (n, 3) unit vectors from the camera to the ball's centre
+    facing : (3, n) unit vectors from the camera to the ball's centre
     radius_px : (n,) radius of the ball that the normals were made with
     Small offsets, ball far from the camera: the disc's coordinates shift and shrink, the normal stays on the sphere.
     """
-    n = normals.shape[0]
-    moved = np.empty((n, 3))
+    n = normals.shape[1]
+    moved = np.empty((3, n))
     for i in range(n):
-        ux, uy, uz = facing[i, 0], facing[i, 1], facing[i, 2]
+        ux, uy, uz = facing[0, i], facing[1, i], facing[2, i]
         # The image's axes as seen from the ball: across = x less its part along u, down = u cross across.
         length = math.sqrt(max(1.0 - ux * ux, 1e-12))
         ax, ay, az = (1.0 - ux * ux) / length, -ux * uy / length, -ux * uz / length
         dx, dy, dz = uy * az - uz * ay, uz * ax - ux * az, ux * ay - uy * ax
-        across = ax * normals[i, 0] + ay * normals[i, 1] + az * normals[i, 2]
-        down = dx * normals[i, 0] + dy * normals[i, 1] + dz * normals[i, 2]
+        across = ax * normals[0, i] + ay * normals[1, i] + az * normals[2, i]
+        down = dx * normals[0, i] + dy * normals[1, i] + dz * normals[2, i]
         shrink = radius_px[i] / (radius_px[i] + wider_px)
         across, down = (across - x_px / radius_px[i]) * shrink, (down - y_px / radius_px[i]) * shrink
         rim = max(math.sqrt(across * across + down * down), 1.0)
         across, down = across / rim, down / rim
         depth = math.sqrt(max(1.0 - across * across - down * down, 0.0))
-        moved[i, 0] = across * ax + down * dx - depth * ux
-        moved[i, 1] = across * ay + down * dy - depth * uy
-        moved[i, 2] = across * az + down * dz - depth * uz
+        moved[0, i] = across * ax + down * dx - depth * ux
+        moved[1, i] = across * ay + down * dy - depth * uy
+        moved[2, i] = across * az + down * dz - depth * uz
     return moved
 
 
@@ -70,7 +71,8 @@ def shifted_spin(spin: Floats, axes: Floats, change: Floats) -> Floats:
 class Hill:
     """The score as a function of the spin and, if `prior_px` has entries, of the ball's offsets.
 
-    part : the events, one window; facing, radius_px : of the same events
+    part : the events, one window; others : rows of its exchanged events
+    facing, radius_px : (3, n) and (n,) of the same events, see `moved_normals`
     sigma, floor : kernel in radians, density floor
     prior_px : (0,) or (3,) 1 sigma of the offsets of centre x, y and radius, px
     trust : weight of the score against the prior
@@ -78,6 +80,7 @@ class Hill:
     """
 
     part: Window
+    others: Integers
     facing: Floats
     radius_px: Floats
     sigma: float
@@ -92,7 +95,7 @@ class Hill:
         if offsets_px.size:
             x_px, y_px, wider_px = offsets_px
             moved = moved_normals(part.normals, self.facing, self.radius_px, x_px, y_px, wider_px)
-            part = part._replace(normals=moved)
+            part = part._replace(normals=moved, other_normals=np.ascontiguousarray(moved[:, self.others]))
         return float(score(self.ratios, spin_rad_s, *part, self.sigma * CELLS_PER_SIGMA, self.floor))
 
     def value(self, spin_rad_s: Floats, offsets_px: Floats) -> float:

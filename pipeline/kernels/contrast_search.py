@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .contrast import CELLS_PER_SIGMA, score, scores
-from .contrast_window import Window, window
+from .contrast_window import Window, segment_starts, segmented
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -82,8 +82,7 @@ def bursts(t_s: Floats, normals: Floats, layers: Integers) -> NDArray[np.bool_]:
     no denser than usual at its place (less than e^0.2) is left out. Sparse events pass, for the floor is low.
     """
     segment_s, sigma, floor, usual = 0.5e-3, 0.1, 0.3, 600
-    number = np.floor((t_s - t_s[0]) / segment_s)
-    starts = np.append(np.flatnonzero(np.diff(number, prepend=-1.0)), t_s.size).astype(np.int64)
+    starts = segment_starts(t_s, segment_s)
     rows = np.arange(0, t_s.size, max(1, t_s.size // usual))
     count = starts.size - 1
     ratios = np.empty(t_s.size)
@@ -95,7 +94,8 @@ def bursts(t_s: Floats, normals: Floats, layers: Integers) -> NDArray[np.bool_]:
         layers,
         starts,
         np.zeros(count * rows.size),
-        np.tile(rows, count),
+        np.tile(normals[:, rows], count),
+        np.tile(layers[rows], count),
         np.arange(count + 1) * rows.size,
         sigma * CELLS_PER_SIGMA,
         floor,
@@ -160,15 +160,8 @@ def _over_turns(
     speed = np.round(np.log(np.linalg.norm(spins_rad_s, axis=1)) / SHARED)
     values = np.full(speed.size, -np.inf)
     for one in np.unique(speed):
-        part = window(
-            t_s,
-            normals,
-            layers,
-            segment_s=turns * TURN / math.exp(one * SHARED),
-            most=most,
-            most_each=most_each,
-            times_each=1,
-        )
+        segment_s = turns * TURN / math.exp(one * SHARED)
+        part = segmented(t_s, normals, layers, segment_s=segment_s, most=most, most_each=most_each)
         if part.t_s.size:
             mine = speed == one
             values[mine] = scored(spins_rad_s[mine], part, sigma, floor) * (t_s.size / part.t_s.size)

@@ -14,14 +14,15 @@ GOLDEN = 0.6180339887498949  # its multiples modulo 1 spread as evenly as any se
 
 
 class Window(NamedTuple):
-    """Arguments of the kernel `score`, in its order: t_s is relative to the reference time."""
+    """Arguments of the kernel `score`, in its order; t_s is relative to the reference time, normals are (3, n)."""
 
     t_s: Floats
     normals: Floats
     layers: Integers
     starts: Integers
     other_t_s: Floats
-    other_rows: Integers
+    other_normals: Floats
+    other_layers: Integers
     other_starts: Integers
 
 
@@ -53,34 +54,42 @@ def exchanged(t_s: Floats, starts: Integers, times_each: int) -> tuple[Floats, I
     return other_t_s, rows, other_starts
 
 
-def window(
-    t_s: Floats,
-    normals: Floats,
-    layers: Integers,
-    *,
-    segment_s: float,
-    most: int,
-    most_each: int,
-    times_each: int,
+def segment_starts(t_s: Floats, segment_s: float) -> Integers:
+    """(k + 1,) int64, rows at which the segments that hold events start, and the number of events."""
+    number = np.floor((t_s - t_s[:1]) / segment_s)
+    starts = np.flatnonzero(np.diff(number, prepend=-1.0))
+    return np.append(starts, t_s.size).astype(np.int64)
+
+
+def whole(t_s: Floats, normals: Floats, layers: Integers, times_each: int) -> tuple[Window, Integers]:
+    """All events (normals (3, n)) as one segment, and the rows of its exchanged events."""
+    starts = np.array([0, t_s.size], np.int64)
+    return _window(t_s, normals, layers, starts, times_each)
+
+
+def segmented(
+    t_s: Floats, normals: Floats, layers: Integers, *, segment_s: float, most: int, most_each: int
 ) -> Window:
-    """The events as one window of segments no longer than segment_s, thinned evenly.
+    """The events (normals (3, n)) in segments no longer than segment_s, thinned evenly.
 
     Events within a segment are thinned to about `most_each` on average, then whole segments are left out, evenly,
-    until at most about `most` events are left: thinning alone would leave no pairs.
+    until about `most` events are left: thinning alone would leave no pairs.
     """
-    number = ((t_s - t_s[0]) / segment_s).astype(np.int64) if t_s.size else np.empty(0, np.int64)
-    starts = np.append(np.flatnonzero(np.diff(number, prepend=-1)), t_s.size)
+    starts = segment_starts(t_s, segment_s)
     stride = max(1, round(t_s.size / max(starts.size - 1, 1) / most_each))
     rows = np.arange(0, t_s.size, stride)
+    segment = np.searchsorted(starts, rows, side="right")
     if rows.size > most:
-        segment = np.searchsorted(starts, rows, side="right") - 1
-        rows = rows[segment % -(-rows.size // most) == 0]
-    kept, number = t_s[rows], number[rows]
-    starts = np.append(np.flatnonzero(np.diff(number, prepend=-1)), rows.size).astype(np.int64)
-    return Window(
-        kept,
-        np.ascontiguousarray(normals[rows]),
-        layers[rows],
-        starts,
-        *exchanged(kept, starts, times_each),
-    )
+        keep = segment % -(-rows.size // most) == 0
+        rows, segment = rows[keep], segment[keep]
+    starts = np.append(np.flatnonzero(np.diff(segment, prepend=-1)), rows.size).astype(np.int64)
+    return _window(t_s[rows], np.ascontiguousarray(normals[:, rows]), layers[rows], starts, 1)[0]
+
+
+def _window(
+    t_s: Floats, normals: Floats, layers: Integers, starts: Integers, times_each: int
+) -> tuple[Window, Integers]:
+    other_t_s, rows, other_starts = exchanged(t_s, starts, times_each)
+    other_normals = np.ascontiguousarray(normals[:, rows])
+    part = Window(t_s, normals, layers, starts, other_t_s, other_normals, layers[rows], other_starts)
+    return part, rows

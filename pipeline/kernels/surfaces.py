@@ -20,9 +20,7 @@ def remember(
 
 
 @njit(cache=True, nogil=True)
-def read(
-    values: NDArray[np.uint8], last_us: NDArray[np.int64], end_us: int, span_us: int, linear: bool
-) -> None:
+def read(values: NDArray[np.uint8], last_us: NDArray[np.int64], end_us: int, span_us: int, linear: bool) -> None:
     """Write the pixels with an event in [end - span, end) into values.
 
     values : (height, width) uint8, which must hold zeros; last_us : (height, width) int64

@@ -66,6 +66,4 @@ def step(parameters: FilterParameters, state: FilterState, packet: Packet) -> Fi
     surface_events = events if surface[0] == kernels.OFF else events[kernels.rows_with(passed, 0)]
     if logo == surface:
         return FilterResult(surface_events, surface_events)
-    return FilterResult(
-        surface_events, events if logo[0] == kernels.OFF else events[kernels.rows_with(passed, 1)]
-    )
+    return FilterResult(surface_events, events if logo[0] == kernels.OFF else events[kernels.rows_with(passed, 1)])

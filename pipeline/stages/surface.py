@@ -20,18 +20,12 @@ INPUTS = ("packet", "filter")
 class SurfaceParameters(ParameterGroup):
     """Which surface, and how it is cleaned."""
 
-    kind: str = choice(
-        "eros", ("eros", "accumulated", "linear"), "EROS, accumulated frame or linear time surface"
-    )
+    kind: str = choice("eros", ("eros", "accumulated", "linear"), "EROS, accumulated frame or linear time surface")
     k_px: int = tunable(
         10, 1, eros.K_MAX_PX, 1, "px", "EROS: width of the block that an event fades (forced odd, 10 -> 11)"
     )
-    span_us: int = tunable(
-        2000, 100, 100_000, 100, "us", "accumulated, linear: how far back in time it shows"
-    )
-    cleaning: str = choice(
-        "isolated", ("off", "isolated", "printed"), "removal of isolated pixels before the search"
-    )
+    span_us: int = tunable(2000, 100, 100_000, 100, "us", "accumulated, linear: how far back in time it shows")
+    cleaning: str = choice("isolated", ("off", "isolated", "printed"), "removal of isolated pixels before the search")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,9 +91,7 @@ def start(parameters: SurfaceParameters, setting: Setting) -> SurfaceState:
     return SurfaceState(height, width, memory)
 
 
-def step(
-    parameters: SurfaceParameters, state: SurfaceState, packet: Packet, filtered: FilterResult
-) -> SurfaceResult:
+def step(parameters: SurfaceParameters, state: SurfaceState, packet: Packet, filtered: FilterResult) -> SurfaceResult:
     """Draw the tick's filtered events and read the surface at its end."""
     events, memory = filtered.surface_events, state.memory
     values = np.zeros((state.height_px, state.width_px), np.uint8)

@@ -139,9 +139,7 @@ def test_the_table_for_people_names_units_and_methods(samples: Path) -> None:
         (["{samples}/README.md"], "README.md"),
     ],
 )
-def test_wrong_input_is_one_clear_line_and_status_2(
-    samples: Path, arguments: list[object], says: str
-) -> None:
+def test_wrong_input_is_one_clear_line_and_status_2(samples: Path, arguments: list[object], says: str) -> None:
     done = spinscope("analyze", *(str(argument).replace("{samples}", str(samples)) for argument in arguments))
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1, done.stderr

@@ -114,9 +114,7 @@ def test_rally_has_its_shots(tmp_path: Path) -> None:
         ("rally", {"shots": 50, "duration_ms": 1000.0}, "do not fit"),
     ],
 )
-def test_nonsense_gets_one_line_and_no_file(
-    tmp_path: Path, kind: str, options: dict[str, Any], words: str
-) -> None:
+def test_nonsense_gets_one_line_and_no_file(tmp_path: Path, kind: str, options: dict[str, Any], words: str) -> None:
     with pytest.raises(SpinscopeError, match=words) as caught:
         simulate_to_file(kind, tmp_path / "out.h5", **(SMALL | options))
     assert "\n" not in str(caught.value)

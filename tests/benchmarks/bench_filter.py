@@ -44,10 +44,7 @@ def everywhere() -> EventBatch:
 @pytest.mark.parametrize("stream", [flight, everywhere])
 def test_two_filters_in_one_packet(benchmark: Any, stream: Any) -> None:
     events, parameters = stream(), FilterParameters()
-    packets = [
-        Packet(0, 0, 0, events[first : first + PACKET_EVENTS])
-        for first in range(0, len(events), PACKET_EVENTS)
-    ]
+    packets = [Packet(0, 0, 0, events[first : first + PACKET_EVENTS]) for first in range(0, len(events), PACKET_EVENTS)]
     state = stage.start(parameters, SETTING)
 
     def run() -> None:

@@ -85,9 +85,7 @@ def test_eros_events(benchmark: Any, events: EventBatch, k_px: int) -> None:
 
     x, y = events.x_px[:50_000], events.y_px[:50_000]
     surface, decay = np.zeros((HEIGHT, WIDTH), np.float32), 0.3 ** (1 / k_px)
-    loop_ns = (
-        median_s(lambda: compiled_float32_loop(surface, x, y, half, np.float32(decay)), 7) / x.size * 1e9
-    )
+    loop_ns = median_s(lambda: compiled_float32_loop(surface, x, y, half, np.float32(decay)), 7) / x.size * 1e9
     padded = np.zeros((HEIGHT + 2 * half, WIDTH + 2 * half))
     x, y = x[:10_000], y[:10_000]
     cv2_ns = median_s(lambda: cv2_float64(padded, x, y, half, decay), 5) / x.size * 1e9
@@ -150,10 +148,7 @@ def test_filter_and_surface_of_a_packet(benchmark: Any, events: EventBatch, kind
     filters, surfaces = FilterParameters(), SurfaceParameters(kind=kind)
     filter_state, state = filter_stage.start(filters, SETTING), stage.start(surfaces, SETTING)
     starts = range(0, len(events) - PACKET_EVENTS, PACKET_EVENTS)
-    packets = [
-        Packet(0, 0, int(events.t_us[i + PACKET_EVENTS - 1]) + 1, events[i : i + PACKET_EVENTS])
-        for i in starts
-    ]
+    packets = [Packet(0, 0, int(events.t_us[i + PACKET_EVENTS - 1]) + 1, events[i : i + PACKET_EVENTS]) for i in starts]
     packet_s: list[float] = []
 
     def run() -> None:

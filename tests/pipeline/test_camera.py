@@ -40,9 +40,7 @@ def test_silhouette_is_the_image_of_the_outline(place: tuple[float, float, float
     points = CAMERA.project(outline(np.array(place), RADIUS_M))
     middle = (points.min(axis=0) + points.max(axis=0)) / 2  # of an ellipse: its centre
     shifted = points - middle
-    area = 0.5 * abs(
-        np.sum(shifted[:, 0] * np.roll(shifted[:, 1], -1) - shifted[:, 1] * np.roll(shifted[:, 0], -1))
-    )
+    area = 0.5 * abs(np.sum(shifted[:, 0] * np.roll(shifted[:, 1], -1) - shifted[:, 1] * np.roll(shifted[:, 0], -1)))
     assert np.allclose([x[0], y[0]], middle, atol=1e-3)
     assert radius[0] == pytest.approx(np.sqrt(area / np.pi), rel=1e-5)
 

@@ -87,9 +87,7 @@ def test_an_unchanged_run_computes_nothing_again(calls: dict[str, int]) -> None:
         ("filter.mode=off", set(INPUTS)),
     ],
 )
-def test_a_change_runs_its_stage_and_those_below(
-    calls: dict[str, int], assignment: str, rerun: set[str]
-) -> None:
+def test_a_change_runs_its_stage_and_those_below(calls: dict[str, int], assignment: str, rerun: set[str]) -> None:
     chain = Chain(source())
     list(chain.run(DEFAULT))
     before = dict(calls)
@@ -159,9 +157,7 @@ def test_a_stage_that_raises_leaves_no_half_column(calls: dict[str, int]) -> Non
     assert [tick.spin for tick in chain.run(DEFAULT)] == [tick.spin for tick in Chain(source()).run(DEFAULT)]
 
 
-def test_the_budget_drops_what_was_not_used_for_longest(
-    calls: dict[str, int], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_budget_drops_what_was_not_used_for_longest(calls: dict[str, int], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(chain_module, "nbytes", lambda result: 1000)
     chain = Chain(source(), budget_bytes=7 * 20 * 1000 + 4 * 20 * 1000)  # one whole run and one from logo on
     for pad in (1, 2, 3):

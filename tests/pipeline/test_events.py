@@ -13,9 +13,7 @@ from pipeline.events import EventBatch
 
 def batch(times: list[int]) -> EventBatch:
     n = len(times)
-    return EventBatch.checked(
-        times, np.arange(n) % 7, np.zeros(n, int), np.arange(n) % 2, width_px=8, height_px=4
-    )
+    return EventBatch.checked(times, np.arange(n) % 7, np.zeros(n, int), np.arange(n) % 2, width_px=8, height_px=4)
 
 
 def test_columns_are_read_only_and_copied() -> None:
@@ -29,9 +27,7 @@ def test_columns_are_read_only_and_copied() -> None:
 
 @given(st.lists(st.integers(0, 50)).map(sorted), st.integers(-5, 55), st.integers(-5, 55))
 def test_between_takes_start_and_leaves_end(times: list[int], start: int, end: int) -> None:
-    assert batch(times).between(start, max(start, end)).t_us.tolist() == [
-        t for t in times if start <= t < end
-    ]
+    assert batch(times).between(start, max(start, end)).t_us.tolist() == [t for t in times if start <= t < end]
 
 
 @given(st.lists(st.integers(0, 50), min_size=1).map(sorted), st.data())

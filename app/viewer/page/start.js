@@ -29,7 +29,7 @@ async function placePlayhead(viewer, request) {
 async function start() {
   const recording = bytesOf("recording.rrd");
   const request = bytesOf("playhead");
-  await wasm_bindgen({ module_or_path: "re_viewer_bg.wasm" });
+  await wasm_bindgen({ module_or_path: document.getElementById("rerun").src.replace(".js", "_bg.wasm") });
   const viewer = new wasm_bindgen.WebHandle({
     hide_welcome_screen: true,
     enable_history: false,

@@ -86,9 +86,7 @@ def test_a_burst_passes_as_the_supplement_says(mode: str, rows: list[int]) -> No
 @pytest.mark.parametrize("on", [False, True])
 def test_the_first_event_of_a_pixel_passes_trail_only(on: bool) -> None:
     for mode in MODES:
-        assert passed_rows(fresh(), [(0, 0, 0, on)], (mode, 10))[0] == (
-            [0] if mode in ("off", "trail") else []
-        )
+        assert passed_rows(fresh(), [(0, 0, 0, on)], (mode, 10))[0] == ([0] if mode in ("off", "trail") else [])
 
 
 def test_rows_of_more_events_than_a_byte_counts() -> None:

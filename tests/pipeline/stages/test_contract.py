@@ -114,9 +114,7 @@ def test_a_stage_leaves_inputs_and_earlier_results_alone(
 
 
 @pytest.mark.parametrize("name", STAGES)
-def test_stop_and_resume_gives_the_same(
-    case: tuple[EventSource, Parameters], ticks: list[Tick], name: str
-) -> None:
+def test_stop_and_resume_gives_the_same(case: tuple[EventSource, Parameters], ticks: list[Tick], name: str) -> None:
     """A deep copy of the state half way is as good as the state itself: nothing hides elsewhere."""
     source, parameters = case
     stage, group = STAGES[name], parameters.group(name)

@@ -36,17 +36,13 @@ def packets(seed: int, ticks: int = 6, events_a_tick: int = 150) -> list[Packet]
 
 
 def rows(batch: EventBatch) -> list[tuple[int, int, int, bool]]:
-    return list(
-        zip(batch.t_us.tolist(), batch.x_px.tolist(), batch.y_px.tolist(), batch.on.tolist(), strict=True)
-    )
+    return list(zip(batch.t_us.tolist(), batch.x_px.tolist(), batch.y_px.tolist(), batch.on.tolist(), strict=True))
 
 
 @pytest.mark.parametrize(("mode", "logo_mode"), list(itertools.product(MODES, MODES)))
 @pytest.mark.parametrize("logo_threshold_us", [200, 500])
 def test_every_pair_of_filters_equals_two_twins(mode: str, logo_mode: str, logo_threshold_us: int) -> None:
-    parameters = FilterParameters(
-        mode=mode, threshold_us=200, logo_mode=logo_mode, logo_threshold_us=logo_threshold_us
-    )
+    parameters = FilterParameters(mode=mode, threshold_us=200, logo_mode=logo_mode, logo_threshold_us=logo_threshold_us)
     state = stage.start(parameters, SETTING)
     twin, logo_twin = NaiveFilter(mode, 200), NaiveFilter(logo_mode, logo_threshold_us)
     for packet in packets(seed=1):

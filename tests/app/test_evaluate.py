@@ -1,0 +1,95 @@
+"""`spinscope evaluate`: what it shows and writes."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from app.evaluate import (
+    Evaluation,
+    evaluate_suite,
+    print_evaluation,
+    write_csv,
+    write_figures,
+    write_json,
+    write_page,
+)
+from pipeline.errors import ParameterError, RecordingError
+from pipeline.evaluation import SUITES, Bench, Row, Suite, Summary, Table
+from pipeline.evaluation import figures as figures_of_suites
+from pipeline.evaluation.work import Task
+
+
+def measure(bench: Bench, number: int) -> list[Row]:
+    return [{"number": number, "error_px": number / 2, "picture": "QUJD"}]
+
+
+def tables(rows: Sequence[Row]) -> list[Table]:
+    return [
+        Table("Errors [px]", ("what", "error [px]"), [("all", Summary.over(row["error_px"] for row in rows))], "Note.")
+    ]
+
+
+@pytest.fixture
+def evaluation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Evaluation:
+    tasks = [Task(measure, {"number": number}) for number in range(4)]
+    monkeypatch.setitem(
+        SUITES, "made_up", Suite("made_up", "Made up", lambda quick: tasks[: 2 if quick else 4], tables)
+    )
+    return evaluate_suite("made_up", workers=0, cache=tmp_path / "cache")
+
+
+def test_tables_on_screen_keep_their_units(evaluation: Evaluation) -> None:
+    screen = Console(file=io.StringIO(), width=100)
+    print_evaluation(evaluation, screen)
+    shown = screen.file.getvalue()  # type: ignore[attr-defined]
+    assert "Errors [px]" in shown and "0.75 ± 0.65 (0.75)" in shown and evaluation.machine.split()[0] in shown
+
+
+def test_json_csv_and_page(evaluation: Evaluation, tmp_path: Path) -> None:
+    write_json([evaluation], tmp_path / "all.json")
+    found = json.loads((tmp_path / "all.json").read_text())
+    assert found["suite"] == "made_up" and not found["quick"] and len(found["rows"]) == 4
+    assert found["date"] and found["machine"] and found["version"]
+    write_csv(evaluation, tmp_path / "rows.csv")
+    rows = list(csv.DictReader((tmp_path / "rows.csv").open()))
+    assert [row["error_px"] for row in rows] == ["0.0", "0.5", "1.0", "1.5"] and "picture" not in rows[0]
+    write_page([evaluation], tmp_path / "page.md")
+    assert "| all | 0.75 ± 0.65 (0.75) |" in (tmp_path / "page.md").read_text()
+
+
+def test_quick_is_said(evaluation: Evaluation, tmp_path: Path) -> None:
+    quick = evaluate_suite("made_up", quick=True, workers=0, cache=tmp_path / "cache")
+    write_page([quick], tmp_path / "page.md")
+    assert len(quick.report.rows) == 2 and "thinned" in (tmp_path / "page.md").read_text()
+
+
+def test_figures_in_a_new_folder(evaluation: Evaluation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def drawn(rows: Sequence[Row]) -> dict[str, object]:
+        figure, axes = figures_of_suites._panels(1, 1)
+        figures_of_suites._curve(axes[0, 0], rows, "number", "error_px", "errors")
+        return {"errors": figure}
+
+    monkeypatch.setitem(figures_of_suites.DRAWINGS, "made_up", drawn)
+    paths = write_figures(evaluation, tmp_path / "new" / "folder")
+    assert [path.name for path in paths] == ["made_up_errors.png", "made_up.csv"]
+    assert sorted(path.name for path in (tmp_path / "new" / "folder").iterdir()) == [
+        "made_up.csv",
+        "made_up_errors.png",
+    ]
+
+
+def test_nonsense(evaluation: Evaluation, tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="there is no suite 'spiner'"):
+        evaluate_suite("spiner", workers=0, cache=tmp_path)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RecordingError, match="no folder"):
+        write_figures(evaluation, tmp_path / "file")
+    with pytest.raises(RecordingError, match="cannot be written"):
+        write_json([evaluation], tmp_path / "file" / "all.json")

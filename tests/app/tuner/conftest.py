@@ -1,0 +1,148 @@
+"""A tuner that answers, on a free port of this machine, in this process."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+import uvicorn
+
+from app.session import Choices
+from app.tuner.serving import _listening_socket
+from app.tuner.web import application
+from app.tuner.workshop import Workshop
+
+PATIENCE_S = 120.0  # the first run on a machine compiles the kernels
+
+
+@dataclass
+class Served:
+    """A server and its workshop, and how to stop it."""
+
+    address: str
+    workshop: Workshop
+    stop: Callable[[], None]
+    clients: list[Client] = field(default_factory=list)
+
+    def open(self, recording: str | None = None) -> Client:
+        """A new page that listens; closed with the server at the latest."""
+        http = httpx.Client(timeout=60.0)
+        answer = http.post(f"{self.address}api/pages", json={"recording": recording})
+        assert answer.status_code == 200, answer.text
+        client = Client(self.address, answer.json(), http)
+        client.listener = threading.Thread(target=client.listen, daemon=True)
+        client.listener.start()
+        self.clients.append(client)
+        return client
+
+    def close(self, client: Client) -> None:
+        """End a page and its threads."""
+        self.clients.remove(client)
+        page = self.workshop.page(client.opening["page"])
+        if page is not None:
+            self.workshop.close_page(page)
+            page.join(10)
+        client.listener.join(10)
+        client.http.close()
+
+
+def served(path: Path, port: int = 0) -> Served:
+    """Start serving a recording."""
+    workshop = Workshop(path, Choices())
+    listening = _listening_socket(port)
+    config = uvicorn.Config(application(workshop), log_level="error", timeout_graceful_shutdown=2)
+    server = uvicorn.Server(config)
+    thread = threading.Thread(target=lambda: server.run([listening]), daemon=True)
+    thread.start()
+
+    def stop() -> None:
+        for client in list(made.clients):
+            made.close(client)
+        workshop.close()
+        server.should_exit = True
+        thread.join(10)
+        listening.close()
+
+    made = Served(f"http://127.0.0.1:{listening.getsockname()[1]}/", workshop, stop)
+    return made
+
+
+@pytest.fixture(scope="session")
+def flight(samples: Path) -> Path:
+    """The default sample."""
+    return samples / "flight_fast_top.h5"
+
+
+@pytest.fixture(scope="session")
+def tuner(flight: Path) -> Iterator[Served]:
+    """A tuner on the default sample."""
+    made = served(flight)
+    yield made
+    made.stop()
+
+
+@dataclass
+class Client:
+    """A page without a browser: asks, listens, fetches."""
+
+    address: str
+    opening: dict[str, Any]
+    http: httpx.Client
+    serial: int = 0
+    messages: list[dict[str, Any]] = field(default_factory=list)
+    listener: threading.Thread = field(default_factory=threading.Thread)
+    _arrived: threading.Condition = field(default_factory=threading.Condition)
+
+    def path(self, rest: str) -> str:
+        return f"{self.address}api/pages/{self.opening['page']}/{rest}"
+
+    def listen(self) -> None:
+        """Gather the messages until the server ends them."""
+        with httpx.stream("GET", self.path("messages"), timeout=None) as stream:
+            for line in stream.iter_lines():
+                if line.startswith("data: "):
+                    with self._arrived:
+                        self.messages.append(json.loads(line.removeprefix("data: ")))
+                        self._arrived.notify_all()
+
+    def wish(self, parameters: dict[str, Any] | None = None, **more: Any) -> dict[str, Any]:
+        """A run request of the next serial."""
+        self.serial += 1
+        start_us, end_us = self.opening["recording"]["clip_us"]
+        wish = {"serial": self.serial, "parameters": parameters or {}, "start_us": start_us, "end_us": end_us}
+        return {**wish, **more}
+
+    def run(self, parameters: dict[str, Any] | None = None, **more: Any) -> dict[str, Any]:
+        """Ask for a run and wait for its end; the last message on it."""
+        wish = self.wish(parameters, **more)
+        answer = self.http.post(self.path("run"), json=wish)
+        assert answer.status_code == 202, answer.text
+        return self.wait("run", lambda m: m["serial"] == wish["serial"] and m["state"] in ("done", "failed"))
+
+    def wait(self, kind: str, holds: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+        """The first message of a kind for which something holds."""
+
+        def found() -> list[dict[str, Any]]:
+            return [message for message in self.messages if message["kind"] == kind and holds(message)]
+
+        with self._arrived:
+            assert self._arrived.wait_for(lambda: bool(found()), PATIENCE_S), self.messages[-3:]
+            return found()[0]
+
+    def post(self, rest: str, **content: Any) -> httpx.Response:
+        """Any other request of the page."""
+        return self.http.post(self.path(rest), json=content)
+
+
+@pytest.fixture
+def client(tuner: Served) -> Iterator[Client]:
+    """A new page on the default sample."""
+    made = tuner.open()
+    yield made
+    tuner.close(made)

@@ -1,0 +1,298 @@
+"""The server without a browser: runs, what is refused, two pages, presets, exports."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import shlex
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from click.testing import CliRunner
+from rerun.chunk import RrdReader
+
+from app.cli import cli
+from app.session import Choices
+from app.tuner.bench import Bench
+from pipeline.chain import STAGES, Parameters
+from pipeline.stages import logo
+
+from .conftest import Client, Served
+
+
+def stages_run(done: dict[str, Any]) -> set[str]:
+    """The stages that had to be computed for this answer."""
+    return {stage for stage, ms in done["stages"].items() if ms > 0 and stage in STAGES}
+
+
+def test_a_run_gives_a_picture_that_rerun_can_read_and_numbers_near_the_truth(client: Client, tmp_path: Path) -> None:
+    done = client.run()
+    assert done["state"] == "done"
+    picture = client.http.get(client.path(f"pictures/{done['recording']}"))
+    assert picture.status_code == 200
+    path = tmp_path / "run.rrd"
+    path.write_bytes(picture.content)
+    entities = {chunk.entity_path for chunk in RrdReader(path).stream()}
+    assert {"/image/events", "/image/surface", "/plots/x/kalman", "/compare"} <= entities
+    shot = done["measures"]["shots"][0]
+    assert shot["spin"]["triplet"]["error_rps"] < 2.0
+    assert done["measures"]["tracked_share"] > 0.8
+
+
+@pytest.mark.parametrize(
+    ("stage", "field", "value"),
+    [
+        ("filter", "threshold_us", 4000),
+        ("surface", "k_px", 8),
+        ("surface", "cleaning", "off"),
+        ("track", "coast_us", 25_000),
+        ("logo", "pad_px", 3.25),
+        ("rate", "ema_us", 2500),
+        ("flow", "reach_px", 3.5),
+        ("spin", "triplet_solve", "paper"),
+    ],
+)
+def test_a_change_runs_its_stage_and_those_below_and_going_back_runs_nothing(
+    client: Client, stage: str, field: str, value: Any
+) -> None:
+    client.run()
+    before = getattr(Parameters().group(stage), field)
+    other = value if value != before else "least_squares"
+    changed = client.run({stage: {field: other}})
+    order = list(STAGES)
+    assert stages_run(changed) <= set(order[order.index(stage) :])
+    assert stage in stages_run(changed) or changed["measures"] is not None
+    back = client.run()
+    assert stages_run(back) == set()
+
+
+def test_frames_that_would_not_fit_are_refused(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.tuner.bench.MOST_FRAMES_BYTES", 30 * 1280 * 720)
+    answer = client.http.post(client.path("run"), json=client.wish({"track": {"tick_us": 1000}}))
+    assert answer.status_code == 400 and "frames of this clip" in answer.json()["error"]
+
+
+def test_the_newest_wish_wins_and_an_older_one_is_refused(client: Client) -> None:
+    client.run()
+    old = client.wish({"logo": {"pad_px": 4.0}})
+    new = client.wish({"logo": {"pad_px": 5.0}})
+    assert client.http.post(client.path("run"), json=new).status_code == 202
+    assert client.http.post(client.path("run"), json=old).status_code == 409
+    client.wait("run", lambda m: m["serial"] == new["serial"] and m["state"] == "done")
+    assert not [m for m in client.messages if m["serial"] == old["serial"]]
+
+
+def test_a_burst_of_changes_ends_with_the_last_one(client: Client) -> None:
+    wishes = [client.wish({"surface": {"k_px": k}}) for k in range(3, 15)]
+    for wish in wishes:
+        assert client.http.post(client.path("run"), json=wish).status_code == 202
+    last = client.wait("run", lambda m: m["serial"] == wishes[-1]["serial"] and m["state"] == "done")
+    assert last["state"] == "done"
+    finished = {m["serial"] for m in client.messages if m["state"] == "done"}
+    assert wishes[-1]["serial"] in finished
+
+
+def test_two_pages_on_one_process_do_not_disturb_each_other(tuner: Served) -> None:
+    one, two = tuner.open(), tuner.open()
+    assert one.opening["page"] != two.opening["page"]
+    first, second = one.wish({"logo": {"pad_px": 1.5}}), two.wish({"logo": {"pad_px": 6.5}})
+    one.http.post(one.path("run"), json=first)
+    two.http.post(two.path("run"), json=second)
+    ends = [c.wait("run", lambda m: m["state"] == "done") for c in (one, two)]
+    events = [end["measures"]["logo_events"] for end in ends]
+    assert events[0] > events[1]
+    assert two.http.get(two.path(f"pictures/{ends[0]['recording']}")).status_code == 404
+
+
+def test_a_and_b_are_in_one_recording_with_a_table_of_what_differs(client: Client, tmp_path: Path) -> None:
+    done = client.run({"logo": {"pad_px": 5.0}}, pinned={})
+    assert done["differs"] == [["logo.pad_px", Parameters().logo.pad_px, 5.0]]
+    assert done["pinned_measures"]["logo_events"] > done["measures"]["logo_events"]
+    assert set(done["pinned_measures"]["stage_ms"]) == set(STAGES)
+    path = tmp_path / "ab.rrd"
+    path.write_bytes(client.http.get(client.path(f"pictures/{done['recording']}")).content)
+    chunks = list(RrdReader(path).stream())
+    entities = {chunk.entity_path for chunk in chunks}
+    assert {"/image/surface", "/A/image/surface", "/plots/spin/triplet", "/A/plots/spin/triplet"} <= entities
+    batches = [chunk.to_record_batch() for chunk in chunks if chunk.entity_path == "/A/plots/x/kalman"]
+    names = [b.column(i)[0].as_py()[0] for b in batches for i, n in enumerate(b.schema.names) if n.endswith(":names")]
+    assert "A: " in " ".join(names)
+
+
+REFUSED: list[tuple[dict[str, Any], str]] = [
+    ({"parameters": {"logo": {"pad_px": -1}}}, "out of range"),
+    ({"parameters": {"logo": {"pd_px": 1}}}, "did you mean pad_px"),
+    ({"parameters": {"lgo": {}}}, "there is no stage"),
+    ({"parameters": {"logo": 3}}, "valid dictionary"),
+    ({"parameters": {"logo": {"pad_px": 10**400}}}, "too large"),
+    ({"parameters": {"logo": {"pad_px": [1]}}}, "not a number"),
+    ({"parameters": {"logo": {"pad_px": True}}}, "not a number"),
+    ({"start_us": 90_000, "end_us": 1_000}, "no part of the recording"),
+    ({"start_us": -5, "end_us": 10**9}, "no part of the recording"),
+    ({"start_us": 1.5}, "integer"),
+    ({"serial": -1}, "greater than or equal to 0"),
+    ({"unknown": 1}, "Extra inputs"),
+]
+
+
+@pytest.mark.parametrize(("content", "said"), REFUSED, ids=[said for _, said in REFUSED])
+def test_a_bad_request_gets_one_line_and_changes_nothing(client: Client, content: dict[str, Any], said: str) -> None:
+    client.run()
+    wish = {**client.wish(), **content}
+    answer = client.http.post(client.path("run"), json=wish)
+    assert 400 <= answer.status_code < 500
+    error = answer.json()["error"]
+    assert said in error and "\n" not in error and len(error) < 500
+    assert client.run()["stages"].keys() and stages_run(client.run()) == set()
+
+
+@pytest.mark.parametrize(
+    "text", ['{"serial": 1, "parameters": {"logo": {"pad_px": NaN}}, "start_us": 5, "end_us": 95703}']
+)
+def test_not_a_number_is_refused(client: Client, text: str) -> None:
+    answer = client.http.post(client.path("run"), content=text, headers={"content-type": "application/json"})
+    assert answer.status_code == 400 and "not a number" in answer.json()["error"]
+
+
+def test_strangers_are_turned_away(tuner: Served) -> None:
+    page = f"{tuner.address}api/pages"
+    assert httpx.post(page, json={}, headers={"origin": "http://elsewhere.example"}).status_code == 403
+    assert httpx.post(page, json={}, headers={"origin": "null"}).status_code == 403
+    assert httpx.post(page, json={}, headers={"sec-fetch-site": "cross-site"}).status_code == 403
+    assert httpx.get(tuner.address, headers={"host": "elsewhere.example"}).status_code == 421
+    assert httpx.post(page, content="{}", headers={"content-type": "text/plain"}).status_code == 415
+    assert httpx.post(page, json={"recording": "x" * 300_000}).status_code == 413
+    assert (
+        httpx.post(page, content=iter([b"x" * 200_000] * 3), headers={"content-type": "application/json"}).status_code
+        == 413
+    )
+    assert httpx.post(page, content="{", headers={"content-type": "application/json"}).status_code == 422
+    assert httpx.get(f"{tuner.address}api/pages/none/recording").status_code == 404
+    assert httpx.get(f"{tuner.address}nothing").status_code == 404
+    assert httpx.get(f"{tuner.address}static/../web.py").status_code == 404
+    assert httpx.get(f"{tuner.address}static/%2e%2e/web.py").status_code == 404
+    own = {"origin": tuner.address.rstrip("/"), "sec-fetch-site": "same-origin"}
+    assert httpx.post(page, json={}, headers=own).status_code == 200
+
+
+@pytest.mark.parametrize("name", ["../README.md", "/etc/passwd", "nothing.h5", "..", "", "a/../flight_back.h5x"])
+def test_nothing_outside_the_folder_is_opened(tuner: Served, name: str) -> None:
+    answer = httpx.post(f"{tuner.address}api/pages", json={"recording": name})
+    assert answer.status_code == 400 and "in the opened folder" in answer.json()["error"]
+
+
+def test_the_page_fetches_nothing_from_elsewhere(tuner: Served) -> None:
+    index = httpx.get(tuner.address)
+    assert index.status_code == 200
+    policy = index.headers["content-security-policy"]
+    assert "default-src 'self'" in policy and "http" not in policy
+    static = Path(__file__).parents[3] / "app/tuner/static"
+    for path in static.iterdir():
+        text = path.read_text(encoding="utf-8").replace("http://www.w3.org/", "")
+        assert "http://" not in text and "https://" not in text, path
+        assert httpx.get(f"{tuner.address}static/{path.name}").status_code == 200
+
+
+def test_the_viewer_is_served_with_its_class_and_its_program(tuner: Served) -> None:
+    version = httpx.post(f"{tuner.address}api/pages", json={}).json()["viewer"]
+    script = httpx.get(f"{tuner.address}rerun/{version}/widget.js")
+    assert script.headers["content-type"].startswith("text/javascript")
+    assert script.text.rstrip().endswith("export { WebViewer };")
+    with httpx.stream("GET", f"{tuner.address}rerun/{version}/re_viewer_bg.wasm") as program:
+        assert program.headers["content-type"] == "application/wasm"
+        assert next(program.iter_raw())[:4] == b"\0asm"
+
+
+def test_a_stage_that_raises_says_so_and_the_last_good_state_stays(
+    client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    good = client.run()
+
+    def broken(*_: Any) -> None:
+        raise ValueError("out of order")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(logo, "step", broken)
+        bad = client.run({"logo": {"pad_px": 7.75}})
+    assert bad["state"] == "failed"
+    assert bad["error"].startswith("logo failed") or "out of order" in bad["error"]
+    assert client.http.get(client.path(f"pictures/{good['recording']}")).status_code == 200
+    assert client.run({"logo": {"pad_px": 7.75}})["state"] == "done"
+
+
+def test_presets_go_out_as_toml_and_come_back(client: Client) -> None:
+    settings = {"logo": {"pad_px": 4.5}, "flow": {"t_acc_from": "fixed", "t_acc_us": 1800}}
+    written = client.post("presets/write", parameters=settings).json()
+    read = client.post("presets/read", text=written["toml"]).json()["parameters"]
+    assert read == Parameters().with_values(settings).as_dict()
+    for text in ("[logo\npad_px = 1", "[logo]\npad_px = 1e9", "[nothing]\na = 1", "logo = 3"):
+        answer = client.post("presets/read", text=text)
+        assert answer.status_code == 400 and answer.json()["error"]
+    assert client.post("presets/read", text="#" * 200_000).status_code in (413, 422)
+
+
+def test_the_paper_preset_leaves_the_set_up_alone(client: Client) -> None:
+    paper = client.opening["presets"]["paper"]
+    opened_with = client.opening["presets"]["opened"]
+    assert paper["camera"] == opened_with["camera"] and paper["track"]["ball"] == opened_with["track"]["ball"]
+    assert paper["filter"]["logo_mode"] == "stc_cut_trail"
+
+
+def test_the_command_line_gives_the_same_numbers(client: Client) -> None:
+    done = client.run({"logo": {"pad_px": 4.0}})
+    assert done["state"] == "done"
+    mine = client.http.get(client.path("export/results.json")).json()
+    command = client.post("presets/write", parameters={"logo": {"pad_px": 4.0}}).json()["command"]
+    words = shlex.split(command)
+    assert words[:2] == ["spinscope", "analyze"]
+    answer = CliRunner().invoke(cli, [*words[1:], "--json", "-"])
+    theirs = json.loads(answer.stdout)
+    assert theirs["shots"] == mine["shots"]
+    assert theirs["parameters"] == mine["parameters"]
+
+
+def test_results_go_out_as_tables_and_as_a_recording(client: Client, tmp_path: Path) -> None:
+    assert client.http.get(client.path("export/results.json")).status_code == 409
+    client.run()
+    spins = list(csv.DictReader(io.StringIO(client.http.get(client.path("export/spins.csv")).text)))
+    assert {row["method"] for row in spins} >= {"triplet", "normal_flow"}
+    track = list(csv.DictReader(io.StringIO(client.http.get(client.path("export/track.csv")).text)))
+    assert len(track) > 10 and float(track[0]["radius_px"]) > 5
+    answer = client.http.get(client.path("export/run.rrd"))
+    assert 'filename="flight_fast_top.rrd"' in answer.headers["content-disposition"]
+    path = tmp_path / "run.rrd"
+    path.write_bytes(answer.content)
+    assert {chunk.entity_path for chunk in RrdReader(path).stream()} >= {"/image/events"}
+    assert client.http.get(client.path("export/nothing")).status_code == 404
+
+
+def test_a_fixed_ball_is_found_and_its_picture_shown(tuner: Served) -> None:
+    client = tuner.open("spinner_ball1_top.h5")
+    start_us, end_us = client.opening["recording"]["clip_us"]
+    picture = client.http.get(client.path(f"events.png?start_us={start_us}&end_us={end_us}"))
+    assert picture.content.startswith(b"\x89PNG")
+    found = client.post("find_ball", parameters={}).json()
+    # Where the ball is: the samples' README.
+    assert abs(found["fixed_x_px"] - 663.75) < 3 and abs(found["fixed_y_px"] - 272.39) < 3
+    done = client.run({"track": {"ball": "fixed", **found}})
+    assert done["measures"]["shots"]
+
+
+def test_a_long_recording_is_worked_on_clip_by_clip(flight: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.tuner.bench.CLIP_FRAMES_BYTES", 10 * 1280 * 720)
+    bench = Bench.open(flight, Choices())
+    assert bench.is_long
+    start_us, end_us = bench.first_clip_us()
+    assert end_us - start_us <= bench.longest_us == 50_000
+    for share in bench.find_shots(bench.session.parameters):
+        last = share
+    assert last == 1.0
+    assert len(bench.found) == 1
+    found_start_us, found_end_us = bench.found[0]
+    assert found_end_us - found_start_us > 80_000
+    clip = bench.clip(start_us, end_us)
+    ticks = [step.tick for step in clip.run(bench.session.parameters)]
+    assert ticks[0].packet.start_us <= start_us and ticks[-1].packet.end_us == end_us

@@ -1,0 +1,169 @@
+"""Tuning curve, search, biases: what they compute, and that they can be stopped."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.simulate import simulate_to_file
+from app.tuner.controls import scale_of, sections
+from app.tuner.curve import values_over
+from app.tuner.search import REFUSED, cost_of
+from pipeline.chain import Parameters
+from pipeline.errors import ParameterError
+
+from .conftest import Client, served
+
+
+def test_every_parameter_has_one_control() -> None:
+    names = [control["name"] for section in sections() for control in section["controls"]]
+    wanted = [f"{group}.{field}" for group, fields in Parameters().as_dict().items() for field in fields]
+    assert sorted(names) == sorted(wanted)
+    stages = [section["title"] for section in sections()][:8]
+    assert stages[0] == "Filter" and stages[-1] == "Spin"
+
+
+@pytest.mark.parametrize("name", ["logo.pad_px", "filter.threshold_us", "surface.k_px", "track.coast_us"])
+def test_the_values_of_a_curve_span_the_range(name: str) -> None:
+    stage, field = name.split(".")
+    tunable = Parameters().group(stage).tunables()[field]
+    values = values_over(tunable, name, None, None, 9)
+    assert values[0] == tunable.low and values[-1] == pytest.approx(tunable.high)
+    assert values == sorted(set(values))
+    assert scale_of(tunable) in ("linear", "logarithmic", "cubic")
+    for value in values:
+        Parameters().with_values({stage: {field: value}})
+
+
+def test_a_curve_over_choices_takes_all_of_them_and_a_wrong_range_is_refused() -> None:
+    tunable = Parameters().group("filter").tunables()["mode"]
+    assert values_over(tunable, "filter.mode", None, None, 5) == list(tunable.choices)
+    pad = Parameters().group("logo").tunables()["pad_px"]
+    for low, high, points in ((3.0, 2.0, 5), (0.0, 1e9, 5), (0.0, 5.0, 1), (0.0, 5.0, 10_000)):
+        with pytest.raises(ParameterError):
+            values_over(pad, "logo.pad_px", low, high, points)
+
+
+def test_a_curve_tells_every_point_and_agrees_with_single_runs(client: Client) -> None:
+    request = {"parameters": {}, "name": "logo.pad_px", "low": 2.0, "high": 6.0, "points": 3}
+    assert client.post("curve", **request).status_code == 202
+    done = client.wait("curve", lambda m: m["state"] == "done")
+    assert [point["value"] for point in done["points"]] == [2.0, 4.0, 6.0]
+    alone = client.run({"logo": {"pad_px": 4.0}})["measures"]
+    assert done["points"][1]["logo_events"] == alone["logo_events"]
+    assert done["points"][1]["spin"] == alone["shots"][0]["spin"]
+
+
+def test_a_curve_can_be_cancelled(client: Client) -> None:
+    client.post("curve", parameters={}, name="surface.k_px", points=31)
+    client.wait("curve", lambda m: m["state"] == "running")
+    assert client.post("cancel", kind="curve").status_code == 200
+    client.wait("curve", lambda m: m["state"] == "cancelled")
+    assert client.post("cancel", kind="nothing").status_code == 422
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        {"names": []},
+        {"names": ["logo.nothing"]},
+        {"names": ["camera.up"]},
+        {"names": ["logo.pad_px"], "objective": "luck"},
+        {"names": ["logo.pad_px"], "trials": 0},
+        {"names": ["track.fixed_x_px"] * 9},
+    ],
+)
+def test_a_search_that_makes_no_sense_is_refused(client: Client, content: dict[str, Any]) -> None:
+    request = {"parameters": {}, "names": ["logo.pad_px"], "objective": "truth", "trials": 3, **content}
+    answer = client.post("search", **request)
+    if content["names"][:1] == ["track.fixed_x_px"]:
+        assert answer.status_code == 202  # one parameter named often is one parameter
+        client.post("cancel", kind="search")
+        return
+    assert answer.status_code == 400 and answer.json()["error"]
+
+
+def test_a_search_never_ends_worse_than_it_began_and_tells_the_best_so_far(client: Client) -> None:
+    start = {"logo": {"pad_px": 9.0}}
+    names = ["logo.pad_px", "flow.reach_px"]
+    client.post("search", parameters=start, names=names, objective="truth", trials=6)
+    done = client.wait("search", lambda m: m["state"] in ("done", "failed"))
+    assert done["state"] == "done", done
+    assert len(done["trials"]) == 6 and done["best"] == min(done["trials"]) <= done["trials"][0]
+    values = {name.split(".")[0]: {} for name in names}
+    for name, value in done["values"].items():
+        stage, field = name.split(".")
+        values[stage][field] = value
+    measured = client.run({**start, **values})["measures"]
+    assert cost_of(measured, "truth") == pytest.approx(done["best"])
+
+
+def test_no_answer_is_the_worst_objective() -> None:
+    assert cost_of({"shots": []}, "truth") == REFUSED
+    assert cost_of({"shots": [{"logo_events": 0, "best": None, "spin": {}}]}, "stated") == REFUSED
+
+
+def test_biases_of_a_finished_recording_are_locked_and_say_why(client: Client) -> None:
+    state = client.opening["biases"]
+    assert "carries no scene" in state["locked"]
+    answer = client.post("biases", biases={"diff_on": 10})
+    assert answer.status_code == 400 and "carries no scene" in answer.json()["error"]
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A short spinner on a small sensor, with its scene."""
+    path = tmp_path_factory.mktemp("biases") / "spinner.h5"
+    simulate_to_file("spinner", path, duration_ms=30.0, width_px=320, height_px=240)
+    return path
+
+
+def test_a_simulated_scene_is_taken_again_with_other_biases(simulated: Path) -> None:
+    tuner = served(simulated)
+    try:
+        client = tuner.open()
+        assert client.opening["biases"]["locked"] is None
+        before = client.opening["recording"]["events"]
+        assert client.post("biases", biases={"diff_on": 1000}).status_code == 400
+        assert client.post("biases", biases={"nothing": 1}).status_code == 400
+        biases = {**client.opening["biases"]["values"], "diff_on": 120, "diff_off": 150}
+        assert client.post("biases", biases=biases).status_code == 202
+        client.wait("biases", lambda m: m["state"] == "done")
+        again = client.http.get(client.path("recording")).json()
+        assert again["recording"]["events"] < 0.9 * before  # higher thresholds, fewer events
+        assert again["biases"]["values"] == biases
+        client.post("bias_curve", biases=biases, name="diff_on", points=3)
+        curve = client.wait("bias_curve", lambda m: m["state"] in ("done", "failed"))
+        assert curve["state"] == "done", curve
+        noise = [point["noise_on_hz"] for point in curve["points"]]
+        assert noise[0] > noise[1] > noise[2]
+        text = client.http.post(f"{tuner.address}api/biases/write", json={"biases": biases}).json()["text"]
+        read = client.http.post(f"{tuner.address}api/biases/read", json={"text": text}).json()
+        assert read["biases"] == biases
+        assert client.http.post(f"{tuner.address}api/biases/read", json={"text": "x"}).status_code == 400
+    finally:
+        tuner.stop()
+
+
+def test_recordings_with_bias_files_beside_them_give_measured_rates(
+    samples: Path, tmp_path: Path, client: Client
+) -> None:
+    for value in (10, 60):
+        (tmp_path / f"take{value}.h5").symlink_to(samples / "flight_fast_top.h5")
+        (tmp_path / f"take{value}.bias").write_text(f"{value} % bias_diff_on\n0 % bias_fo\n", encoding="utf-8")
+    tuner = served(tmp_path / "take10.h5")
+    try:
+        page = tuner.open()
+        assert page.opening["biases"]["values"]["diff_on"] == 10
+        page.post("bias_curve", biases=page.opening["biases"]["values"], name="diff_on")
+        done = page.wait("bias_curve", lambda m: m["state"] in ("done", "failed"))
+        assert done["state"] == "done", done
+        assert [point["biases"]["diff_on"] for point in done["points"]] == [10, 60]
+        assert all(point["ball_on_hz"] > 0 and point["noise_on_hz"] > 0 for point in done["points"])
+    finally:
+        tuner.stop()
+    client.post("bias_curve", biases={}, name="diff_on")
+    failed = client.wait("bias_curve", lambda m: m["state"] == "failed")
+    assert "no recording of this folder" in failed["error"]

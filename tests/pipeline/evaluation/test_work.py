@@ -1,0 +1,151 @@
+"""Tasks: kept results, interruption, who does the work."""
+
+from __future__ import annotations
+
+import sys
+import types
+from collections.abc import Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from pipeline.chain import Parameters
+from pipeline.errors import ParameterError, RecordingError
+from pipeline.evaluation.tables import Row
+from pipeline.evaluation.work import Bench, Task, _make_room, executor, run, write_whole
+
+CALLS: list[int] = []
+
+
+def square(bench: Bench, number: int) -> list[Row]:
+    CALLS.append(number)
+    return [{"number": number, "square": number * number}]
+
+
+def failing(bench: Bench) -> list[Row]:
+    raise ParameterError("no")
+
+
+@pytest.fixture(autouse=True)
+def no_calls() -> Iterator[None]:
+    CALLS.clear()
+    yield
+    CALLS.clear()
+
+
+def squares(count: int, keep: bool = True) -> list[Task]:
+    return [Task(square, {"number": number}, keep) for number in range(count)]
+
+
+def test_rows_come_in_the_order_of_tasks(tmp_path: Path) -> None:
+    shares: list[float] = []
+    with ThreadPoolExecutor(3) as pool:
+        rows = run(squares(20), Bench(tmp_path), pool, lambda share, what: shares.append(share))
+    assert [row["square"] for row in rows] == [n * n for n in range(20)]
+    assert shares == sorted(shares) and shares[-1] == 1.0
+
+
+def test_interrupted_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    def stop(share: float, what: str) -> None:
+        if share == 0.75:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(squares(4), Bench(tmp_path), None, stop)
+    assert CALLS == [0, 1, 2]
+    rows = run(squares(4), Bench(tmp_path), None)
+    assert CALLS == [0, 1, 2, 3]
+    assert [row["square"] for row in rows] == [0, 1, 4, 9]
+
+
+def test_error_of_a_task_stops_the_run_and_keeps_what_is_done(tmp_path: Path) -> None:
+    with ThreadPoolExecutor(1) as pool, pytest.raises(ParameterError, match="no"):
+        run([*squares(1), Task(failing), *squares(3)[1:]], Bench(tmp_path), pool)
+    assert len(list((tmp_path / "results").iterdir())) >= 1
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def test_other_parameters_are_other_results(tmp_path: Path) -> None:
+    run(squares(1), Bench(tmp_path), None)
+    run(squares(1), Bench(tmp_path, Parameters().with_assignments(["logo.pad_px=3"])), None)
+    assert CALLS == [0, 0]
+
+
+def test_damaged_result_is_made_anew(tmp_path: Path) -> None:
+    run(squares(1), Bench(tmp_path), None)
+    (kept,) = (tmp_path / "results").iterdir()
+    kept.write_text("[{")
+    assert run(squares(1), Bench(tmp_path), None) == [{"number": 0, "square": 0}]
+    assert CALLS == [0, 0]
+
+
+def test_times_and_runs_without_a_cache_are_not_kept(tmp_path: Path) -> None:
+    for _ in range(2):
+        run(squares(1, keep=False), Bench(tmp_path), None)
+        run(squares(1), Bench(None), None)
+    assert CALLS == [0] * 4
+    assert not list(tmp_path.iterdir())
+
+
+def test_local_processes_do_the_work(tmp_path: Path) -> None:
+    with executor(1) as by:
+        rows = run(squares(2), Bench(tmp_path), by)
+    assert [row["square"] for row in rows] == [0, 1]
+    assert not CALLS  # not in this process
+
+
+def test_no_workers_means_this_process() -> None:
+    with executor(0) as by:
+        assert by is None
+
+
+def test_cluster_without_dask_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(ParameterError, match="needs Dask"), executor(cluster="tcp://nowhere:1"):
+        pass
+
+
+def test_cluster_that_does_not_answer_and_one_that_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Client:
+        def __init__(self, address: str, timeout: float) -> None:
+            if "nowhere" in address:
+                raise OSError("timed out")
+
+        def __enter__(self) -> Client:
+            return self
+
+        def __exit__(self, *_: object) -> None:
+            pass
+
+        def get_executor(self) -> Executor:
+            return ThreadPoolExecutor(1)
+
+    monkeypatch.setitem(sys.modules, "distributed", types.SimpleNamespace(Client=Client))
+    with (
+        pytest.raises(ParameterError, match="no Dask cluster answers at tcp://nowhere:1"),
+        executor(cluster="tcp://nowhere:1"),
+    ):
+        pass
+    with executor(cluster="tcp://here:1") as by:
+        assert [row["square"] for row in run(squares(3), Bench(None), by)] == [0, 1, 4]
+
+
+def test_place_that_cannot_be_written_gets_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RecordingError, match="cannot be written") as caught:
+        write_whole(tmp_path / "file" / "below.json", "text")
+    assert "\n" not in str(caught.value)
+
+
+def test_cache_keeps_to_its_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import os
+
+    monkeypatch.setattr("pipeline.evaluation.work.CACHE_BYTES", 250)
+    (tmp_path / "results").mkdir()
+    for age in range(4):
+        file = tmp_path / "results" / str(age)
+        file.write_bytes(b"." * 100)
+        os.utime(file, (1000 - age, 1000 - age))
+    _make_room(tmp_path)
+    assert sorted(path.name for path in (tmp_path / "results").iterdir()) == ["0", "1"]
