@@ -286,6 +286,44 @@ def simulate(
     )
 
 
+@cli.command()
+@click.argument("suites", nargs=-1, required=True, metavar="SUITE...")
+@click.option("--quick", is_flag=True, help="A thinned suite, about ten seconds.")
+@click.option("--json", "output", type=click.Path(path_type=Path), metavar="OUT", help="Write JSON, one suite a line.")
+@click.option("--figures", type=click.Path(path_type=Path), metavar="DIR", help="Write figures (PNG) and rows (CSV).")
+@click.option("--page", type=click.Path(path_type=Path), metavar="FILE.md", help="Write the tables as a page.")
+@click.option("--cluster", metavar="ADDRESS", help="Scheduler of a running Dask cluster that does the work.")
+@click.option("--workers", type=click.IntRange(0), help="Processes on this machine; one a core by default.")
+def evaluate(
+    suites: tuple[str, ...],
+    quick: bool,
+    output: Path | None,
+    figures: Path | None,
+    page: Path | None,
+    cluster: str | None,
+    workers: int | None,
+) -> None:
+    """Run the paper's experiments on simulated recordings, next to the paper's own numbers.
+
+    Suites: detector, spinner, thrower, frames, biases, filters, runtime. Recordings and results are kept, so that an
+    interrupted run goes on where it stopped.
+    """
+    from . import evaluate as running
+
+    done = []
+    for suite in suites:
+        with ProgressBar() as bar:
+            done.append(running.evaluate_suite(suite, quick=quick, workers=workers, cluster=cluster, on_progress=bar))
+        running.print_evaluation(done[-1])
+        if figures:
+            for path in running.write_figures(done[-1], figures):
+                note(f"wrote {path}")
+    if output:
+        running.write_json(done, output)
+    if page:
+        running.write_page(done, page)
+
+
 def _view(recording: Path, save: Path | None, native: bool, layout: str, choices: Choices) -> None:
     with ProgressBar() as bar:
         session = Session.open(recording, choices, bar)

@@ -30,7 +30,7 @@ class Workshop:
     """
 
     def __init__(self, path: Path, choices: Choices) -> None:
-        self.path = path.resolve()
+        self.path = path.absolute()
         self.folder = self.path.parent
         self.drawings = Drawings()
         self._choices = choices
@@ -124,7 +124,7 @@ class Workshop:
             self._scratch = None
 
     def _inside(self, name: str) -> Path:
-        path = (self.folder / name).resolve()
-        if path.parent != self.folder or not path.is_file():
+        path = self.folder / name
+        if not name or Path(name).name != name or not path.is_file():
             raise RecordingError(f"there is no recording {name!r} in the opened folder: choose one of its files")
         return path

@@ -58,7 +58,7 @@ def test_json_csv_and_page(evaluation: Evaluation, tmp_path: Path) -> None:
     assert found["suite"] == "made_up" and not found["quick"] and len(found["rows"]) == 4
     assert found["date"] and found["machine"] and found["version"]
     write_csv(evaluation, tmp_path / "rows.csv")
-    rows = list(csv.DictReader((tmp_path / "rows.csv").open()))
+    rows = list(csv.DictReader((tmp_path / "rows.csv").read_text().splitlines()))
     assert [row["error_px"] for row in rows] == ["0.0", "0.5", "1.0", "1.5"] and "picture" not in rows[0]
     write_page([evaluation], tmp_path / "page.md")
     assert "| all | 0.75 ± 0.65 (0.75) |" in (tmp_path / "page.md").read_text()

@@ -270,13 +270,13 @@ def test_results_go_out_as_tables_and_as_a_recording(client: Client, tmp_path: P
 
 
 def test_a_fixed_ball_is_found_and_its_picture_shown(tuner: Served) -> None:
-    client = tuner.open("spinner_ball1_top.h5")
+    client = tuner.open("spinner_ball2_side.h5")
     start_us, end_us = client.opening["recording"]["clip_us"]
     picture = client.http.get(client.path(f"events.png?start_us={start_us}&end_us={end_us}"))
     assert picture.content.startswith(b"\x89PNG")
     found = client.post("find_ball", parameters={}).json()
     # Where the ball is: the samples' README.
-    assert abs(found["fixed_x_px"] - 663.75) < 3 and abs(found["fixed_y_px"] - 272.39) < 3
+    assert abs(found["fixed_x_px"] - 528.43) < 3 and abs(found["fixed_y_px"] - 426.87) < 3
     done = client.run({"track": {"ball": "fixed", **found}})
     assert done["measures"]["shots"]
 

@@ -44,8 +44,8 @@ def test_unknown_suite() -> None:
 def test_every_suite_has_figures_and_distinct_full_tasks() -> None:
     assert set(DRAWINGS) == set(SUITES)
     for suite in SUITES.values():
-        every = [(task.function.__qualname__, repr(task.arguments)) for task in suite.tasks(False)]
-        assert len(set(every)) == len(every) > 3 * len(suite.tasks(True)) / 2
+        every = [(task.function, repr(task.arguments)) for task in suite.tasks(False)]
+        assert len(set(every)) == len(every) > 2 * len(suite.tasks(True))
 
 
 def test_spinner(cache: Path) -> None:
@@ -63,9 +63,9 @@ def test_thrower_and_the_frame_camera_beside_it(cache: Path) -> None:
     assert best and len(errors(best, "axis_error_deg")) == len(best)
     assert max(errors(best, "magnitude_error_rps")) < 8 and max(errors(best, "axis_error_deg")) < 12
     frames = run("frames", cache).rows
-    assert where(frames, method="best") == where(rows, method="best")  # the same flights, not run again
+    assert all(row in rows for row in where(frames, method="best"))  # the same flights, not run again
     rival = where(frames, method="frame")
-    assert len(rival) == len(where(rows, method="best"))
+    assert len(rival) == len(where(frames, method="best")) > 0
     assert max(errors(rival, "magnitude_error_rps")) < 1 and max(errors(rival, "axis_error_deg")) < 8
 
 
