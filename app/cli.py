@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import click
 
-from pipeline.errors import SpinscopeError
+from pipeline.errors import ParameterError, SpinscopeError
 
 from .session import DEFAULT_SAMPLE, Choices, Session
 from .simulate import KINDS, SimulateParameters
@@ -136,15 +137,15 @@ def cli(context: click.Context) -> None:
 @cli.command()
 @click.argument("recording", type=RECORDING)
 @click.option("--sensor", type=SensorSize(), help="Size of the sensor in pixels, where the file does not say it.")
-@click.option("--json", "output", type=click.File("w"), help="Write JSON to this file, - for standard output.")
-def info(recording: Path, sensor: tuple[int, int] | None, output: IO[str] | None) -> None:
+@click.option("--json", "output", type=click.Path(), help="Write JSON to this file, - for standard output.")
+def info(recording: Path, sensor: tuple[int, int] | None, output: str | None) -> None:
     """Say what a recording holds: format, sensor, events, duration, rates, hot pixels, triggers, damage."""
     from .info import information, print_information
 
     with ProgressBar() as bar:
         found = information(recording, sensor, bar)
     if output:
-        output.write(json.dumps(found.as_dict(), allow_nan=False) + "\n")
+        _write(output, json.dumps(found.as_dict(), allow_nan=False) + "\n")
     else:
         print_information(found)
 
@@ -169,6 +170,8 @@ def analyze(recordings: tuple[Path, ...], output: str | None, method: str, choic
     """Find the shots of recordings and estimate their spin."""
     from .analyze import analyze as analyzed
 
+    if output not in (None, "-") and not os.access(Path(str(output)).absolute().parent, os.W_OK):
+        raise ParameterError(f"JSON cannot be written there: choose another place with --json: {output}")
     reports: list[dict[str, Any]] = []
     for recording in recordings:
         try:
@@ -182,9 +185,7 @@ def analyze(recordings: tuple[Path, ...], output: str | None, method: str, choic
     if output is None:
         print_reports(reports)
     else:
-        lines = "".join(json.dumps(report, allow_nan=False) + "\n" for report in reports)
-        with click.open_file(output, "w", encoding="utf-8", atomic=output != "-") as file:
-            file.write(lines)
+        _write(output, "".join(json.dumps(report, allow_nan=False) + "\n" for report in reports))
     if any("error" in report for report in reports):
         sys.exit(2)
 
@@ -322,6 +323,17 @@ def evaluate(
         running.write_json(done, output)
     if page:
         running.write_page(done, page)
+
+
+def _write(output: str, text: str) -> None:
+    """Text to a file, which appears whole or not at all, or to standard output for "-"."""
+    try:
+        with click.open_file(output, "w", encoding="utf-8", atomic=output != "-") as file:
+            file.write(text)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise ParameterError(f"JSON cannot be written ({error.strerror}): choose another place: {output}") from None
 
 
 def _view(recording: Path, save: Path | None, native: bool, layout: str, choices: Choices) -> None:

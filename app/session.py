@@ -173,6 +173,12 @@ class Session:
                 f"each +-{std_px:.1f} px: give --fixed-ball X_PX Y_PX RADIUS_PX where you know better"
             )
         else:
+            x, y, radius = (float(number) for number in fixed_ball)
+            if not (-radius < x < self.source.width_px + radius and -radius < y < self.source.height_px + radius):
+                raise ParameterError(
+                    f"--fixed-ball {x:g} {y:g} {radius:g} lies outside the image of "
+                    f"{self.source.width_px} x {self.source.height_px} px: give X_PX Y_PX RADIUS_PX in pixels"
+                )
             names = ("fixed_x_px", "fixed_y_px", "fixed_radius_px")
             values |= dict(zip(names, fixed_ball, strict=True))
         self.parameters = self.parameters.with_values({"track": values})

@@ -20,7 +20,7 @@ def note(text: str) -> None:
 
 
 class ProgressBar:
-    """A bar on standard error for work that takes longer than a second; calls take (share 0..1, what)."""
+    """A bar on standard error of a terminal for work that takes longer than a second; calls take (share 0..1, what)."""
 
     def __init__(self) -> None:
         self._begin = time.perf_counter()
@@ -37,7 +37,7 @@ class ProgressBar:
 
     def __call__(self, share: float, what: str) -> None:
         if self._bar is None:
-            if time.perf_counter() - self._begin < PATIENCE_S:
+            if time.perf_counter() - self._begin < PATIENCE_S or not sys.stderr.isatty():
                 return
             self._bar = Progress(
                 TextColumn("{task.description}"),

@@ -15,6 +15,7 @@ from pipeline.results import SpinEstimate
 from . import entities as at
 from .rerun_api import Chunk, columns_at, once
 from .run import Run, shown_estimate
+from .stages import PNG_QUICK
 from .still import Sampler, density, disc_directions, sphere, texture_directions, tone, turned
 
 Floats = NDArray[np.float64]
@@ -306,10 +307,13 @@ class _Discs:
 
     def picture(self, painted: _Painted | None) -> bytes:
         """PNG with ON and OFF in their colours."""
-        picture = np.where(self.mask[..., None], DISC, at.BACKGROUND).astype(np.float64)
+        colours = np.tile(DISC.astype(np.float32), (int(self.mask.sum()), 1))
         if painted is not None:
             for density_of, colour in ((painted.on, at.ON), (painted.off, at.OFF)):
                 counts = self.sampler(density_of)
-                picture[self.mask] += tone(counts, _full(counts))[:, None] * (np.array(colour) - DISC)
-        rgb = picture.clip(0, 255).astype(np.uint8)
-        return bytes(cv2.imencode(".png", rgb[..., ::-1])[1])
+                seen = np.flatnonzero(counts)
+                strength = tone(counts[seen], _full(counts))[:, None]
+                colours[seen] += strength * (np.array(colour) - DISC).astype(np.float32)
+        picture = np.full((*self.mask.shape, 3), at.BACKGROUND, np.uint8)
+        picture[self.mask] = colours.clip(0, 255)
+        return bytes(cv2.imencode(".png", picture[..., ::-1], PNG_QUICK)[1])

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from . import LAYOUTS
 from . import entities as at
 from .ball import EYE, path_bounds_m
+from .plots import true_state
 from .run import Run
 from .summary import CARD_PX
 
@@ -211,11 +212,12 @@ def _state_tabs(run: Run) -> rrb.Container:
 
 def _residual(run: Run, name: str) -> rrb.View:
     column = at.QUANTITIES.index(name)
-    widest = np.sqrt(run.variances[:, column])
-    measured = [getattr(tick.track.measured, f"{name}_px", np.nan) for tick in run.ticks] - run.means[:, column]
-    return _plot(
-        f"{at.RESIDUAL}/{name}", f"{name} less Kalman [px]", _range(np.concatenate([widest, -widest, measured]))
-    )
+    deviation, mean = np.sqrt(run.variances[:, column]), run.means[:, column]
+    values = [deviation, -deviation]
+    values.append(np.array([getattr(tick.track.measured, f"{name}_px", np.nan) for tick in run.ticks]) - mean)
+    if run.truth is not None:
+        values.append(true_state(run)[:, column] - mean)
+    return _plot(f"{at.RESIDUAL}/{name}", f"{name} less Kalman [px]", _range(np.concatenate(values)))
 
 
 def _event_count(run: Run) -> rrb.View:

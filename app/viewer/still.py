@@ -35,14 +35,13 @@ def density(normals: Floats) -> NDArray[np.float32]:
     """How often the unit vectors (n, 3) fall in each cell of the cube, smoothed: (CELLS**3,) float32."""
     cells = (_place(normals) + 0.5).astype(np.int64)
     flat = (cells[:, 0] * CELLS + cells[:, 1]) * CELLS + cells[:, 2]
-    counts = np.bincount(flat, minlength=CELLS**3).astype(np.float32).reshape(CELLS, CELLS, CELLS)
-    for axis in range(3):  # weights 1 2 1 along each side
-        earlier, later = np.moveaxis(counts, axis, 0)[:-1], np.moveaxis(counts, axis, 0)[1:]
+    counts = np.bincount(flat, minlength=CELLS**3).astype(np.float32)
+    for stride in (1, CELLS, CELLS * CELLS):  # weights 1 2 1 along each side; the cube's sides are empty
         smooth = 2 * counts
-        np.moveaxis(smooth, axis, 0)[1:] += earlier
-        np.moveaxis(smooth, axis, 0)[:-1] += later
+        smooth[stride:] += counts[:-stride]
+        smooth[:-stride] += counts[stride:]
         counts = smooth
-    whole: NDArray[np.float32] = counts.ravel() / np.float32(64)
+    whole: NDArray[np.float32] = counts / np.float32(64)
     return whole
 
 
@@ -56,21 +55,22 @@ class Sampler:
 
     def __init__(self, directions: Floats) -> None:
         """directions : (..., 3) unit vectors."""
-        place = _place(directions)
+        place = _place(directions.reshape(-1, 3))
         cell = np.floor(place).astype(np.int64)
         part = place - cell
-        self._corners, self._weights = [], []
+        corners, weights = [], []
         for corner in np.ndindex(2, 2, 2):
             at = cell + corner
-            self._corners.append((at[..., 0] * CELLS + at[..., 1]) * CELLS + at[..., 2])
-            self._weights.append(np.prod(np.where(np.array(corner), part, 1 - part), axis=-1))
+            corners.append((at[:, 0] * CELLS + at[:, 1]) * CELLS + at[:, 2])
+            weights.append(np.prod(np.where(np.array(corner), part, 1 - part), axis=-1))
+        self._shape = directions.shape[:-1]
+        self._corners = np.array(corners)
+        self._weights = np.array(weights, np.float32)
 
-    def __call__(self, smooth: NDArray[np.float32]) -> Floats:
+    def __call__(self, smooth: NDArray[np.float32]) -> NDArray[np.float32]:
         """(...) the density in every direction."""
-        found = np.zeros(self._weights[0].shape)
-        for corner, weight in zip(self._corners, self._weights, strict=True):
-            found += weight * smooth[corner]
-        return found
+        found: NDArray[np.float32] = np.einsum("kn,kn->n", self._weights, smooth.take(self._corners))
+        return found.reshape(self._shape)
 
 
 def texture_directions() -> Floats:

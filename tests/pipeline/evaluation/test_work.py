@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import types
 from collections.abc import Iterator
@@ -139,8 +140,6 @@ def test_place_that_cannot_be_written_gets_one_line(tmp_path: Path) -> None:
 
 
 def test_cache_keeps_to_its_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import os
-
     monkeypatch.setattr("pipeline.evaluation.work.CACHE_BYTES", 250)
     (tmp_path / "results").mkdir()
     for age in range(4):
@@ -149,3 +148,19 @@ def test_cache_keeps_to_its_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         os.utime(file, (1000 - age, 1000 - age))
     _make_room(tmp_path)
     assert sorted(path.name for path in (tmp_path / "results").iterdir()) == ["0", "1"]
+
+
+@pytest.mark.filterwarnings("ignore")  # Dask's own
+def test_two_workers_of_a_dask_cluster(tmp_path: Path) -> None:
+    dask = pytest.importorskip("distributed")
+    with (
+        dask.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        executor(cluster=cluster.scheduler_address) as by,
+    ):
+        rows = run([Task(pow_of, {"number": number}) for number in range(6)], Bench(tmp_path), by)
+    assert [row["power"] for row in rows] == [2**n for n in range(6)]
+    assert len({row["process"] for row in rows}) <= 2
+
+
+def pow_of(bench: Bench, number: int) -> list[Row]:
+    return [{"power": 2**number, "process": os.getpid()}]
