@@ -337,14 +337,16 @@ def _write(output: str, text: str) -> None:
 
 
 def _view(recording: Path, save: Path | None, native: bool, layout: str, choices: Choices) -> None:
+    from . import viewer
+
+    if native and not save:
+        viewer.require_display()
     with ProgressBar() as bar:
         session = Session.open(recording, choices, bar)
         session = session.clip_for_viewing(bar)
         ticks, log = session.all_ticks(bar)
         for warning in session.warnings:
             note(f"warning: {warning}")
-        from . import viewer  # Rerun takes a while to load: not before it is needed
-
         if save:
             viewer.save(session, ticks, log.shots, save, layout=layout, no_shot_reason=log.no_shot_reason)
     if save:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 
 import cv2
 import numpy as np
@@ -16,7 +17,7 @@ from . import entities as at
 from .rerun_api import Chunk, columns_at, once
 from .run import Run, shown_estimate
 from .stages import PNG_QUICK
-from .still import Sampler, density, disc_directions, sphere, texture_directions, tone, turned
+from .still import TEXTURE_PX, Sampler, density, disc_directions, sphere, texture_directions, tone, turned
 
 Floats = NDArray[np.float64]
 
@@ -221,12 +222,12 @@ def path_bounds_m(run: Run) -> tuple[Floats, Floats]:
 
 def _painting(run: Run) -> list[Chunk]:
     """The logo's events turned back by the estimate of the moment: on the ball's texture, and flat on two discs."""
-    texels = texture_directions()
-    on_texture = Sampler(texels)
+    on_texture = _texture_sampler()
+    width, height = TEXTURE_PX
     discs: dict[int, _Discs] = {}
     times = [run.start_us]
-    textures = [np.broadcast_to(WHITE.astype(np.uint8), texels.shape).tobytes()]
-    pictures = [_Discs.around(np.array([0.0, 0.0, -1.0])).picture(None)]
+    textures = [np.broadcast_to(WHITE.astype(np.uint8), (height, width, 3)).tobytes()]
+    pictures = [_blank_discs()]
     for index, painted in _painted(run):
         shot = run.ticks[index].track.shot
         assert shot is not None
@@ -236,7 +237,6 @@ def _painting(run: Run) -> list[Chunk]:
         pictures.append(discs[shot].picture(painted))
         textures.append(_texture(painted, on_texture).tobytes())
     t_us = np.array(times)
-    width, height = texels.shape[1], texels.shape[0]
     form = rr.components.ImageFormat(width=width, height=height, color_model="RGB", channel_datatype="U8")
     columns = rr.Mesh3D.columns(albedo_texture_buffer=textures, albedo_texture_format=[form] * len(times))
     return [
@@ -283,6 +283,16 @@ def _full(counts: Floats) -> float:
     """The count that is shown in full colour: what a twentieth of the marked places exceed."""
     marked = counts[counts > 0]
     return float(np.quantile(marked, 0.95)) if marked.size else 0.0
+
+
+@cache
+def _texture_sampler() -> Sampler:
+    return Sampler(texture_directions())
+
+
+@cache
+def _blank_discs() -> bytes:
+    return _Discs.around(np.array([0.0, 0.0, -1.0])).picture(None)
 
 
 def _texture(painted: _Painted, sampler: Sampler) -> NDArray[np.uint8]:

@@ -67,10 +67,10 @@ class Sampler:
         self._corners = np.array(corners)
         self._weights = np.array(weights, np.float32)
 
-    def __call__(self, smooth: NDArray[np.float32]) -> NDArray[np.float32]:
+    def __call__(self, smooth: NDArray[np.float32]) -> Floats:
         """(...) the density in every direction."""
-        found: NDArray[np.float32] = np.einsum("kn,kn->n", self._weights, smooth.take(self._corners))
-        return found.reshape(self._shape)
+        found = np.einsum("kn,kn->n", self._weights, smooth.take(self._corners))
+        return found.reshape(self._shape).astype(np.float64)
 
 
 def texture_directions() -> Floats:

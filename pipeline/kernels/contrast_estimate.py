@@ -41,7 +41,7 @@ class Settings:
     fastest_rps: float = 150.0
     sigma: float = 0.04
     floor: float = 3.0
-    fewest: int = 60
+    fewest: int = 40
     most: int = 3000
     search_most: int = 800
     scan_most: int = 600
@@ -205,7 +205,8 @@ def _scanned(events: LogoEvents, spins: Floats, settings: Settings) -> Floats:
             if all(abs(math.log(one / other)) > math.log(factors[1] / factors[0]) for other in magnitudes):
                 magnitudes.append(float(one))
     directions = spread_directions(SCAN_DIRECTIONS)
-    candidates = np.concatenate([*(directions * one for one in magnitudes[:5]), spins])
+    fastest = settings.fastest_rps * TURN
+    candidates = np.concatenate([*(directions * one for one in magnitudes[:5] if one <= fastest), spins])
     order = np.argsort(-scored(candidates, part, sigma, settings.floor), kind="stable")
     candidates = candidates[order][distinct(candidates[order], 0.1, 5)]
     hill = _hill(events.thinned(1000), settings, 1.5 * settings.sigma)
