@@ -17,13 +17,20 @@ TRACKING = ("filter", "surface", "track", "logo")
 SCHEMA = 1
 
 
-def analyze(path: Path, choices: Choices, method: str, on_progress: Progress | None = None) -> dict[str, Any]:
-    """The report on one recording, as CONTRACTS lays it down; raises SpinscopeError."""
+def analyze(
+    path: Path, choices: Choices, method: str, on_progress: Progress | None = None, *, cold: bool = True
+) -> dict[str, Any]:
+    """The report on one recording (tests/app/analyze.schema.json); raises SpinscopeError.
+
+    cold : whether this is the process's first; loading the kernels is then told apart from the work itself
+    """
     begin = time.perf_counter()
     session = Session.open(path, choices, on_progress)
+    load_seconds = session.load_kernels() if cold else 0.0
     log = session.shots(on_progress)
     made = report(session, log.shots, log.no_shot_reason, method)
     made["recording"]["path"] = str(path)
+    made["seconds"]["load"] = load_seconds
     made["seconds"]["total"] = time.perf_counter() - begin
     return made
 

@@ -176,7 +176,7 @@ def analyze(recordings: tuple[Path, ...], output: str | None, method: str, choic
     for recording in recordings:
         try:
             with ProgressBar() as bar:
-                reports.append(analyzed(recording, choices, method, bar))
+                reports.append(analyzed(recording, choices, method, bar, cold=not reports))
         except SpinscopeError as error:
             if len(recordings) == 1:
                 raise

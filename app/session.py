@@ -23,6 +23,7 @@ SAMPLES = Path(__file__).parents[1] / "sample_recordings"
 DEFAULT_SAMPLE = SAMPLES / "flight_fast_top.h5"
 
 FRAMES_BYTES = 1_500_000_000  # full frames held for the viewer: 8 s of the paper's sensor at 200 Hz
+WARM_TICKS = 4  # with flow, until the spin has been solved for and solved again
 MARGIN_US = 50_000  # shown before and after a shot of a long recording
 
 Progress = Callable[[float, str], None]  # share done (0..1) and what is being done
@@ -103,6 +104,15 @@ class Session:
             yield tick
             if on_progress:
                 on_progress((index + 1) / count, "running the stages")
+
+    def load_kernels(self) -> float:
+        """Run a throw-away chain until every stage has had work, so that compiled kernels are in memory; seconds."""
+        begin, worked = time.perf_counter(), 0
+        for index, tick in enumerate(Chain(self.source).run(self.parameters, forget=("surface",))):
+            worked += len(tick.flow.t_us) > 0
+            if worked == WARM_TICKS or index == 20 * WARM_TICKS:
+                break
+        return time.perf_counter() - begin
 
     def shots(self, on_progress: Progress | None = None) -> ShotLog:
         """The shots of the window; keeps no full frames, so that it works for recordings of any length."""

@@ -69,7 +69,7 @@ class Sampler:
 
     def __call__(self, smooth: NDArray[np.float32]) -> Floats:
         """(...) the density in every direction."""
-        found = np.einsum("kn,kn->n", self._weights, smooth.take(self._corners))
+        found: NDArray[np.float32] = np.einsum("kn,kn->n", self._weights, smooth.take(self._corners))
         return found.reshape(self._shape).astype(np.float64)
 
 

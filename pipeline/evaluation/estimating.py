@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,7 +12,7 @@ from ..results import Truth
 from ..shots import Shot, ShotLog
 from ..stages.spin import METHODS
 from .rendering import Rendered
-from .tables import Cell, Row, Summary, Table, share, summary, where
+from .tables import Cell, Row, Table, share, summary, where
 
 LOGO = 2  # the truth's label of the logo's events
 BEST = "best"  # what the program itself trusts
@@ -98,26 +99,25 @@ def calibration(rows: Sequence[Row], methods: Sequence[str]) -> Table:
     lines: list[tuple[Cell, ...]] = []
     for method in methods:
         own = where(rows, method=method)
-        lines.append(
-            (
-                method,
-                Summary.over(_ratio(row, "magnitude_error_rps", "magnitude_std_rps") for row in own),
-                Summary.over(_ratio(row, "axis_error_deg", "axis_std_deg") for row in own),
-            )
-        )
+        cells: list[Cell] = []
+        for error, std in (("magnitude_error_rps", "magnitude_std_rps"), ("axis_error_deg", "axis_std_deg")):
+            ratios = [ratio for row in own if (ratio := _ratio(row, error, std)) is not None]
+            cells.append(statistics.median(ratios) if ratios else None)
+            cells.append(sum(ratio > 3 for ratio in ratios) / len(ratios) if ratios else None)
+        lines.append((method, *cells))
     return Table(
         "Error over expected error (1 sigma)",
-        ("method", "magnitude", "axis"),
+        ("method", "magnitude, median", "above 3", "axis, median", "above 3"),
         lines,
-        "A median of 0.67 for the magnitude and about 0.8 for the axis is what honest errors give.",
+        "Honest errors give medians of 0.67 for the magnitude and about 0.8 for the axis, and hardly any above 3.",
     )
 
 
 def _ratio(row: Row, error: str, std: str) -> float | None:
     value, expected = row[error], row[std]
-    if not isinstance(value, float) or not isinstance(expected, float) or expected <= 0:
+    if not isinstance(value, float) or not isinstance(expected, float):
         return None
-    return value / expected
+    return value / max(expected, 1e-9)
 
 
 def _answered(row: Row) -> bool:

@@ -9,6 +9,7 @@ import multiprocessing
 import os
 import secrets
 import signal
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -65,13 +66,20 @@ def executor(workers: int = 1, cluster: str | None = None) -> Iterator[Executor 
     else:
         # Fresh processes: a copy of this one would share its threads' locks (progress bars, HDF5).
         fresh = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(workers, fresh, _ignore_interrupt) as pool:
+        with ProcessPoolExecutor(workers, fresh) as pool:
+            _start_deaf(pool)
             yield pool
 
 
-def _ignore_interrupt() -> None:
-    """Ctrl-C is for the main process, which then stops the others."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _start_deaf(pool: Executor) -> None:
+    """Start a pool's processes so that Ctrl-C is for this process alone, which then stops them."""
+    if threading.current_thread() is not threading.main_thread():
+        return  # only the main thread may say so
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # the new processes inherit it
+    try:
+        pool.submit(int)
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _of_cluster(address: str) -> Iterator[Executor]:

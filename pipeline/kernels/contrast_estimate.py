@@ -20,6 +20,8 @@ Integers = NDArray[np.int64]
 COMB_LOW, COMB_HIGH, COMB_STEP = 0.45, 2.2, 0.1
 SCAN_DIRECTIONS = 150  # 17 degrees apart: visits of the logo one turn apart fix the axis only within each visit
 FOLLOW_TURNS, FOLLOW_RATIO = 1.6, 2.5
+# Peaks nearer than this (relative) are one answer with a wide error, farther ones are two answers.
+NEAR = 0.3
 # Stretches longer than this may hold steady shading for the search to be rid of, and bursts to tell it by.
 BURSTS_FROM_S = 0.015
 
@@ -40,7 +42,7 @@ class Settings:
 
     fastest_rps: float = 150.0
     sigma: float = 0.04
-    floor: float = 3.0
+    floor: float = 1.5
     fewest: int = 40
     most: int = 3000
     search_most: int = 800
@@ -198,15 +200,15 @@ def _scanned(events: LogoEvents, spins: Floats, settings: Settings) -> Floats:
     sigma = 2.0 * settings.sigma
     part = _hill(events.thinned(settings.scan_most), settings, sigma).part
     magnitudes: list[float] = []
-    for spin in spins[:3]:
+    for spin in spins[:2]:
         magnitude = float(np.linalg.norm(spin))
         factors, values = comb(part, spin, sigma, settings.floor)
-        for one in (magnitude, *(magnitude * factors[peaks_of(values)[:3]])):
+        for one in magnitude * np.concatenate([[1.0, 0.5, 2.0], factors[peaks_of(values)[:2]]]):
             if all(abs(math.log(one / other)) > math.log(factors[1] / factors[0]) for other in magnitudes):
                 magnitudes.append(float(one))
     directions = spread_directions(SCAN_DIRECTIONS)
     fastest = settings.fastest_rps * TURN
-    candidates = np.concatenate([*(directions * one for one in magnitudes[:5] if one <= fastest), spins])
+    candidates = np.concatenate([*(directions * one for one in magnitudes if one <= fastest), spins])
     order = np.argsort(-scored(candidates, part, sigma, settings.floor), kind="stable")
     candidates = candidates[order][distinct(candidates[order], 0.1, 5)]
     hill = _hill(events.thinned(1000), settings, 1.5 * settings.sigma)
@@ -234,9 +236,9 @@ def peaks_of(values: Floats) -> Integers:
 def _refined(
     events: LogoEvents, spins: Floats, place: Place, settings: Settings, reference_s: float, span_s: float
 ) -> Answer:
+    spins, margins = _ranked(events, spins, settings)
     hill = _hill(events.thinned(settings.most), settings, settings.sigma)
-    spin, _, _ = climb(hill, spins[0], NO_OFFSETS, 3)
-    margin, rival = _rivalled(events, spin, spins[1:], settings)
+    spin, _, _ = climb(hill, spins[0], NO_OFFSETS, 2)
     hill.prior_px = np.array([place.centre_std_px, place.centre_std_px, place.radius_std_px])
     hill.trust = settings.trust
     spin, offsets, _ = climb(hill, spin, np.zeros(3), 3)
@@ -246,9 +248,36 @@ def _refined(
     hill.part = hill.part._replace(t_s=np.random.default_rng(0).permutation(hill.part.t_s))
     contrast = (own - hill.score(spin, offsets)) / hill.ratios.size
     covariance /= TURN**2
-    spin = spin / TURN
+    spins, spin = spins / TURN, spin / TURN
+    margin, rival = math.inf, None
+    for other, t in zip(spins[1:], margins[1:], strict=True):
+        near = np.linalg.norm(other - spins[0]) < NEAR * np.linalg.norm(spins[0])
+        if near and t < 6:
+            gap = other - spins[0]
+            covariance += np.outer(gap, gap) / (1.0 + math.exp(min(t, 50.0)))
+        elif not near and t < margin:
+            margin, rival = t, other
     stats = (margin, rival, contrast, own)
-    return Answer(spin, covariance, stats, len(events), reference_s, span_s, spins[1:] / TURN, offsets, contrast)
+    return Answer(spin, covariance, stats, len(events), reference_s, span_s, spins[1:], offsets, contrast)
+
+
+def _ranked(events: LogoEvents, spins: Floats, settings: Settings) -> tuple[Floats, Floats]:
+    """Distinct spins (k, 3) climbed with the final kernel, best first, and by how much the best beats each.
+
+    The margin is in standard deviations of the difference of the two scores, over the events that tell them apart.
+    """
+    hill = _hill(events.thinned(1000), settings, settings.sigma)
+    tops, shares = [], []
+    for spin in spins:
+        top, _, _ = climb(hill, spin, NO_OFFSETS, 3)
+        hill.score(top, NO_OFFSETS)
+        tops.append(top)
+        shares.append(hill.ratios.copy())
+    order = np.argsort([-float(share.sum()) for share in shares], kind="stable")
+    order = order[distinct(np.array(tops)[order], 0.05, 4)]
+    gaps = np.array([shares[order[0]] - shares[row] for row in order])
+    margins = gaps.sum(axis=1) / np.sqrt(settings.repeats * np.sum(gaps**2, axis=1) + 1e-12)
+    return np.array(tops)[order], margins
 
 
 def _drift(events: LogoEvents, place: Place, span_s: float) -> Floats:
@@ -262,20 +291,3 @@ def _drift(events: LogoEvents, place: Place, span_s: float) -> Floats:
     return spread
 
 
-def _rivalled(events: LogoEvents, spin: Floats, rivals: Floats, settings: Settings) -> tuple[float, Floats | None]:
-    """By how many standard deviations the spin beats its nearest rival, and that; of events that tell the two apart."""
-    hill = _hill(events.thinned(1000), settings, settings.sigma)
-    best, _, own = climb(hill, spin, NO_OFFSETS, 1)
-    hill.value(best, NO_OFFSETS)
-    shares = hill.ratios.copy()
-    worst: tuple[float, Floats | None] = (math.inf, None)
-    for rival in rivals:
-        top, _, _ = climb(hill, rival, NO_OFFSETS, 2)
-        if np.linalg.norm(top - best) < 0.1 * np.linalg.norm(best):
-            continue
-        other = hill.value(top, NO_OFFSETS)
-        gaps = shares - hill.ratios
-        margin = (own - other) / math.sqrt(settings.repeats * float(gaps @ gaps) + 1e-12)
-        if margin < worst[0]:
-            worst = margin, top / TURN
-    return worst

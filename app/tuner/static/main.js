@@ -43,6 +43,7 @@ async function start() {
     clip: link.clip ?? recording.clip_us,
     preset,
   });
+  settings.fallback = { parameters: opened, clip: recording.clip_us };
   describe(opening);
   app.bar = new Bar(byId("bar"), opening.stages);
   app.overview = new Overview(byId("overview"), recording);
@@ -56,7 +57,7 @@ async function start() {
   new Controls(byId("controls"), opening.sections, settings);
   app.runner = new Runner(connection, settings, () => viewer.playhead_us());
   listen(link);
-  await viewer.start(opening.viewer, byId("viewer"));
+  viewer.start(opening.viewer, byId("viewer")).catch((error) => notice(`The viewer does not start: ${error.message}`, "error", 0));
   if (Object.keys(link.biases).length) app.biases.take(link.biases);
   app.runner.want(true);
 }
@@ -99,6 +100,7 @@ function listen(link) {
     app.bar.show(detail);
     if (detail.error) notice(detail.error);
     if (detail.state === "done") app.results.show(detail);
+    if (["done", "failed"].includes(detail.state)) document.body.dataset.done = detail.serial;
     if (detail.measures && !app.opening.recording.is_long) showShots(detail.measures);
     if (!detail.recording) return;
     latest = detail.recording;

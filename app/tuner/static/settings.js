@@ -7,6 +7,7 @@ export class Settings extends EventTarget {
   pinned = null;
   clip = [0, 0];
   preset = { name: "opened", values: {} };
+  fallback = null;
   #past = [];
   #future = [];
   #settled = null;
@@ -87,10 +88,13 @@ export class Settings extends EventTarget {
     this.#go(this.#future, this.#past);
   }
 
-  // The last change was refused: forget that it was made.
+  // The last change was refused: forget that it was made. The first settings of all may come from a mangled link:
+  // then the recording is taken as it was opened.
   revert() {
     if (JSON.stringify(this.#snapshot()) !== JSON.stringify(this.#settled)) this.#take(this.#settled);
     else if (this.canUndo) this.#take((this.#settled = this.#past.pop()));
+    else if (this.fallback) this.start({ ...this.fallback, preset: this.preset });
+    this.fallback = null;
   }
 
   #snapshot() {

@@ -23,22 +23,20 @@ export class Viewer extends EventTarget {
   #queue = Promise.resolve();
   #playhead = null;
 
-  async start(version, parent) {
+  // Loads the viewer; whatever else is asked of it meanwhile waits.
+  start(version, parent) {
+    return this.#next(() => this.#start(version, parent));
+  }
+
+  async #start(version, parent) {
     stayAtHome();
     const { WebViewer } = await import(`/rerun/${version}/widget.js`);
     const viewer = new WebViewer();
     const ready = new Promise((resolve) => viewer.once("ready", resolve));
     const base_url = new URL(`/rerun/${version}/`, location.href).toString();
-    await viewer.start(null, parent, {
-      base_url,
-      width: "100%",
-      height: "100%",
-      hide_welcome_screen: true,
-      notebook: true,
-      allow_fullscreen: false,
-      theme: "dark",
-      manifest_url: null,
-    });
+    const size = { width: "100%", height: "100%" };
+    const plain = { hide_welcome_screen: true, notebook: true, allow_fullscreen: false, theme: "dark" };
+    await viewer.start(null, parent, { base_url, ...size, ...plain });
     await ready;
     this.#viewer = viewer;
     this.#channel = viewer.open_channel("spinscope");

@@ -1,0 +1,357 @@
+"""The page in a real browser: sliders, playhead, A and B, presets, curve, biases, two tabs, and a server that goes."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.simulate import simulate_to_file
+
+from .conftest import Served, served
+
+CHROMIUM = Path("/usr/bin/chromium")
+FLAGS = [
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-dev-shm-usage",
+]
+SIZE = {"width": 1000, "height": 620}  # software drawing is slow: a small window
+PATIENCE_MS = 120_000
+
+pytestmark = pytest.mark.skipif(not CHROMIUM.exists(), reason=f"there is no browser at {CHROMIUM}")
+
+
+class Tab:
+    """A tab with the page in it."""
+
+    def __init__(self, page: Any) -> None:
+        self.page = page
+        self.requests: list[str] = []
+        self.errors: list[str] = []
+        page.set_default_timeout(PATIENCE_MS)
+        page.on("request", lambda request: self.requests.append(request.url))
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+
+    def open(self, address: str) -> None:
+        self.page.goto(address)
+        self.page.wait_for_selector("body[data-done]", state="attached")
+
+    @property
+    def serial(self) -> int:
+        """The newest wish the page has sent."""
+        return int(self.page.evaluate("window.spinscope.runner.serial"))
+
+    def settled(self, what: str = "done") -> None:
+        """Wait until the newest wish is fulfilled: computed (done) or to be seen (shown)."""
+        end = time.monotonic() + PATIENCE_MS / 1000
+        while time.monotonic() < end:
+            self.page.wait_for_timeout(60)
+            if self.page.get_attribute("body", f"data-{what}") == str(self.serial):
+                return
+        raise AssertionError(f"not {what}: {self.page.inner_text('#bar')} {self.page.inner_text('#notices')}")
+
+    def after(self, act: Any, what: str = "done") -> None:
+        """Do something that makes the page send a wish, and wait until that is fulfilled."""
+        before = self.serial
+        act()
+        end = time.monotonic() + 30
+        while self.serial == before and time.monotonic() < end:
+            self.page.wait_for_timeout(30)
+        assert self.serial > before, "nothing was asked of the server"
+        self.settled(what)
+
+    def slide(self, name: str, key: str = "ArrowUp", what: str = "done") -> None:
+        """Press a key on a slider."""
+        slider = self.page.locator(f"[data-name='{name}'] input[type=range]")
+        self.after(lambda: slider.press(key), what)
+
+    def value(self, name: str) -> Any:
+        return self.page.evaluate(f"window.spinscope.settings.get('{name}')")
+
+    def computed(self) -> set[str]:
+        """The stages whose cells in the bar say that they ran."""
+        cells = self.page.locator("#bar .stage:not(.kept)")
+        return {cell.get_attribute("data-stage") for cell in cells.all()} - {"drawing"}
+
+    def where(self) -> dict[str, Any]:
+        """Playhead (us) and play state of the viewer."""
+        found: dict[str, Any] = self.page.evaluate(
+            "window.spinscope.viewer.where().then((w) => ({time: Number(w.time) / 1000, play: w.play}))"
+        )
+        return found
+
+    def panel(self, title: str) -> Any:
+        """A panel of the right side, opened."""
+        details = self.page.locator(f"#side details[data-title='{title}']")
+        if details.get_attribute("open") is None:
+            details.locator("> summary").click()
+        return details
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """One chromium for all tests."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        made = playwright.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
+        yield made
+        made.close()
+
+
+@pytest.fixture(scope="module")
+def server(flight: Path) -> Iterator[Served]:
+    """A tuner of its own: the tests stop and start it."""
+    made = served(flight)
+    yield made
+    made.stop()
+
+
+@pytest.fixture(scope="module")
+def tab(browser: Any, server: Served) -> Iterator[Tab]:
+    """The page with its viewer, on the tracker's tab, which draws fastest."""
+    context = browser.new_context(viewport=SIZE)
+    made = Tab(context.new_page())
+    made.open(f"{server.address}#tab=Tracker")
+    made.settled("shown")
+    yield made
+    context.close()
+
+
+def bare_tab(browser: Any, address: str) -> Tab:
+    """A page without the viewer, whose program takes ten seconds to start in software."""
+    context = browser.new_context(viewport=SIZE)
+    made = Tab(context.new_page())
+    made.page.route(re.compile(r"re_viewer_bg\.wasm"), lambda route: route.abort())
+    made.open(address)
+    made.settled()
+    return made
+
+
+GROUPS = [
+    ("filter.threshold_us", {"filter"}),
+    ("surface.k_px", {"surface", "track"}),
+    ("track.coast_us", {"track"}),
+    ("logo.pad_px", {"logo", "rate", "flow"}),
+    ("rate.ema_us", {"rate"}),
+    ("flow.reach_px", {"flow"}),
+    ("spin.max_spin_rps", {"spin"}),
+]
+ORDER = ["filter", "surface", "track", "logo", "rate", "flow", "spin"]
+
+
+def test_every_group_of_sliders_changes_its_stages_and_nothing_above(tab: Tab) -> None:
+    for name, expected in GROUPS:
+        before = tab.value(name)
+        tab.slide(name)
+        assert tab.value(name) > before, name
+        computed = tab.computed()
+        assert expected <= computed, (name, computed)
+        # The highest spin is read by rate and flow too.
+        first = 4 if name.startswith("spin") else ORDER.index(name.split(".")[0])
+        assert computed <= set(ORDER[first:]), (name, computed)
+        assert tab.page.locator(f"[data-name='{name}'].differs").count() == 1
+        tab.after(lambda: tab.page.keyboard.press("Control+z"))
+        assert tab.value(name) == before and tab.computed() == set()
+    choice = tab.page.locator("[data-name='surface.cleaning'] select")
+    tab.after(lambda: choice.select_option("off"))
+    assert "surface" in tab.computed()
+    tab.after(lambda: tab.page.locator("[data-name='surface.cleaning'] .reset").click())
+    assert tab.value("surface.cleaning") == "isolated"
+
+
+def test_the_playhead_stays_where_it_is_paused_and_playing(tab: Tab) -> None:
+    tab.settled("shown")
+    tab.page.evaluate("window.spinscope.viewer.seek(52345)")
+    tab.slide("logo.pad_px", what="shown")
+    where = tab.where()
+    assert where == {"time": 52345, "play": "paused"}
+    tab.page.evaluate("window.spinscope.viewer.play('playing')")
+    tab.slide("logo.pad_px", what="shown")
+    assert tab.where()["play"] == "playing"
+    assert tab.where()["time"] > 52345
+    tab.page.evaluate("window.spinscope.viewer.play('paused')")
+    state = tab.page.evaluate("window.spinscope.viewer.state().then((s) => s.recordings.length)")
+    assert state == 1  # the old recordings are closed
+    assert tab.page.evaluate("window.spinscope.viewer.tab()") == "Tracker"
+
+
+def test_typing_reset_undo_and_redo(tab: Tab) -> None:
+    start = tab.value("logo.pad_px")
+    box = tab.page.locator("[data-name='logo.pad_px'] input.number")
+
+    def typed(text: str) -> None:
+        box.fill(text)
+        box.press("Enter")
+
+    tab.after(lambda: typed("4.75"))
+    assert tab.value("logo.pad_px") == 4.75
+    typed("900")
+    tab.page.wait_for_selector(".notice")
+    assert "0 to 100 px" in tab.page.inner_text("#notices")
+    assert tab.value("logo.pad_px") == 4.75
+    tab.page.locator(".notice").first.click()
+    tab.after(lambda: tab.page.click("#undo"))
+    assert tab.value("logo.pad_px") == start
+    tab.after(lambda: tab.page.click("#redo"))
+    assert tab.value("logo.pad_px") == 4.75
+    tab.after(lambda: tab.page.locator("[data-name='logo.pad_px'] .reset").click())
+    assert tab.page.locator(".control.differs").count() == 0
+
+
+def test_values_that_do_not_go_together_are_taken_back(tab: Tab) -> None:
+    low, high = tab.value("track.radius_min_px"), tab.value("track.radius_max_px")
+    tab.page.evaluate(f"window.spinscope.settings.set('track.radius_min_px', {high + 5})")
+    tab.page.wait_for_timeout(1500)
+    if tab.value("track.radius_min_px") != low:  # the stage may live with it
+        tab.after(lambda: tab.page.click("#undo"))
+    assert tab.value("track.radius_min_px") == low
+
+
+def test_a_and_b_beside_each_other(tab: Tab) -> None:
+    tab.after(lambda: tab.page.click("#pin"))
+    tab.slide("logo.pad_px", "PageUp")
+    text = tab.page.inner_text("#side details[data-title='Result']")
+    assert "logo.pad_px" in text
+    headings = tab.page.locator("#side tr.heading th").all_inner_texts()
+    assert "A" in headings and "B" in headings
+    changed = tab.value("logo.pad_px")
+    tab.after(lambda: tab.page.click("#swap"))
+    assert tab.value("logo.pad_px") != changed
+    tab.after(lambda: tab.page.click("#discard"))
+    assert tab.value("logo.pad_px") == changed
+    assert tab.page.locator("#swap").is_hidden()
+    tab.after(lambda: tab.page.locator("[data-name='logo.pad_px'] .reset").click())
+
+
+def test_a_preset_is_taken_and_marks_follow_it(tab: Tab) -> None:
+    tab.after(lambda: tab.page.select_option("#preset", "paper"))
+    assert tab.value("filter.logo_mode") == "stc_cut_trail"
+    assert tab.page.locator(".control.differs").count() == 0
+    tab.slide("logo.pad_px")
+    assert tab.page.locator(".control.differs").count() == 1
+    tab.after(lambda: tab.page.select_option("#preset", "opened"))
+
+
+def test_a_point_of_the_curve_is_taken_by_a_click(tab: Tab) -> None:
+    panel = tab.panel("Tuning curve")
+    panel.locator("input[aria-label=from]").fill("2")
+    panel.locator("input[aria-label=to]").fill("5")
+    panel.locator("input[aria-label=points]").fill("4")
+    panel.locator("button.primary").click()
+    tab.page.wait_for_selector("svg.chart .dot.pick")
+    panel.locator("progress").wait_for(state="hidden")
+    dot = panel.locator("svg.chart >> nth=0").locator(".dot.pick").last
+    tab.after(lambda: dot.dispatch_event("click"))
+    assert tab.value("logo.pad_px") == 5
+    tab.after(lambda: tab.page.click("#undo"))
+
+
+def test_tune_for_me_shows_the_best_and_leads_back(tab: Tab) -> None:
+    panel = tab.panel("Tune for me")
+    panel.locator("input[aria-label=trials]").fill("4")
+    before = tab.page.evaluate("JSON.stringify(window.spinscope.settings.parameters)")
+    panel.locator("button.primary").first.click()
+    take = panel.get_by_text("Take the best")
+    take.wait_for()
+    panel.locator("progress").wait_for(state="hidden")
+    take.click()
+    tab.page.wait_for_timeout(200)
+    tab.settled()
+    panel.get_by_text("Way back").click()
+    tab.page.wait_for_timeout(200)
+    tab.settled()
+    assert tab.page.evaluate("JSON.stringify(window.spinscope.settings.parameters)") == before
+
+
+def test_the_coach_sees_the_shot_alone(tab: Tab) -> None:
+    tab.settled("shown")
+    tab.page.click("#coach")
+    tab.page.wait_for_selector("#leave", state="visible")
+    views = (
+        "window.spinscope.viewer.api.get_blueprint()"
+        ".then((b) => Object.keys(b.blueprint).filter((p) => /^.view.[^/]+$/.test(p)).length)"
+    )
+    end = time.monotonic() + 60
+    while tab.page.evaluate(views) > 4 and time.monotonic() < end:
+        tab.page.wait_for_timeout(200)
+    assert tab.page.evaluate(views) <= 4
+    assert tab.page.locator("#controls").is_hidden()
+    tab.page.click("#leave")
+    tab.page.wait_for_selector("#controls", state="visible")
+    end = time.monotonic() + 60
+    while tab.page.evaluate(views) <= 4 and time.monotonic() < end:
+        tab.page.wait_for_timeout(200)
+    assert tab.page.evaluate("window.spinscope.viewer.tab()") == "Tracker"
+
+
+def test_nothing_was_fetched_from_elsewhere_and_nothing_went_wrong(tab: Tab, server: Served) -> None:
+    own = (server.address, "blob:", "data:")
+    assert [url for url in tab.requests if not url.startswith(own)] == []
+    assert tab.errors == []
+
+
+def test_two_tabs_and_a_reload(browser: Any, tab: Tab, server: Served) -> None:
+    other = bare_tab(browser, server.address)
+    mine = tab.value("logo.pad_px")
+    other.slide("logo.pad_px", "PageUp")
+    changed = other.value("logo.pad_px")
+    assert changed > mine and tab.value("logo.pad_px") == mine
+    other.page.wait_for_url(re.compile(r"set=logo\.pad_px"))
+    other.page.reload()
+    other.page.wait_for_selector("body[data-done]", state="attached")
+    assert other.value("logo.pad_px") == changed
+    other.page.goto("about:blank")
+    other.open(f"{server.address}#set=logo.pad_px=-5&set=nothing.at=1&clip=7-3")
+    other.page.wait_for_timeout(300)
+    other.settled()
+    assert other.value("logo.pad_px") == mine  # a mangled link opens the recording all the same
+    other.page.context.close()
+
+
+def test_a_simulated_scene_is_taken_again_from_the_page(browser: Any, tmp_path: Path) -> None:
+    path = tmp_path / "spinner.h5"
+    simulate_to_file("spinner", path, duration_ms=25.0, width_px=320, height_px=240)
+    own = served(path)
+    try:
+        tab = bare_tab(browser, own.address)
+        before = tab.page.inner_text("#about")
+        panel = tab.panel("Biases")
+        slider = panel.locator("[data-bias=diff_on] input[type=range]")
+        tab.after(lambda: slider.press("End"))
+        assert tab.page.inner_text("#about") != before
+        panel.get_by_text("Rates against this bias").click()
+        tab.page.wait_for_selector("#side details[data-title=Biases] svg.chart")
+        panel.locator("progress").wait_for(state="hidden")
+        assert panel.locator("svg.chart").count() == 2
+        assert panel.locator("line.present").count() == 2
+        tab.page.context.close()
+    finally:
+        own.stop()
+
+
+def test_the_page_says_that_the_server_is_gone_and_comes_back(browser: Any, flight: Path) -> None:
+    first = served(flight)
+    tab = bare_tab(browser, first.address)
+    tab.slide("logo.pad_px")
+    value = tab.value("logo.pad_px")
+    port = int(first.address.rsplit(":", 1)[1].strip("/"))
+    first.stop()
+    tab.page.wait_for_selector("body.lost", state="attached")
+    assert "does not answer" in tab.page.inner_text("#bar")
+    second = served(flight, port)
+    try:
+        tab.page.wait_for_selector("body:not(.lost)", state="attached")
+        tab.settled()
+        assert tab.value("logo.pad_px") == value
+        tab.slide("logo.pad_px")
+        tab.page.context.close()
+    finally:
+        second.stop()

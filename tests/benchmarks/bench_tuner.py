@@ -1,0 +1,139 @@
+"""The tuner: from a slider's change to the bytes at the server, to the picture in the browser, and 200 times over.
+
+`pytest tests/benchmarks/bench_tuner.py --benchmark-only -s`; nothing else should run on the machine.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.app.tuner.conftest import Client, Served, served
+
+ROOT = Path(__file__).parents[2]
+FLIGHT = ROOT / "sample_recordings/flight_fast_top.h5"
+CHROMIUM = Path("/usr/bin/chromium")
+FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+CHANGES = 200
+
+# What is changed by how much each time, and the median that is asked for on the sample flight, 2 cores.
+KNOBS: dict[str, tuple[str, str, float, float, float]] = {
+    "pad": ("logo", "pad_px", 2.0, 0.01, 150),
+    "t_acc": ("flow", "t_acc_us", 1500, 10, 150),
+    "spin": ("spin", "max_spin_rps", 120, 0.5, 150),
+    "surface": ("surface", "k_px", 3, 1, 500),
+    "filter": ("filter", "threshold_us", 4000, 10, 500),
+}
+
+
+@pytest.fixture(scope="module")
+def tuner() -> Iterator[Served]:
+    made = served(FLIGHT)
+    yield made
+    made.stop()
+
+
+@pytest.fixture(scope="module")
+def client(tuner: Served) -> Client:
+    made = tuner.open()
+    made.run()
+    return made
+
+
+def bytes_of(client: Client, parameters: dict[str, Any]) -> bytes:
+    """Change, wait, fetch: what the page does."""
+    done = client.run(parameters)
+    return client.http.get(client.path(f"pictures/{done['recording']}")).content
+
+
+@pytest.mark.parametrize("knob", KNOBS)
+def test_change_to_bytes(benchmark: Any, client: Client, knob: str) -> None:
+    stage, field, start, step, target_ms = KNOBS[knob]
+    counter = itertools.count()
+    kind = type(start) if knob != "spin" else float
+
+    def change() -> tuple[tuple[Client, dict[str, Any]], dict[str, Any]]:
+        values: dict[str, Any] = {field: kind(start + step * next(counter))}
+        if knob == "t_acc":
+            values["t_acc_from"] = "fixed"
+        return (client, {stage: values}), {}
+
+    content = benchmark.pedantic(bytes_of, setup=change, rounds=15, warmup_rounds=1)
+    median_ms = 1000 * benchmark.stats.stats.median
+    print(f"\n{knob}: {median_ms:.0f} ms median for {len(content) / 1e6:.1f} MB (asked for: {target_ms:.0f} ms)")
+
+
+def test_back_to_earlier_values(benchmark: Any, client: Client) -> None:
+    one, two = {"logo": {"pad_px": 2.0}}, {"logo": {"pad_px": 3.0}}
+    for values in (one, two):
+        bytes_of(client, values)
+    turns = itertools.cycle((one, two))
+    benchmark.pedantic(bytes_of, setup=lambda: ((client, next(turns)), {}), rounds=20)
+    print(f"\nback: {1000 * benchmark.stats.stats.median:.0f} ms median (asked for: 30 ms plus encoding)")
+
+
+def test_200_changes_and_the_picture_in_the_browser(benchmark: Any) -> None:
+    """Server and browser over 200 changes: milliseconds, memory, threads."""
+    if not CHROMIUM.exists():
+        pytest.skip(f"there is no browser at {CHROMIUM}")
+    benchmark.pedantic(_two_hundred_changes, rounds=1)
+
+
+def _two_hundred_changes() -> None:
+    from playwright.sync_api import sync_playwright
+
+    command = [sys.executable, "-m", "app", "tune", str(FLIGHT), "--no-browser", "--port", "0"]
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    address = process.stdout.readline().strip()
+    try:
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
+            page = browser.new_page(viewport={"width": 1000, "height": 620})
+            page.set_default_timeout(180_000)
+            page.goto(f"{address}#tab=Tracker")
+            page.wait_for_selector("body[data-shown]", state="attached")
+            _drive(page, process.pid)
+            browser.close()
+    finally:
+        process.terminate()
+        process.wait(20)
+        process.stdout.close()
+
+
+def _drive(page: Any, pid: int) -> None:
+    server, shown = [], []
+    print("\nchange  server RSS  threads  browser heap")
+    for number in range(CHANGES):
+        began = time.perf_counter()
+        pad = round(2 + 0.01 * (number % 150), 2)
+        page.evaluate(f"window.spinscope.settings.set('logo.pad_px', {pad})")
+        serial = page.evaluate("window.spinscope.runner.serial")
+        page.wait_for_selector(f"body[data-done='{serial}']", state="attached")
+        server.append(1000 * (time.perf_counter() - began))
+        page.wait_for_selector(f"body[data-shown='{serial}']", state="attached")
+        shown.append(1000 * (time.perf_counter() - began))
+        if number % 25 == 24:
+            heap = page.evaluate("performance.memory?.usedJSHeapSize ?? 0") / 1e6
+            print(
+                f"{number + 1:6d}  {_status(pid, 'VmRSS') / 1e3:7.0f} MB  {_status(pid, 'Threads'):7d}  {heap:9.0f} MB"
+            )
+    print(
+        f"change to answer {statistics.median(server):.0f} ms, change to picture {statistics.median(shown):.0f} ms (medians)"
+    )
+
+
+def _status(pid: int, name: str) -> int:
+    """A number of /proc/PID/status (kB for memory)."""
+    found = re.search(rf"^{name}:\s+(\d+)", Path(f"/proc/{pid}/status").read_text(encoding="utf-8"), re.MULTILINE)
+    assert found is not None
+    return int(found.group(1))
