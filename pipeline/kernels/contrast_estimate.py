@@ -22,6 +22,7 @@ SCAN_DIRECTIONS = 150  # 17 degrees apart: visits of the logo one turn apart fix
 FOLLOW_TURNS, FOLLOW_RATIO = 1.6, 2.5
 # Peaks nearer than this (relative) are one answer with a wide error, farther ones are two answers.
 NEAR = 0.3
+TRACK_MEMORY_S = 0.02  # four steps of the Kalman filter
 # Stretches longer than this may hold steady shading for the search to be rid of, and bursts to tell it by.
 BURSTS_FROM_S = 0.015
 
@@ -284,8 +285,10 @@ def _drift(events: LogoEvents, place: Place, span_s: float) -> Floats:
     """(3, 3) covariance, rad^2/s^2: a centre that drifts across the ball looks like a turn about an axis in the image."""
     facing = events.facing.mean(axis=1)
     facing /= np.linalg.norm(facing)
-    # Over a long stretch the track cannot drift farther than it is uncertain: a ramp of +-sqrt(3) sigma.
-    drift_px_s = min(place.drift_std_px_s, math.sqrt(12.0) * place.centre_std_px / max(span_s, 1e-6))
+    # A track that is off by the centre's sigma, anew every TRACK_MEMORY_S, cannot drift faster than this on average.
+    longest_s = max(span_s, 1e-6)
+    drift_px_s = math.sqrt(12.0) * place.centre_std_px / longest_s / math.sqrt(max(longest_s / TRACK_MEMORY_S, 1.0))
+    drift_px_s = min(place.drift_std_px_s, drift_px_s)
     rate = drift_px_s / float(np.mean(events.radius_px))
     spread: Floats = rate**2 * (np.eye(3) - np.outer(facing, facing))
     return spread
