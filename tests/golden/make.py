@@ -1,0 +1,56 @@
+"""Golden numbers of the sample recordings: `uv run python -m tests.golden.make` writes them anew.
+
+Run it after a change that is meant to change results, and read the difference before committing it.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.session import SAMPLES, Choices, Session
+from pipeline.recordings import open_recording
+
+FILE = Path(__file__).with_name("samples.json")
+
+
+def numbers(path: Path) -> dict[str, Any]:
+    """What one sample gives, from its events to its spins, in a form that JSON holds."""
+    truth = open_recording(path).truth
+    assert truth is not None
+    fixed = bool(np.ptp(truth.x_px) == 0)
+    ball = (float(truth.x_px[0]), float(truth.y_px[0]), float(truth.radius_px[0]))
+    session = Session.open(path, Choices(fixed_ball=ball if fixed else None))
+    ticks, log = session.all_ticks()
+    events = session.source.events
+    return {
+        "events": [len(events), int(events.x_px.sum()), int(events.y_px.sum()), int(events.on.sum())],
+        "surface_events": sum(len(tick.filter.surface_events) for tick in ticks),
+        "logo_filter_events": sum(len(tick.filter.logo_events) for tick in ticks),
+        "surface_sum": int(ticks[len(ticks) // 2].surface.values.sum(dtype=np.int64)),
+        "shots": [
+            {
+                "us": [shot.start_us, shot.end_us],
+                "logo_events": shot.logo_events,
+                "mean_state": np.round(shot.state.mean(axis=0), 3).tolist(),
+                "spin_rps": {
+                    name: None if one.vector_rps is None else np.round(one.vector_rps, 3).tolist()
+                    for name, one in shot.estimates.items()
+                },
+                "best": shot.best,
+            }
+            for shot in log.shots
+        ],
+    }
+
+
+def samples() -> list[Path]:
+    """The sample recordings, by name."""
+    return sorted(SAMPLES.glob("*.h5"))
+
+
+if __name__ == "__main__":
+    FILE.write_text(json.dumps({path.stem: numbers(path) for path in samples()}, indent=1) + "\n", encoding="utf-8")

@@ -1,0 +1,35 @@
+"""The samples give what they gave: whole numbers exactly, track and spin to what processors may differ in."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from .make import FILE, numbers, samples
+
+GOLDEN: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
+
+
+def test_every_sample_has_golden_numbers() -> None:
+    assert [path.stem for path in samples()] == sorted(GOLDEN)
+
+
+@pytest.mark.parametrize("path", samples(), ids=lambda path: path.stem)
+def test_a_sample_gives_its_golden_numbers(path: Path) -> None:
+    found, golden = numbers(path), GOLDEN[path.stem]
+    shots, golden_shots = found.pop("shots"), golden.pop("shots")
+    assert found == golden
+    assert len(shots) == len(golden_shots)
+    for shot, expected in zip(shots, golden_shots, strict=True):
+        assert shot["us"] == expected["us"]
+        assert shot["best"] == expected["best"]
+        assert shot["logo_events"] == pytest.approx(expected["logo_events"], rel=0.01, abs=2)
+        assert shot["mean_state"] == pytest.approx(expected["mean_state"], rel=1e-4, abs=0.02)
+        for method, spin in expected["spin_rps"].items():
+            if spin is None:
+                assert shot["spin_rps"][method] is None
+            else:
+                assert shot["spin_rps"][method] == pytest.approx(spin, abs=0.5)
