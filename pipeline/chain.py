@@ -167,7 +167,7 @@ class Chain:
         are not kept beyond their tick (full frames of a long recording would not fit).
         """
         setting = self.setting(parameters)
-        keys = self._keys(parameters)
+        keys = self.keys(parameters)
         columns = {name: self._column(keys[name], name, parameters, setting) for name in STAGES}
         count = self.tick_count(parameters)
         for index in range(count if ticks is None else min(ticks, count)):
@@ -192,8 +192,11 @@ class Chain:
         start_us, end_us = number * tick_us, min((number + 1) * tick_us, self.source.end_us)
         return Packet(number, start_us, end_us, self.source.between(start_us, end_us))
 
-    def _keys(self, parameters: Parameters) -> dict[str, Hashable]:
-        """Each stage's key: its name, its parameters, what else it reads, and the keys of its inputs."""
+    def keys(self, parameters: Parameters) -> dict[str, Hashable]:
+        """Each stage's key: its name, its parameters, what else it reads, and the keys of its inputs.
+
+        Stages with the same key have the same results.
+        """
         keys: dict[str, Hashable] = {
             "packet": (self.source.identity, parameters.track.tick_us, parameters.camera, parameters.ball)
         }

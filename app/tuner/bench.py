@@ -78,7 +78,7 @@ class Clip:
         chain = self.session.chain
         with self.lock:
             ticks = chain.run(parameters)
-        keys = {stage: self.key(parameters, stage) for stage in STAGES}
+        keys = self.keys(parameters)
         while True:
             with self.lock:
                 before = dict(chain.seconds)
@@ -93,17 +93,14 @@ class Clip:
                 return
             yield Progressed(tick, took)
 
-    def key(self, parameters: Parameters, stage: str) -> Hashable:
-        """What a stage's column of results is made from, compared by value."""
-        above = list(STAGES)[: list(STAGES).index(stage) + 1]
-        own = tuple(parameters.group(name) for name in above)
-        setting = parameters.camera, parameters.ball, parameters.spin.max_spin_rps, parameters.track.tick_us
-        return self.session.source.identity, stage, setting, own
+    def keys(self, parameters: Parameters) -> dict[str, Hashable]:
+        """What each stage's results are made from, compared by value."""
+        return self.session.chain.keys(parameters)
 
     def cost_of(self, parameters: Parameters) -> dict[str, float]:
         """Seconds each stage took with these parameters when it was computed; absent where it never was."""
         with self.lock:
-            keys = {stage: self.key(parameters, stage) for stage in STAGES}
+            keys = self.keys(parameters)
             return {stage: self.cost_s[key] for stage, key in keys.items() if key in self.cost_s}
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pipeline.chain import STAGES, Parameters
+from pipeline.chain import Parameters
 from pipeline.parameters import Tunable
 
 # (title, group, its fields or None for all that no other section names)
@@ -39,7 +39,7 @@ def sections() -> list[dict[str, Any]]:
         declared = parameters.group(group).tunables()
         chosen = fields or tuple(field for field in declared if (group, field) not in named)
         controls = [_control(group, field, declared[field]) for field in chosen]
-        made.append({"title": title, "stage": group if group in STAGES else "filter", "controls": controls})
+        made.append({"title": title, "controls": controls})
     return made
 
 
@@ -56,7 +56,7 @@ def _control(group: str, field: str, declared: Tunable) -> dict[str, Any]:
     default = list(declared.default) if isinstance(declared.default, tuple) else declared.default
     return {
         "name": f"{group}.{field}",
-        "label": field.removesuffix(f"_{declared.unit}").replace("_", " "),
+        "label": field.removesuffix(_suffix(declared.unit)).replace("_", " "),
         "kind": declared.kind,
         "default": default,
         "optional": declared.default is None,
@@ -69,6 +69,11 @@ def _control(group: str, field: str, declared: Tunable) -> dict[str, Any]:
         "allowed": declared.allowed,
         "scale": scale_of(declared),
     }
+
+
+def _suffix(unit: str) -> str:
+    """How a field's name says its unit: m/s^2 is _m_s2."""
+    return "_" + unit.replace("/", "_").replace("^", "").lower()
 
 
 def scale_of(declared: Tunable) -> str:

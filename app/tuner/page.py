@@ -182,12 +182,11 @@ class Page:
             raise Superseded
         report.tell("drawing", 1.0, force=True)
         began = time.perf_counter()
-        chunks = self._drawings.chunks(b.run, lambda stage: clip.key(b.session.parameters, stage))
+        chunks = self._drawings.chunks(b.run, clip.keys(b.session.parameters))
         if a is None:
             chunks = [*chunks, *note_without_a(b.run)]
         else:
-            a_parameters = a.session.parameters
-            a_chunks = self._drawings.chunks(a.run, lambda stage: clip.key(a_parameters, stage))
+            a_chunks = self._drawings.chunks(a.run, clip.keys(a.session.parameters))
             chunks = [*chunks, *compared(a_chunks), *note_with_a(b.run, _difference_text(a, b))]
         recording_id = f"{self.id}-{wanted.serial}{'-part' if partial else ''}"
         picture = rrd_bytes(chunks, recording_id)

@@ -172,7 +172,7 @@ def _recording(bench: Bench) -> dict[str, Any]:
     start_us, end_us = bench.window_us
     clip_start_us, clip_end_us = bench.first_clip_us()
     return {
-        "name": session.recording.path.name,
+        "name": bench.original.name,
         "events": len(session.source.events),
         "width_px": session.source.width_px,
         "height_px": session.source.height_px,

@@ -119,6 +119,7 @@ class Workshop:
             finder.close()
         for page in pages:
             page.join(2.0)
+        self.drawings.close()
         if self._scratch is not None:
             self._scratch.cleanup()
             self._scratch = None

@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 # Cells along the cube around the unit sphere: 2 degrees, two thirds of what a pixel covers on a ball of 20 px radius.
 CELLS = 64
 TEXTURE_PX = (192, 96)  # 1.9 degrees a texel
-DISC_PX = 160
+DISC_PX = 128
 GAP_PX = 12
 
 

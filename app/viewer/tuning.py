@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -49,16 +50,21 @@ class Drawings:
         self._made: OrderedDict[Hashable, tuple[list[Chunk], int]] = OrderedDict()
         self._bytes = 0
         self._lock = threading.Lock()
+        self._threads = ThreadPoolExecutor(2, "drawing")
 
-    def chunks(self, run: Run, key: Callable[[str], Hashable]) -> list[Chunk]:
+    def close(self) -> None:
+        """End the threads."""
+        self._threads.shutdown(cancel_futures=True)
+
+    def chunks(self, run: Run, keys: Mapping[str, Hashable]) -> list[Chunk]:
         """Everything there is to see of a run.
 
-        key : tells what a stage's results were made from, by the stage's name; two runs with the same key look alike
+        keys : what each stage's results were made from; what comes from the same looks alike
         """
-        made: list[Chunk] = []
-        for number, (drawer, stage) in enumerate(DRAWERS):
-            made += self._drawn(drawer, run, (number, len(run.ticks), key(stage)))
-        return made
+        wanted = [(drawer, (number, len(run.ticks), keys[stage])) for number, (drawer, stage) in enumerate(DRAWERS)]
+        # The ball and the words take longest, each in its own thread; numpy, OpenCV and Pillow let go of Python.
+        last_first = [self._threads.submit(self._drawn, drawer, run, key) for drawer, key in reversed(wanted)]
+        return [chunk for drawn in reversed(last_first) for chunk in drawn.result()]
 
     def _drawn(self, drawer: Drawer, run: Run, key: Hashable) -> list[Chunk]:
         with self._lock:

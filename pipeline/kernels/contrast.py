@@ -55,9 +55,7 @@ def turn_back(turned: Floats, spin_rad_s: Floats, t_s: Floats, normals: Floats) 
         turns = t_s[k] * turns_per_s
         half = math.pi * (turns - math.floor(turns + 0.5))
         h2 = half * half
-        s = half * (
-            1.0 + h2 * (-1 / 6 + h2 * (1 / 120 + h2 * (-1 / 5040 + h2 * (1 / 362880 - h2 * (1 / 39916800)))))
-        )
+        s = half * (1.0 + h2 * (-1 / 6 + h2 * (1 / 120 + h2 * (-1 / 5040 + h2 * (1 / 362880 - h2 * (1 / 39916800))))))
         c = 1.0 + h2 * (
             -1 / 2 + h2 * (1 / 24 + h2 * (-1 / 720 + h2 * (1 / 40320 + h2 * (-1 / 3628800 + h2 / 479001600))))
         )

@@ -55,16 +55,16 @@ def moved_normals(
     return moved
 
 
+@numba.njit(cache=True, nogil=True)
 def shifted_spin(spin: Floats, axes: Floats, change: Floats) -> Floats:
     """The spin with its magnitude changed by change[0] and its direction turned by change[1:3] / |spin| (radians)."""
-    magnitude = float(np.linalg.norm(spin))
-    angle = math.hypot(change[1], change[2]) / magnitude
-    direction = axes[0]
-    if angle > 0.0:
-        sideways = (change[1] * axes[1] + change[2] * axes[2]) / (angle * magnitude)
-        direction = math.cos(angle) * direction + math.sin(angle) * sideways
-    result: Floats = direction * max(magnitude + change[0], 1e-3)
-    return result
+    magnitude = math.sqrt(spin[0] ** 2 + spin[1] ** 2 + spin[2] ** 2)
+    across = math.hypot(change[1], change[2])
+    angle = across / magnitude
+    ahead, sideways = math.cos(angle), math.sin(angle) / max(across, 1e-12)
+    direction = ahead * axes[0] + sideways * (change[1] * axes[1] + change[2] * axes[2])
+    turned: Floats = direction * max(magnitude + change[0], 1e-3)
+    return turned
 
 
 @dataclass(slots=True, eq=False)
@@ -122,7 +122,13 @@ def climb(hill: Hill, spin_rad_s: Floats, offsets_px: Floats, iterations: int) -
     for _ in range(iterations):
         axes, steps = axes_of(spin), hill.steps(spin) * scale
 
-        def at(change: Floats, axes: Floats = axes, steps: Floats = steps, spin: Floats = spin) -> float:
+        def at(
+            change: Floats,
+            axes: Floats = axes,
+            steps: Floats = steps,
+            spin: Floats = spin,
+            offsets: Floats = offsets,
+        ) -> float:
             moved = change * steps
             return hill.value(shifted_spin(spin, axes, moved[:3]), offsets + moved[3:])
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,8 +33,11 @@ DIRECTION_SPACING = math.sqrt(4.0 * math.pi / DIRECTIONS)
 # Halvings of the best cells, how many are kept, and how the kernel shrinks: four bring 0.2 to 3.2 turns.
 HALVINGS = 4
 KEPT = 48
-SHRINK = 0.9
+CROWD = 6
+SHRINK = 0.8
 EACH_SEGMENT = 100  # events: more do not sharpen a coarse answer, they only cost time
+# Spins nearer than this (relative) belong to one top of the score, farther ones to two.
+NEAR = 0.3
 # Magnitudes that share a segment length.
 SHARED = 0.15
 
@@ -54,25 +58,29 @@ def scored(spins_rad_s: Floats, part: Window, sigma: float, floor: float) -> Flo
     return out
 
 
-def distinct(spins: Floats, apart: float, most: int) -> Integers:
-    """Rows of at most `most` spins, in order, each farther than `apart` (relative to the faster) from those before."""
+def distinct(spins: Floats, apart: float, most: int, crowd: int = 0) -> Integers:
+    """Rows of at most `most` spins, in order, each farther than `apart` (relative to the faster) from those before.
+
+    crowd : if not 0, of spins within NEAR of each other no more than so many, or one broad top takes every place
+    """
     rows: list[int] = []
     size = np.linalg.norm(spins, axis=1)
     for row in range(spins.shape[0]):
-        gap = np.linalg.norm(spins[rows] - spins[row], axis=1)
-        if np.all(gap > apart * np.maximum(size[rows], size[row])):
+        gap = np.linalg.norm(spins[rows] - spins[row], axis=1) / np.maximum(size[rows], size[row])
+        if np.all(gap > apart) and (not crowd or np.count_nonzero(gap < NEAR) < crowd):
             rows.append(row)
             if len(rows) == most:
                 break
     return np.array(rows, np.int64)
 
 
+@numba.njit(cache=True, nogil=True)
 def axes_of(spin: Floats) -> Floats:
     """(3, 3) rows: the spin's direction and two directions across it, orthonormal."""
-    along = spin / np.linalg.norm(spin)
-    across = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
-    across /= np.linalg.norm(across)
-    return np.stack([along, across, np.cross(along, across)])
+    x, y, z = spin / math.sqrt(spin[0] ** 2 + spin[1] ** 2 + spin[2] ** 2)
+    across = np.array([0.0, -z, y]) if abs(x) < 0.6 else np.array([z, 0.0, -x])
+    u, v, w = across / math.sqrt(across[0] ** 2 + across[1] ** 2 + across[2] ** 2)
+    return np.array([[x, y, z], [u, v, w], [y * w - z * v, z * u - x * w, x * v - y * u]])
 
 
 def bursts(t_s: Floats, normals: Floats, layers: Integers) -> NDArray[np.bool_]:
@@ -129,12 +137,12 @@ def narrowed(
         turns, sigma = 2.0 * turns, SHRINK * sigma
         spins = np.concatenate([_children(spin, corners, ratio, spacing) for spin in spins])
         values = _over_turns(t_s, normals, layers, spins, turns, sigma, floor, most, EACH_SEGMENT)
-        spins = spins[np.argsort(-values, kind="stable")[: 4 * KEPT]]
+        spins = spins[np.argsort(-values, kind="stable")]
         ratio, spacing = 0.5 * ratio, 0.5 * spacing
-        spins = spins[distinct(spins, 0.6 * spacing, KEPT)]
+        spins = spins[distinct(spins, 0.6 * spacing, KEPT, CROWD)]
         if turns * TURN > span_s * np.linalg.norm(spins, axis=1).max():
             break
-    return spins[distinct(spins, 2.0 * spacing, keep)]
+    return spins[distinct(spins, NEAR, keep)]
 
 
 def _children(spin: Floats, corners: Floats, ratio: float, spacing: float) -> Floats:

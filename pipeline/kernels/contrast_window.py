@@ -67,9 +67,7 @@ def whole(t_s: Floats, normals: Floats, layers: Integers, times_each: int) -> tu
     return _window(t_s, normals, layers, starts, times_each)
 
 
-def segmented(
-    t_s: Floats, normals: Floats, layers: Integers, *, segment_s: float, most: int, most_each: int
-) -> Window:
+def segmented(t_s: Floats, normals: Floats, layers: Integers, *, segment_s: float, most: int, most_each: int) -> Window:
     """The events (normals (3, n)) in segments no longer than segment_s, thinned evenly.
 
     Events within a segment are thinned to about `most_each` on average, then whole segments are left out, evenly,

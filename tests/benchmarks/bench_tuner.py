@@ -127,9 +127,8 @@ def _drive(page: Any, pid: int) -> None:
             print(
                 f"{number + 1:6d}  {_status(pid, 'VmRSS') / 1e3:7.0f} MB  {_status(pid, 'Threads'):7d}  {heap:9.0f} MB"
             )
-    print(
-        f"change to answer {statistics.median(server):.0f} ms, change to picture {statistics.median(shown):.0f} ms (medians)"
-    )
+    answer_ms, picture_ms = statistics.median(server), statistics.median(shown)
+    print(f"change to answer {answer_ms:.0f} ms, change to picture {picture_ms:.0f} ms (medians)")
 
 
 def _status(pid: int, name: str) -> int:

@@ -138,6 +138,7 @@ export class Biases extends EventTarget {
     return ["ball", "noise"].map((kind) => chart({
       title: `${kind === "ball" ? "Ball's events" : "Noise"} [kev/s] against bias_${bias}`,
       low: 0,
+      whole: true,
       present: this.state.locked && !this.state.known ? null : this.values[bias],
       onpick: this.state.locked ? null : ({ x: value }) => this.#put(bias, value),
       series: ["on", "off"].map((polarity) => ({

@@ -9,13 +9,14 @@ const BOTTOM = 17;
 const TOP = 6;
 
 // series: [{name, colour, points: [{x, y, low, high}]}]; x is a number, or the index into `categories`.
-export function chart({ title, series, present = null, scale = "linear", categories = null, low = null, onpick = null }) {
+export function chart({ title, series, present = null, scale = "linear", categories = null, low = null, whole = false, onpick = null }) {
   const all = series.flatMap(({ points }) => points).filter(({ y }) => y !== null && y !== undefined && Number.isFinite(y));
   if (!all.length) return null;
   const known = series.flatMap(({ points }) => points.map(({ x }) => x));
   const place = placing(known, scale);
   const values = all.flatMap(({ y, low: a, high: b }) => [y, a ?? y, b ?? y]);
-  const spread = scaleOf(low === null ? usual(values) : [...usual(values), low]);
+  const shown = whole ? values : usual(values);
+  const spread = scaleOf(low === null ? shown : [...shown, low]);
   const y = (value) => HEIGHT - BOTTOM - (HEIGHT - BOTTOM - TOP) * Math.min(Math.max((value - spread.low) / (spread.high - spread.low), -0.05), 1.05);
   const svg = drawing("svg", { class: "chart", viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": title });
   for (const tick of spread.ticks) {

@@ -28,22 +28,21 @@ async function start() {
   const link = wantedByLink();
   let opening;
   try {
-    opening = await connection.open(link.recording);
+    opening = await opened(link);
   } catch (error) {
     notice(error instanceof Refused ? error.message : "The server does not answer: is `spinscope tune` still running?", "error", 0);
     return;
   }
   app.opening = opening;
   const { recording, presets } = opening;
-  const preset = { name: "opened", values: presets.opened };
-  const { opened } = presets;
+  const values = presets.opened;
   settings.start({
-    parameters: link.parameters(opened),
-    pinned: link.pinnedBy(opened),
+    parameters: link.parameters(values),
+    pinned: link.pinnedBy(values),
     clip: link.clip ?? recording.clip_us,
-    preset,
+    preset: { name: "opened", values },
   });
-  settings.fallback = { parameters: opened, clip: recording.clip_us };
+  settings.fallback = { parameters: values, clip: recording.clip_us };
   describe(opening);
   app.bar = new Bar(byId("bar"), opening.stages);
   app.overview = new Overview(byId("overview"), recording);
@@ -57,9 +56,23 @@ async function start() {
   new Controls(byId("controls"), opening.sections, settings);
   app.runner = new Runner(connection, settings, () => viewer.playhead_us());
   listen(link);
-  viewer.start(opening.viewer, byId("viewer")).catch((error) => notice(`The viewer does not start: ${error.message}`, "error", 0));
+  viewer.start(opening.viewer, byId("viewer")).catch((error) => {
+    app.blind = true; // the numbers are still there
+    notice(`The viewer does not start: ${error.message}`, "error", 0);
+  });
   if (Object.keys(link.biases).length) app.biases.take(link.biases);
   app.runner.want(true);
+}
+
+// The recording of the link, or where that cannot be opened the one the program was started with.
+async function opened(link) {
+  try {
+    return await connection.open(link.recording);
+  } catch (error) {
+    if (!(error instanceof Refused) || link.recording === null) throw error;
+    notice(error.message);
+    return connection.open(null);
+  }
 }
 
 function panel(title, open = false) {
@@ -83,7 +96,7 @@ function describe({ recording, recordings, presets }) {
   const size = `${recording.width_px} x ${recording.height_px}`;
   byId("about").textContent = `${recording.events.toLocaleString("en")} events, ${length}, ${size}`;
   for (const warning of recording.warnings) notice(warning, "warning", 20);
-  byId("preset").replaceChildren(...Object.keys(presets).map((name) => element("option", { value: name }, name)));
+  byId("preset").replaceChildren(...Object.keys(presets).map((name) => element("option", { value: name }, name === "opened" ? "as opened" : name)));
   byId("preset").value = "opened";
 }
 
@@ -102,7 +115,7 @@ function listen(link) {
     if (detail.state === "done") app.results.show(detail);
     if (["done", "failed"].includes(detail.state)) document.body.dataset.done = detail.serial;
     if (detail.measures && !app.opening.recording.is_long) showShots(detail.measures);
-    if (!detail.recording) return;
+    if (!detail.recording || app.blind) return;
     latest = detail.recording;
     try {
       const picture = await bytes(connection.path(`pictures/${detail.recording}`));
@@ -112,7 +125,8 @@ function listen(link) {
       first = false;
       document.body.dataset.shown = detail.serial;
     } catch (error) {
-      if (!(error instanceof Refused) || error.status !== 404) throw error;
+      if (app.blind || (error instanceof Refused && error.status === 404)) return;
+      throw error;
     }
   });
   connection.addEventListener("shots", ({ detail }) => {

@@ -55,7 +55,8 @@ function table(both) {
   }
   rows.push(row("Computing", values((m) => milliseconds(Object.values(m.stage_ms).reduce((a, b) => a + b, 0)))));
   const shotWords = both.map((m) => (m.shots.length > 1 ? `${m.shots.length} shots, the largest` : ""));
-  return element("table.numbers", {}, heading("Result", columns.map((c, i) => [c, shotWords[i]].filter(Boolean).join(": "))), ...rows);
+  const names = columns.map((c, i) => [c, shotWords[i]].filter(Boolean).join(": "));
+  return element("table.numbers", {}, names.some(Boolean) ? heading("Result", names) : null, ...rows);
 }
 
 const heading = (name, columns) => element("tr.heading", {}, element("th", {}, name), ...columns.map((c) => element("th", {}, c)));

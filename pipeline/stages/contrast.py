@@ -1,0 +1,301 @@
+"""Contrast: the spin whose turning back makes the logo sharpest on the ball, with its uncertainty.
+
+Not in the paper; it takes the place of the averaged flow of section 3.3. Every event is a point on the ball
+(`logo`: exact ray-sphere intersection with the track at the event's own time). The method is contrast maximisation
+(Gallego et al., CVPR 2018) on the sphere, scored as a likelihood ratio (kernels.contrast), searched in magnitude and
+direction, started from `normal_flow` where that has an answer, else from a search over all spins, and over a stretch
+of time that grows with the shot.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Setting
+from ..kernels.contrast_estimate import estimate_spin, follow_spin
+from ..kernels.contrast_events import Answer, LogoEvents, Place, Settings
+from ..kernels.contrast_picture import Picture, picture
+from ..parameters import ParameterGroup, switch, tunable
+from ..results import Packet, SpinEstimate, frozen
+from .logo import LogoResult
+from .spin import SpinResult
+from .track import TrackResult
+
+INPUTS = ("packet", "track", "logo", "spin")
+METHOD = "contrast"
+
+Floats = NDArray[np.float64]
+
+# Full estimates when the shot is so old, then each time it is half as old again; in between the last answer is
+# followed, which costs a tenth.
+STAGES_US = (5000, 10_000, 20_000, 50_000)
+LATER = 1.5
+# After a refusal it is worth trying again with so many more events.
+MORE = 1.25
+# ON and OFF, bright and dark pixels report 25 us sooner or later than the mean latency: what the ball flies meanwhile
+# is an error of its place that the tracker, which sees the outline, does not know of.
+LATENCY_SPREAD_S = 25e-6
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContrastParameters(ParameterGroup):
+    """How sharp, how long, and what is trusted."""
+
+    kernel_rad: float = tunable(
+        0.04, 0.01, 0.3, 0.005, "rad", "how near on the ball events must come to count as one (1 sigma)"
+    )
+    floor_events: float = tunable(1.5, 0.1, 100.0, 0.1, "events", "density below which differences mean little")
+    window_us: int = tunable(500_000, 5000, 10_000_000, 5000, "us", "how far back in time events may lie")
+    fewest_events: int = tunable(40, 10, 10_000, 10, "events", "logo events needed for an answer")
+    weakest: float = tunable(
+        0.25, 0.0, 5.0, 0.05, "", "contrast an event must gain over exchanged times (natural log), on average"
+    )
+    rival_sigmas: float = tunable(2.0, 0.0, 20.0, 0.1, "sigma", "lead that the best spin must have over any other")
+    smallest_patch_rad: float = tunable(
+        0.2, 0.0, 1.5, 0.01, "rad", "spread of the logo's events over the ball (rms) below which it is not seen"
+    )
+    axis_std_deg: float = tunable(12.0, 0.1, 180.0, 0.5, "deg", "largest stated error of the axis (1 sigma)")
+    magnitude_std_rps: float = tunable(
+        3.0,
+        0.01,
+        1000.0,
+        0.1,
+        "rps",
+        "largest stated error of the magnitude (1 sigma); a tenth of it if that is more",
+    )
+    curves: bool = switch(True, "score over magnitude and over axis directions, for the viewer")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContrastResult:
+    """The estimate from the present shot so far, and what it rests on.
+
+    estimate : the spin, or the reason for refusing
+    best_rps : (3,) float64, the best spin, also of a refused answer; NaN without one
+    rivals_rps : (k, 3) float64, other tops of the score
+    rival_sigmas : (k,) float64, by how many standard deviations the best one beats each
+    start_us, end_us : stretch of the events used (event time); 0, 0 without events
+    reference_us : the event time to which the events are turned back
+    offsets_px : (3,) float64, centre x, y and radius of the ball, refined less tracked
+    contrast : score an event less that of exchanged times; 0 = nothing turns with the spin
+    full : whether this tick made a full estimate, or followed the last one
+    magnitudes_rps, magnitude_scores : (m,) float64, the score an event along the best axis, at the last full estimate
+    directions, direction_scores : (d, 3) and (d,) float64, the same over all axes at the best magnitude
+    """
+
+    estimate: SpinEstimate
+    best_rps: Floats
+    rivals_rps: Floats
+    rival_sigmas: Floats
+    start_us: int
+    end_us: int
+    reference_us: float
+    offsets_px: Floats
+    contrast: float
+    full: bool
+    magnitudes_rps: Floats
+    magnitude_scores: Floats
+    directions: Floats
+    direction_scores: Floats
+
+
+@dataclass(slots=True)
+class State:
+    """The present shot's logo events, tick by tick, and the last answers.
+
+    full_us : age of the shot, us, at which the next full estimate is due
+    tried : number of events at the last full estimate
+    """
+
+    setting: Setting
+    shot: int | None = None
+    start_us: int = 0
+    parts: list[tuple[int, LogoEvents]] = field(default_factory=list)
+    places: list[tuple[float, float, float, float]] = field(default_factory=list)
+    full_us: float = STAGES_US[0]
+    tried: int = 0
+    answer: Answer | None = None
+    reason: str | None = None
+    picture: Picture = field(default_factory=Picture.empty)
+
+
+def start(parameters: ContrastParameters, setting: Setting) -> State:
+    """No shot yet."""
+    return State(setting)
+
+
+def step(
+    parameters: ContrastParameters,
+    state: State,
+    packet: Packet,
+    track: TrackResult,
+    logo: LogoResult,
+    spin: SpinResult,
+) -> ContrastResult:
+    """The estimate from the present shot up to the end of this tick."""
+    if not track.has_ball:
+        state.shot, state.answer = None, None
+        return _nothing(SpinEstimate.refused(METHOD, track.reason or "no ball"))
+    if state.shot != track.shot:
+        fresh = State(state.setting, track.shot, packet.start_us)
+        for name in State.__slots__:
+            setattr(state, name, getattr(fresh, name))
+    _take(parameters, state, packet, track, logo)
+    count = sum(len(part) for _, part in state.parts)
+    if count < parameters.fewest_events:
+        state.answer = None
+        reason = f"the logo was not seen: {count} logo events, {parameters.fewest_events} are needed"
+        return _nothing(SpinEstimate.refused(METHOD, reason, count))
+    full = _due(state, packet.end_us - state.start_us, count)
+    events = _joined(state)
+    settings = Settings(
+        fastest_rps=state.setting.max_spin_rps,
+        sigma=parameters.kernel_rad,
+        floor=parameters.floor_events,
+        fewest=parameters.fewest_events,
+    )
+    if full:
+        _estimate(parameters, state, events, settings, spin)
+        state.tried = count
+        state.picture = picture(events, state.answer, settings) if parameters.curves else Picture.empty()
+    elif state.answer is not None and state.reason is None:
+        state.answer = follow_spin(events, _place(state), settings, state.answer)
+        state.reason = _doubt(parameters, state.answer)
+    return _result(state, count, full)
+
+
+def _take(parameters: ContrastParameters, state: State, packet: Packet, track: TrackResult, logo: LogoResult) -> None:
+    """Keep the tick's logo events (not the outline's, which do not turn) and what is known of the ball's place."""
+    rows = np.flatnonzero(~logo.of_outline)
+    rays = state.setting.camera.rays(logo.centre_x_px[rows], logo.centre_y_px[rows])
+    part = LogoEvents(
+        (logo.events.t_us[rows] * 1e-6).astype(np.float64),
+        np.ascontiguousarray(logo.normals[rows].T),
+        logo.events.on[rows].astype(np.int64),
+        np.ascontiguousarray((rays / np.linalg.norm(rays, axis=1)[:, None]).T),
+        np.full(rows.size, logo.radius_px),
+    )
+    state.parts.append((packet.end_us, part))
+    flown_px = math.hypot(track.mean[2], track.mean[3]) * LATENCY_SPREAD_S
+    state.places.append((logo.position_std_px, logo.radius_std_px, logo.velocity_std_px_s, flown_px))
+    while state.parts[0][0] <= packet.end_us - parameters.window_us:
+        del state.parts[0], state.places[0]
+
+
+def _joined(state: State) -> LogoEvents:
+    parts = [part for _, part in state.parts]
+    return LogoEvents(
+        np.concatenate([part.t_s for part in parts]),
+        np.concatenate([part.normals for part in parts], axis=1),
+        np.concatenate([part.layers for part in parts]),
+        np.concatenate([part.facing for part in parts], axis=1),
+        np.concatenate([part.radius_px for part in parts]),
+    )
+
+
+def _place(state: State) -> Place:
+    """How well the ball's place is known over the stretch: the ticks' medians."""
+    position, radius, velocity, flown = (float(value) for value in np.median(np.array(state.places), axis=0))
+    return Place(
+        centre_std_px=max(math.hypot(position, flown), 0.01),
+        radius_std_px=max(radius, 0.01),
+        track_std_px=position,
+        drift_std_px_s=velocity,
+    )
+
+
+def _due(state: State, age_us: int, count: int) -> bool:
+    """Whether a full estimate is due: by the shot's age, or after a refusal as soon as there is much more to see."""
+    if age_us >= state.full_us:
+        later = [stage for stage in STAGES_US if stage > age_us]
+        state.full_us = later[0] if later else LATER * age_us
+        return True
+    refused = state.answer is None or state.reason is not None
+    return refused and count >= MORE * state.tried
+
+
+def _estimate(
+    parameters: ContrastParameters, state: State, events: LogoEvents, settings: Settings, spin: SpinResult
+) -> None:
+    """A full estimate: first from what is known already, and from a search where that does not convince."""
+    starts = []
+    if state.answer is not None and state.answer.spin_rps is not None:
+        starts += [state.answer.spin_rps, *state.answer.rivals_rps]
+    normal_flow = spin.estimates["normal_flow"].vector_rps
+    if normal_flow is not None and np.any(normal_flow):
+        starts.append(normal_flow)
+    answer = None
+    if starts:
+        answer = estimate_spin(events, _place(state), settings, starts_rps=np.array(starts), searching=False)
+    if answer is None or _doubt(parameters, answer) is not None:
+        answer = estimate_spin(events, _place(state), settings, starts_rps=np.array(starts) if starts else None)
+    state.answer, state.reason = answer, _doubt(parameters, answer)
+
+
+def _doubt(parameters: ContrastParameters, answer: Answer) -> str | None:
+    """Why an answer is not to be trusted, in words; None if it is."""
+    if answer.spin_rps is None:
+        return f"the logo was not seen: {answer.events} logo events, {parameters.fewest_events} are needed"
+    if answer.contrast < parameters.weakest:
+        return (
+            f"no pattern turns with the ball: the best spin gains {answer.contrast:.2f} an event over chance, "
+            f"{parameters.weakest:g} are needed"
+        )
+    if answer.patch_rad < parameters.smallest_patch_rad:
+        return (
+            f"the logo is hardly seen: its events spread over {math.degrees(answer.patch_rad):.0f} degrees, "
+            f"{math.degrees(parameters.smallest_patch_rad):.0f} are needed"
+        )
+    estimate = SpinEstimate(METHOD, answer.spin_rps, answer.covariance_rps2, None)
+    magnitude, std, axis_std = estimate.magnitude_rps, estimate.magnitude_std_rps, estimate.axis_std_deg
+    if magnitude is None or std is None or axis_std is None:
+        return "the ball does not turn"
+    if answer.margins.size and answer.margins.min() < parameters.rival_sigmas:
+        rival = answer.rivals_rps[int(np.argmin(answer.margins))]
+        return f"another spin explains the logo about as well: {_words(answer.spin_rps)} or {_words(rival)}"
+    if std > max(parameters.magnitude_std_rps, 0.1 * magnitude):
+        return f"the magnitude is too uncertain: {magnitude:.1f} +- {std:.1f} rps"
+    if axis_std > parameters.axis_std_deg:
+        return f"the axis is too uncertain: +- {axis_std:.0f} degrees"
+    return None
+
+
+def _words(spin_rps: Floats) -> str:
+    return f"({', '.join(f'{value:.0f}' for value in spin_rps)}) rps"
+
+
+def _result(state: State, count: int, full: bool) -> ContrastResult:
+    answer = state.answer
+    if answer is None or answer.spin_rps is None or answer.covariance_rps2 is None:
+        return _nothing(SpinEstimate.refused(METHOD, state.reason or "no estimate yet", count))
+    estimate = (
+        SpinEstimate(METHOD, frozen(answer.spin_rps.copy()), frozen(answer.covariance_rps2.copy()), None, count)
+        if state.reason is None
+        else SpinEstimate.refused(METHOD, state.reason, count)
+    )
+    half_us = 0.5e6 * answer.span_s
+    return ContrastResult(
+        estimate,
+        frozen(answer.spin_rps.copy()),
+        frozen(answer.rivals_rps.copy()),
+        frozen(answer.margins.copy()),
+        round(answer.reference_s * 1e6 - half_us),
+        round(answer.reference_s * 1e6 + half_us),
+        answer.reference_s * 1e6,
+        frozen(answer.offsets_px.copy()),
+        answer.contrast,
+        full,
+        *(frozen(column.copy()) for column in state.picture),
+    )
+
+
+def _nothing(estimate: SpinEstimate) -> ContrastResult:
+    """Nothing to see of a shot."""
+    curves = (frozen(column.copy()) for column in Picture.empty())
+    none, no_spins = frozen(np.empty(0)), frozen(np.empty((0, 3)))
+    unknown = frozen(np.full(3, np.nan))
+    return ContrastResult(estimate, unknown, no_spins, none, 0, 0, math.nan, frozen(np.zeros(3)), 0.0, False, *curves)

@@ -1,0 +1,170 @@
+"""What stands behind the page: measures, drawings made once, messages that replace each other."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.session import Choices
+from app.tuner.bench import Bench
+from app.tuner.jobs import Job, fault
+from app.tuner.measures import _jitter_px, measures
+from app.tuner.outbox import Outbox
+from app.tuner.runs import Finished, finish
+from app.viewer.tuning import Drawings, compared, layout_bytes, rrd_bytes, tab_names
+from pipeline.errors import ParameterError
+from pipeline.results import Circle
+
+from .conftest import Client
+
+
+@pytest.fixture(scope="module")
+def bench(samples: Path) -> Bench:
+    return Bench.open(samples / "flight_fast_top.h5", Choices())
+
+
+@pytest.fixture(scope="module")
+def finished(bench: Bench) -> Finished:
+    return finish(bench.clip(*bench.first_clip_us()), bench.session.parameters, lambda: None)
+
+
+def test_the_jitter_of_a_smooth_track_is_the_noise_put_on_it() -> None:
+    random = np.random.default_rng(3)
+    sigma = 0.2
+    places = np.stack([np.linspace(0, 800, 400), np.linspace(0, 300, 400)], axis=1) + sigma * random.standard_normal(
+        (400, 2)
+    )
+    ticks: list[Any] = [
+        SimpleNamespace(track=SimpleNamespace(measured=Circle(x, y, 20.0, 1.0), shot=0)) for x, y in places
+    ]
+    assert _jitter_px(ticks) == pytest.approx(sigma, rel=0.1)
+    assert _jitter_px(ticks[:2]) is None
+
+
+def test_measures_hold_numbers_only_and_agree_with_the_ticks(finished: Finished) -> None:
+    found = measures(finished.session, finished.ticks, finished.shots, finished.no_shot_reason)
+    assert found["ticks"] == len(finished.ticks)
+    assert found["logo_events"] == sum(len(tick.logo.events) for tick in finished.ticks)
+    estimate = found["shots"][0]["spin"]["triplet"]
+    own = finished.shots[0].estimates["triplet"]
+    assert estimate["magnitude_rps"] == own.magnitude_rps
+    # By the cosine rule from what else is told: |spin - truth| / |truth|.
+    truth = finished.session.truth
+    assert truth is not None and own.magnitude_rps is not None
+    size = float(np.linalg.norm(truth.spin_rps[len(truth.t_us) // 2]))
+    angle = np.radians(estimate["error_deg"])
+    gap = np.sqrt(size**2 + own.magnitude_rps**2 - 2 * size * own.magnitude_rps * np.cos(angle))
+    assert estimate["error_share"] == pytest.approx(gap / size, rel=0.02)
+
+
+def test_what_did_not_change_is_not_drawn_again(bench: Bench, finished: Finished) -> None:
+    clip = bench.clip(*bench.first_clip_us())
+    drawings = Drawings()
+    try:
+        first = drawings.chunks(finished.run, clip.keys(bench.session.parameters))
+        again = drawings.chunks(finished.run, clip.keys(bench.session.parameters))
+        assert all(a is b for a, b in zip(first, again, strict=True))
+        other = bench.session.parameters.with_assignments(["logo.pad_px=5"])
+        changed = drawings.chunks(finish(clip, other, lambda: None).run, clip.keys(other))
+        same = {chunk.entity_path for chunk in first} & {c.entity_path for c in changed if any(c is f for f in first)}
+        assert {"/image/events", "/image/surface", "/plots/x/kalman"} <= same
+        assert "/image/ball/logo" not in same
+    finally:
+        drawings.close()
+
+
+def test_drawings_keep_to_their_budget(finished: Finished, bench: Bench) -> None:
+    drawings = Drawings(budget_bytes=1)
+    try:
+        keys = bench.clip(*bench.first_clip_us()).keys(bench.session.parameters)
+        assert drawings.chunks(finished.run, keys)
+        assert len(drawings._made) == 1
+    finally:
+        drawings.close()
+
+
+def test_the_layout_has_a_tab_for_every_view(finished: Finished) -> None:
+    assert tab_names() == ["All stages", "Tracker", "Logo and flow", "Spin", "Compare", "Coach"]
+    for tab in ("", "Coach", "nothing"):
+        assert layout_bytes(finished.run, tab).startswith(b"RRF2")
+
+
+def test_a_recording_of_a_and_b_is_whole(finished: Finished, bench: Bench) -> None:
+    drawings = Drawings()
+    try:
+        chunks = drawings.chunks(finished.run, bench.clip(*bench.first_clip_us()).keys(bench.session.parameters))
+    finally:
+        drawings.close()
+    both = rrd_bytes([*chunks, *compared(chunks)], "both")
+    assert len(both) > 1.5 * len(rrd_bytes(chunks, "one"))
+
+
+def test_an_old_message_of_a_kind_gives_way_to_a_newer_one() -> None:
+    async def read() -> list[dict[str, Any]]:
+        outbox = Outbox()
+        for share in range(100):
+            outbox.put("run", share=share)
+        outbox.put("curve", points=3)
+        found = []
+        async for message in outbox.messages():
+            found.append(message)
+            if len(found) == 2:
+                outbox.close()
+        return found
+
+    assert asyncio.run(read()) == [{"kind": "run", "share": 99}, {"kind": "curve", "points": 3}]
+
+
+def test_a_job_tells_how_it_ended_and_stops_when_asked() -> None:
+    outbox = Outbox()
+
+    def told() -> dict[str, Any]:
+        return outbox._waiting["work"]
+
+    def fail(_: Job) -> dict[str, Any]:
+        raise ParameterError("the knob is loose")
+
+    Job("work", outbox, lambda _: {"answer": 42})._thread.join(5)
+    assert told() == {"kind": "work", "state": "done", "answer": 42}
+    Job("work", outbox, fail)._thread.join(5)
+    assert told() == {"kind": "work", "state": "failed", "error": "the knob is loose"}
+    began = threading.Event()
+
+    def endless(job: Job) -> dict[str, Any]:
+        while True:
+            began.set()
+            job.check()
+            time.sleep(0.001)
+
+    job = Job("work", outbox, endless)
+    assert began.wait(5)
+    job.cancel(5)
+    assert told() == {"kind": "work", "state": "cancelled"}
+
+
+def test_a_fault_is_one_line_that_names_the_stage() -> None:
+    assert fault(ParameterError("too loud")) == "too loud"
+    try:
+        raise ValueError("two\nlines")
+    except ValueError as error:
+        assert fault(error) == "the tuner failed: ValueError: two lines"
+
+
+def test_what_is_seen_at_the_playhead_comes_first_when_the_rest_takes_long(
+    client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.tuner.page.REST_WORTH_WAITING_S", 0.0)
+    start_us, end_us = client.opening["recording"]["clip_us"]
+    middle_us = (start_us + end_us) / 2
+    done = client.run({"surface": {"k_px": 13}}, playhead_us=middle_us)
+    parts = [m for m in client.messages if m["state"] == "partial" and m["serial"] == done["serial"]]
+    assert len(parts) == 1
+    assert middle_us <= parts[0]["end_us"] < done["end_us"]
+    assert client.http.get(client.path(f"pictures/{parts[0]['recording']}")).status_code == 200
