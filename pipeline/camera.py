@@ -122,7 +122,7 @@ class Camera:
         wide = 1 + x * x + y * y
         g4 = (np.atleast_1d(radius_px) / self.focal_px) ** 4
         u = np.sqrt(g4 / wide)
-        for _ in range(4):  # from a relative error of u on: u^2, u^4, u^8, u^16
+        for _ in range(2 if u.max(initial=0.0) < 1e-3 else 4):  # from a relative error of u on: u^2, u^4, u^8, u^16
             u -= ((u + wide) * u * u - g4 * (1 + u)) / ((3 * u + 2 * wide) * u - g4)
         centre[:, :2] /= (1 + u)[:, None]
         centre *= (ball_radius_m * np.sqrt((1 + u) / u))[:, None]

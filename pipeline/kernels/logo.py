@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 @numba.njit(cache=True, nogil=True)
 def rows_inside(
-    rows: NDArray[np.int64],
     t_us: NDArray[np.int64],
     x_px: NDArray[np.uint16],
     y_px: NDArray[np.uint16],
@@ -17,16 +16,16 @@ def rows_inside(
     centre_px: tuple[float, float],
     velocity_px_s: tuple[float, float],
     radius_px: float,
-) -> int:
-    """Write the rows of the events strictly inside the circle into `rows` and return how many there are.
+) -> NDArray[np.int64]:
+    """Rows (m,) int64 of the events strictly inside the circle.
 
-    rows : (n,) int64, overwritten; only the first `count` entries mean anything afterwards
     reference_us : the time stamp that an event of the scene with the ball at `centre_px` carries
     radius_px : of the mask, the ball's less pad; nothing is inside if it is not positive
     """
+    rows = np.empty(t_us.size, np.int64)
     count = 0
     if radius_px <= 0.0:
-        return count
+        return rows[:0]
     radius2 = radius_px * radius_px
     x0, y0 = centre_px
     vx, vy = velocity_px_s[0] * 1e-6, velocity_px_s[1] * 1e-6
@@ -36,4 +35,27 @@ def rows_inside(
         dy = y_px[i] - (y0 + vy * dt_us)
         rows[count] = i  # unconditional store: a branch here mispredicts at the outline
         count += dx * dx + dy * dy < radius2
-    return count
+    return rows[:count]
+
+
+@numba.njit(cache=True, nogil=True)
+def outline_like(
+    x_px: NDArray[np.float64],
+    y_px: NDArray[np.float64],
+    on: NDArray[np.bool_],
+    velocity_px_s: tuple[float, float],
+    least_radius_px: float,
+) -> NDArray[np.bool_]:
+    """(n,) bool: ON ahead of the centre or OFF behind it, within 60 degrees of the motion, this far out or more.
+
+    x_px, y_px : (n,), relative to the ball's centre
+    """
+    out = np.empty(x_px.size, np.bool_)
+    vx, vy = velocity_px_s
+    quarter, least2 = 0.25 * (vx * vx + vy * vy), least_radius_px * least_radius_px
+    for i in range(x_px.size):
+        across2 = x_px[i] * x_px[i] + y_px[i] * y_px[i]
+        ahead = x_px[i] * vx + y_px[i] * vy
+        # ahead > speed * cos(60 degrees) * distance from the centre, without a root
+        out[i] = ((ahead > 0.0) == on[i]) & (ahead * ahead > quarter * across2) & (across2 > least2)
+    return out

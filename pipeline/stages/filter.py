@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..camera import Setting
 from ..events import EventBatch
 from ..kernels import filter as kernels
+from ..kernels.rows import taken
 from ..parameters import ParameterGroup, choice, tunable
 from ..results import Packet
 
@@ -60,10 +61,14 @@ def step(parameters: FilterParameters, state: FilterState, packet: Packet) -> Fi
     logo = (MODES.index(parameters.logo_mode), parameters.logo_threshold_us)
     if surface[0] == logo[0] == kernels.OFF:
         return FilterResult(events, events)
-    passed = kernels.passing(
+    rows, logo_rows = kernels.passing(
         state.last, state.width_px, events.t_us, events.x_px, events.y_px, events.on, *surface, *logo
     )
-    surface_events = events if surface[0] == kernels.OFF else events[kernels.rows_with(passed, 0)]
+    surface_events = events if surface[0] == kernels.OFF else _taken(rows, events)
     if logo == surface:
         return FilterResult(surface_events, surface_events)
-    return FilterResult(surface_events, events if logo[0] == kernels.OFF else events[kernels.rows_with(passed, 1)])
+    return FilterResult(surface_events, events if logo[0] == kernels.OFF else _taken(logo_rows, events))
+
+
+def _taken(rows: NDArray[np.int64], events: EventBatch) -> EventBatch:
+    return EventBatch(*taken(rows, events.t_us, events.x_px, events.y_px, events.on))

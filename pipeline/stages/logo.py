@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from ..camera import Setting
 from ..events import EventBatch
-from ..kernels.logo import rows_inside
+from ..kernels.logo import outline_like, rows_inside
+from ..kernels.rows import taken
 from ..kernels.sphere import meet_ball
 from ..parameters import ParameterGroup, tunable
 from ..results import Packet, frozen
@@ -18,6 +19,8 @@ from .filter import FilterResult
 from .track import TrackResult
 
 INPUTS = ("packet", "filter", "track")
+
+Floats = NDArray[np.float64]
 
 # A centre that moves evenly in the image moves almost evenly in space: taking it as even over 16 px (f = 1646 px) is
 # wrong by less than 0.01 px across the line of sight.
@@ -52,7 +55,7 @@ class LogoResult:
     """
 
     events: EventBatch
-    centre_x_px: NDArray[np.float64]
+    centre_x_px: Floats
     centre_y_px: NDArray[np.float64]
     x_px: NDArray[np.float64]
     y_px: NDArray[np.float64]
@@ -87,10 +90,12 @@ def step(
             EventBatch.empty(), none, none, none, none, math.nan, parameters.pad_px, empty, empty, no, *(math.nan,) * 3
         )
     radius_px = float(track.mean[4])
-    events = filtered.logo_events[_rows(filtered.logo_events, track, radius_px - parameters.pad_px)]
+    events = _inside(filtered.logo_events, track, radius_px - parameters.pad_px)
     centre_x, centre_y = track.centre_px(events.t_us)
-    rays = state.camera.rays(events.x_px, events.y_px)
-    from_centre = (rays - state.camera.rays(centre_x, centre_y))[:, :2] * state.camera.focal_px
+    camera = state.camera
+    rays = camera.rays(events.x_px, events.y_px)
+    middles = camera.rays(centre_x, centre_y)
+    x, y = (rays[:, 0] - middles[:, 0]) * camera.focal_px, (rays[:, 1] - middles[:, 1]) * camera.focal_px
     points, normals = meet_ball(
         rays, events.t_us, packet.start_us, packet.end_us, _knots_m(packet, track, state), state.ball_radius_m
     )
@@ -98,29 +103,28 @@ def step(
         events=events,
         centre_x_px=frozen(centre_x),
         centre_y_px=frozen(centre_y),
-        x_px=frozen(from_centre[:, 0].copy()),
-        y_px=frozen(from_centre[:, 1].copy()),
+        x_px=frozen(x),
+        y_px=frozen(y),
         radius_px=radius_px,
         pad_px=parameters.pad_px,
         points_m=frozen(points),
         normals=frozen(normals),
-        of_outline=frozen(_of_outline(from_centre, events.on, track)),
+        of_outline=frozen(_of_outline(x, y, events.on, track)),
         position_std_px=math.sqrt(0.5 * (track.covariance[0, 0] + track.covariance[1, 1])),
         radius_std_px=math.sqrt(track.covariance[4, 4]),
         velocity_std_px_s=math.sqrt(0.5 * (track.covariance[2, 2] + track.covariance[3, 3])),
     )
 
 
-def _rows(events: EventBatch, track: TrackResult, mask_radius_px: float) -> NDArray[np.int64]:
-    """Rows of the events inside the mask."""
-    rows = np.empty(len(events), np.int64)
-    x, y, vx, vy, _ = (float(value) for value in track.mean)
-    reference_us = track.t_us + track.latency_us
-    inside = rows_inside(rows, events.t_us, events.x_px, events.y_px, reference_us, (x, y), (vx, vy), mask_radius_px)
-    return rows[:inside]
+def _inside(events: EventBatch, track: TrackResult, mask_radius_px: float) -> EventBatch:
+    """The events inside the mask."""
+    x, y, vx, vy, _ = track.mean.tolist()
+    columns = events.t_us, events.x_px, events.y_px
+    rows = rows_inside(*columns, track.t_us + track.latency_us, (x, y), (vx, vy), mask_radius_px)
+    return EventBatch(*taken(rows, *columns, events.on))
 
 
-def _of_outline(from_centre_px: NDArray[np.float64], on: NDArray[np.bool_], track: TrackResult) -> NDArray[np.bool_]:
+def _of_outline(x_px: Floats, y_px: Floats, on: NDArray[np.bool_], track: TrackResult) -> NDArray[np.bool_]:
     """(n,) whether events look like the shaded rim of a bright ball that moves over a darker ground.
 
     A ball lit from above dims towards its rim, by a contrast threshold of 25 % at two thirds of the radius (the
@@ -128,20 +132,17 @@ def _of_outline(from_centre_px: NDArray[np.float64], on: NDArray[np.bool_], trac
     those before the front half are still reporting ON there; both stand still in the ball's frame and so look like a
     logo that does not turn. They lie within 60 degrees of the direction of motion.
     """
-    vx, vy, radius_px = (float(track.mean[i]) for i in (2, 3, 4))
-    speed = math.hypot(vx, vy)
-    if speed < OUTLINE_SPEED_PX_S:
+    _, _, vx, vy, radius_px = track.mean.tolist()
+    if math.hypot(vx, vy) < OUTLINE_SPEED_PX_S:
         return np.zeros(on.size, np.bool_)
-    across2 = from_centre_px[:, 0] ** 2 + from_centre_px[:, 1] ** 2
-    ahead = (from_centre_px[:, 0] * vx + from_centre_px[:, 1] * vy) / speed
-    facing = np.where(on, ahead, -ahead) > 0.5 * np.sqrt(across2)
-    return facing & (across2 > (OUTLINE_SHARE * radius_px) ** 2)
+    return outline_like(x_px, y_px, on, (vx, vy), OUTLINE_SHARE * radius_px)
 
 
 def _knots_m(packet: Packet, track: TrackResult, setting: Setting) -> NDArray[np.float64]:
     """(k, 3) the ball's centre at k times spread evenly over the packet."""
-    travel_px = math.hypot(track.mean[2], track.mean[3]) * (packet.end_us - packet.start_us) * 1e-6
-    count = 1 + math.ceil(travel_px / KNOT_SPACING_PX)
-    times_us = np.linspace(packet.start_us, packet.end_us, count).round().astype(np.int64)
+    _, _, vx, vy, radius_px = track.mean.tolist()
+    span_us = packet.end_us - packet.start_us
+    count = 1 + math.ceil(math.hypot(vx, vy) * span_us * 1e-6 / KNOT_SPACING_PX)
+    times_us = packet.start_us + np.arange(count, dtype=np.float64) * (span_us / max(count - 1, 1))
     x_px, y_px = track.centre_px(times_us)
-    return setting.camera.ball_centre_m(x_px, y_px, np.full(count, track.mean[4]), setting.ball_radius_m)
+    return setting.camera.ball_centre_m(x_px, y_px, np.full(count, radius_px), setting.ball_radius_m)

@@ -87,7 +87,9 @@ class TrackResult:
         """Whether there is a ball that later stages may use."""
         return self.status in ("tracking", "coasting")
 
-    def centre_px(self, event_t_us: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def centre_px(
+        self, event_t_us: NDArray[np.int64] | NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Centre (x, y) in px at the scene times behind these event times (section 3.2, eq. ball_pos)."""
         dt_s = (event_t_us - self.latency_us - self.t_us) * 1e-6
         return self.mean[0] + self.mean[2] * dt_s, self.mean[1] + self.mean[3] * dt_s
@@ -102,6 +104,7 @@ OUTLINE_STD_PX = 0.05
 # What no filtering takes away: the calibration of latency, place and radius, which differs from shot to shot.
 LATENCY_STD_US = 12.0
 PLACE_STD_PX, RADIUS_STD_PX = 0.06, 0.1
+COMMON_COVARIANCE = np.diag([PLACE_STD_PX**2, PLACE_STD_PX**2, 0.0, 0.0, RADIUS_STD_PX**2])
 # A second ball takes the track over only when this much faster (a slower one rolls back), or while the first
 # is out of sight and when not much slower (a ball that was hit).
 RIVAL_SPEED, RIVAL_SPEED_UNSEEN = 1.5, 0.7
@@ -157,10 +160,10 @@ def step(
     if parameters.ball == "fixed":
         variance = np.array([1.0, 1.0, 0.0, 0.0, 1.0]) * parameters.fixed_std_px**2
         return _result(parameters, packet, "tracking", 0, _fixed_ring(parameters), np.diag(variance))
-    span_us = max(parameters.contour_us, VOTE_US)
-    state.contour = EventBatch.concatenate([state.contour, filtered.logo_events]).between(
-        packet.end_us - span_us, packet.end_us
-    )
+    since_us, events = packet.end_us - max(parameters.contour_us, VOTE_US), filtered.logo_events
+    if since_us < packet.start_us:
+        events = EventBatch.concatenate([state.contour, events])
+    state.contour = events.between(since_us, packet.end_us)
     if state.ball is None:
         return _search(parameters, state, packet, surface)
     return _follow(parameters, state, state.ball, packet, surface)
@@ -293,8 +296,8 @@ def _honest(ball: BallFilter) -> NDArray[np.float64]:
     """The filter's covariance plus the errors that every tick has in common."""
     covariance = ball.covariance
     late = ball.mean[2:4] * LATENCY_STD_US * 1e-6
-    covariance[:2, :2] += np.outer(late, late)
-    covariance[OBSERVED, OBSERVED] += np.array([PLACE_STD_PX, PLACE_STD_PX, RADIUS_STD_PX]) ** 2
+    covariance[:2, :2] += late[:, None] * late
+    covariance += COMMON_COVARIANCE
     return covariance
 
 

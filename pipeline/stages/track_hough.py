@@ -46,10 +46,8 @@ def hough_near(
     if x0 >= x1 or y0 >= y1:
         return None
     xs, ys = kernels.bright_pixels(surface.cleaned(x0, y0, x1, y1), EDGE_LEVEL, MOST_PIXELS)
-    votes = np.zeros((2 * reach_px + 1, 2 * reach_px + 1, radii), np.uint16)
-    left, top = round(x_px) - reach_px, round(y_px) - reach_px
-    kernels.vote(votes, xs + x0, ys + y0, left, top, first_radius)
-    return _circle_of_peak(votes, left, top, first_radius)
+    left, top, side = round(x_px) - reach_px, round(y_px) - reach_px, 2 * reach_px + 1
+    return _circle(kernels.best_circle(xs + x0, ys + y0, left, top, side, side, first_radius, radii))
 
 
 def candidates(
@@ -110,9 +108,9 @@ def find_circle(image: NDArray[Any], radius_min_px: float, radius_max_px: float)
     first_radius = max(1, math.floor(radius_min_px))
     radii = math.ceil(radius_max_px) - first_radius + 1
     height, width = pixels.shape
-    votes = np.zeros((height + 2 * radii, width + 2 * radii, radii), np.uint16)
-    kernels.vote(votes, xs, ys, -radii, -radii, first_radius)
-    start = _circle_of_peak(votes, -radii, -radii, first_radius)
+    start = _circle(
+        kernels.best_circle(xs, ys, -radii, -radii, width + 2 * radii, height + 2 * radii, first_radius, radii)
+    )
     if start is None:
         return None
     x, y, still = xs.astype(np.float64), ys.astype(np.float64), np.zeros(xs.size)
@@ -135,10 +133,5 @@ def find_circle(image: NDArray[Any], radius_min_px: float, radius_max_px: float)
     return Circle(float(ring[0]), float(ring[1]), float(ring[4]), score) if score >= 0.5 else None
 
 
-def _circle_of_peak(votes: NDArray[np.uint16], left_px: int, top_px: int, first_radius_px: int) -> Circle | None:
-    support, a, b, k = kernels.peak(votes, first_radius_px)
-    if support == 0.0:
-        return None
-    x, y, radius = kernels.refined(votes, a, b, k)
-    score = min(1.0, int(votes[b, a, k]) / (2 * math.pi * (first_radius_px + k)))
-    return Circle(left_px + x, top_px + y, first_radius_px + radius, score)
+def _circle(found: tuple[float, float, float, float]) -> Circle | None:
+    return Circle(*found) if found[3] > 0.0 else None

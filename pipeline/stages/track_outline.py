@@ -20,20 +20,8 @@ from ..results import Circle
 
 Floats = NDArray[np.float64]
 
-# Events used for a fit: beyond this the pixels' common errors outweigh the statistical, 0.1 px / sqrt(n).
-MOST_EVENTS = 200
-# An event this near the fitted outline supports it: the scatter on clean outlines is 0.1-0.15 px, on a dim or
-# textured scene three times as much.
-ON_OUTLINE_PX = 1.2
-# Behind, the ball's shading fires up to a fifth of the radius before the edge comes.
-EARLY_SHARE = 0.2
-SECTORS = 32
-# A ring's scatter above this is no outline but a band of events.
-MOST_SCATTER_PX = 0.5
 # The velocity vote looks this far back in time; longer bends the test, shorter leaves too few events.
 VOTE_US = 1500
-# Events that vote for the velocity: a ring of them stands out among some 200 velocities.
-MOST_VOTERS = 120
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,59 +144,33 @@ def measure(
     gate_px : events this near the expected outline take part
     prior_std : (5,) how firmly the expectation holds
     """
-    oval = oval_of(camera, expected[0], expected[1])
-    chosen = kernels.near_outline(expected, events.t_us, events.x_px, events.y_px, end_us, gate_px, MOST_EVENTS, True)
-    if chosen.size < 12:
-        return None
-    ring, covariance, scatter, weight = kernels.fit_ring(
-        expected, prior_std, oval, *_columns(events, chosen, end_us), gate_px, 0.6, 9
-    )
-    if not (np.all(np.isfinite(ring)) and ring[4] > 1.0 and weight >= 8.0 and scatter <= MOST_SCATTER_PX):
-        return None
-    return _judged(events, end_us, camera, ring, covariance, scatter, oval)
-
-
-def _judged(
-    events: EventBatch,
-    end_us: int,
-    camera: Camera,
-    ring: Floats,
-    covariance: Floats,
-    scatter: float,
-    oval: Floats,
-) -> Sighting:
-    around = kernels.near_outline(
-        ring,
+    ring, covariance, scatter, found = kernels.measured(
+        expected,
+        prior_std,
+        oval_of(camera, expected[0], expected[1]),
         events.t_us,
         events.x_px,
         events.y_px,
+        events.on,
         end_us,
-        max(4 * ON_OUTLINE_PX, EARLY_SHARE * ring[4]),
-        400,
-        False,
-    )
-    found, ahead_on, behind_on, ahead, behind, visible, outside, _ = kernels.support(
-        ring,
-        oval,
-        *_columns(events, around, end_us),
-        events.on[around],
+        gate_px,
         camera.width_px,
         camera.height_px,
-        ON_OUTLINE_PX,
-        EARLY_SHARE * ring[4],
-        SECTORS,
-    ).tolist()
+    )
+    if math.isnan(ring[0]):
+        return None
+    events_on, ahead_on, behind_on, ahead, behind, visible, outside, _ = found.tolist()
     return Sighting(
         ring,
         covariance,
         scatter,
-        int(found),
+        int(events_on),
         ahead,
         behind,
         ahead_on - behind_on,
         ahead_on,
         visible,
-        outside / max(found, 1.0),
+        outside / max(events_on, 1.0),
     )
 
 
@@ -217,23 +179,20 @@ def sight(events: EventBatch, end_us: int, camera: Camera, circle: Circle, limit
     radius = circle.radius_px
     fastest = limits.speed_max_radii_s * radius
     recent = events.between(end_us - VOTE_US, end_us)
-    reach = 1.3 * radius + fastest * VOTE_US * 1e-6
-    chosen = np.flatnonzero((np.abs(recent.x_px - circle.x_px) <= reach) & (np.abs(recent.y_px - circle.y_px) <= reach))
-    chosen = chosen[:: max(1, chosen.size // MOST_VOTERS) | 1]
-    if chosen.size < 12:
+    ring, gate = kernels.moving(
+        circle.x_px,
+        circle.y_px,
+        radius,
+        recent.t_us,
+        recent.x_px,
+        recent.y_px,
+        recent.on,
+        end_us,
+        VOTE_US * 1e-6,
+        fastest,
+    )
+    if math.isnan(ring[0]):
         return None
-    columns = _columns(recent, chosen, end_us)
-    ring = np.array([circle.x_px, circle.y_px, 0.0, 0.0, radius])
-    # Two rounds: all velocities with an outline as wide as the steps, then between them. The second width is
-    # what a Hough circle may be off, about 2 px on balls of 20 px.
-    for gate, span in ((0.3 * radius, fastest), (max(2.0, 0.15 * radius), 0.3 * radius / (VOTE_US * 1e-6))):
-        velocity_step = gate / (VOTE_US * 1e-6)
-        m = math.ceil(span / velocity_step)
-        votes = np.zeros((2 * m + 1, 2 * m + 1))
-        kernels.vote_velocity(votes, ring, *columns, recent.on[chosen], velocity_step, gate)
-        row, column = divmod(int(np.argmax(np.abs(votes))), votes.shape[1])
-        ring[2] += (column - m) * velocity_step
-        ring[3] += (row - m) * velocity_step
     free = np.full(5, 1e9)
     first = measure(recent, end_us, camera, ring, 1.5 * gate, free)
     if first is None or first.ahead < 0.3:
@@ -245,9 +204,3 @@ def sight(events: EventBatch, end_us: int, camera: Camera, circle: Circle, limit
     fits = limits.radius_min_px <= size <= limits.radius_max_px
     speed = found.speed_px_s / size
     return found if fits and limits.speed_min_radii_s <= speed <= limits.speed_max_radii_s else None
-
-
-def _columns(events: EventBatch, chosen: NDArray[np.int64], end_us: int) -> tuple[Floats, Floats, Floats]:
-    """Seconds after end_us, and pixels, of the chosen events, as float64."""
-    tau_s = np.asarray((events.t_us[chosen] - end_us) * 1e-6, np.float64)
-    return tau_s, events.x_px[chosen].astype(np.float64), events.y_px[chosen].astype(np.float64)

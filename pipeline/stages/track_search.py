@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..camera import Camera
 from ..events import EventBatch
 from ..kernels import contour as kernels
+from ..kernels.rows import taken
 from ..results import Circle
 from .surface import SurfaceResult
 from .track_hough import candidates
@@ -69,7 +70,8 @@ class Rivals:
             rings.append(tracked)
         for ring in rings:
             margin = 0.3 * ring[4] + 2.0  # room for trails, and for errors of the older ones
-            events = events[kernels.clear_of(ring, events.t_us, events.x_px, events.y_px, end_us, margin)]
+            columns = events.t_us, events.x_px, events.y_px
+            events = EventBatch(*taken(kernels.clear_of(ring, *columns, end_us, margin), *columns, events.on))
         _, found = look(surface, events, end_us, camera, limits, MOST_RIVALS)
         self.known += [(end_us, one) for one, _ in found]
         return found[0] if found and found[0][0].trusted else None

@@ -17,7 +17,6 @@ from pipeline.stages import filter, surface, track
 from pipeline.stages.filter import FilterParameters
 from pipeline.stages.surface import SurfaceParameters
 from pipeline.stages.track import TrackParameters
-from pipeline.stages.track_outline import MOST_EVENTS
 from tests import naive_circle
 from tests.track_runs import PAPERS_SETTING, inputs, run, sample, tracked
 
@@ -74,7 +73,8 @@ def test_fit_of_an_outline(benchmark: Any) -> None:
     packet, filtered, _ = rows[TICK]
     ring = tracked(NAME)[TICK].mean.copy()
     events = filtered.logo_events
-    chosen = contour.near_outline(ring, events.t_us, events.x_px, events.y_px, packet.end_us, 3.0, MOST_EVENTS, True)
+    columns = events.t_us, events.x_px, events.y_px
+    chosen = contour.near_outline(ring, *columns, packet.end_us, 3.0, contour.MOST_EVENTS, True)
     columns = (
         (events.t_us[chosen] - packet.end_us) * 1e-6,
         events.x_px[chosen].astype(np.float64),

@@ -157,3 +157,27 @@ def test_an_oval_outline_is_known() -> None:
     fitted, _, scatter, _ = contour.fit_ring(*args, np.array([0.04, 0.0]), np.zeros(240), x, y, 3.0, 0.6, 12)
     assert np.allclose(fitted, [50, 40, 0, 0, 20], atol=0.05)
     assert scatter < 0.02
+
+
+def test_squares_hold_their_border() -> None:
+    x, y = np.array([0, 5, 10, 11, 5], np.uint16), np.array([5, 5, 10, 5, 11], np.uint16)
+    assert contour.in_square(x, y, 5.0, 5.0, 5.0).tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize("bright", [True, False])
+def test_a_moving_ring_is_measured_from_a_place_alone(bright: bool) -> None:
+    """The velocity by vote, then the fit, its support, and NaN with nothing there."""
+    ring = np.array([60.0, 50.0, 4000.0, -2500.0, 16.0])
+    tau, x, y, on = on_ring(ring, 600, np.random.default_rng(3))
+    columns = np.round(tau * 1e6).astype(np.int64), np.round(x).astype(np.uint16), np.round(y).astype(np.uint16)
+    recent = tau > -1.5e-3
+    events = (*(column[recent] for column in columns), (on if bright else ~on)[recent])
+    start, gate = contour.moving(60.8, 49.0, 15.5, *events, 0, 1.5e-3, 12_000.0)
+    assert np.hypot(*(start - ring)[2:4]) < 1500
+    fitted, covariance, scatter, found = contour.measured(start, FREE, ROUND, *events, 0, 1.5 * gate, 1280, 720)
+    assert np.allclose(fitted[:2], ring[:2], atol=0.3) and abs(fitted[4] - 16) < 0.2
+    assert np.hypot(*(fitted - ring)[2:4]) < 300 and scatter < 0.6 and np.all(np.diag(covariance) > 0)
+    assert min(found[3], found[4]) > 0.8 and np.allclose(found[1:3], [bright, not bright], atol=0.03)
+    nothing = tuple(column[:5] for column in events)
+    assert np.isnan(contour.moving(60.8, 49.0, 15.5, *nothing, 0, 1.5e-3, 12_000.0)[0][0])
+    assert np.isnan(contour.measured(start, FREE, ROUND, *nothing, 0, 3.0, 1280, 720)[0][0])

@@ -84,3 +84,18 @@ def test_active_cells_equal_the_twin(height: int, width: int, cell: int, events:
     y = rng.integers(0, height, events).astype(np.uint16)
     columns, rows = circle.active_cells(values, x, y, 100, cell)
     assert list(zip(columns, rows, strict=True)) == naive_circle.active_cells(values, x, y, 100, cell)
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_the_best_circle_is_the_peak_of_the_vote(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    xs, ys = rng.integers(0, 40, (2, int(rng.integers(0, 60))))
+    votes = naive_circle.vote((9, 11, 4), xs, ys, 15, 16, 6)
+    support, a, b, k = naive_circle.peak(votes, 6)
+    found = circle.best_circle(xs, ys, 15, 16, 11, 9, 6, 4)
+    if support == 0.0:
+        assert found == (0.0, 0.0, 0.0, 0.0)
+        return
+    x, y, radius = circle.refined(votes, a, b, k)
+    share = min(1.0, votes[b, a, k] / (2 * math.pi * (6 + k)))
+    assert np.allclose(found, (15 + x, 16 + y, 6 + radius, share))

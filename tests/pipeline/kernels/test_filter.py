@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.kernels import filter as kernels
+from pipeline.kernels.rows import taken
 from tests.naive_filter import NaiveFilter
 
 MODES = ("off", "stc", "trail", "stc_cut_trail")
@@ -24,7 +25,7 @@ def passed_rows(
 ) -> tuple[list[int], list[int]]:
     """Rows that the two filters pass; events are (t_us, x_px, y_px, on)."""
     t, x, y, on = (np.array([e[c] for e in events]) for c in range(4))
-    passed = kernels.passing(
+    rows, logo_rows = kernels.passing(
         last,
         WIDTH,
         t.astype(np.int64),
@@ -36,7 +37,7 @@ def passed_rows(
         MODES.index(other[0]),
         other[1],
     )
-    return kernels.rows_with(passed, 0).tolist(), kernels.rows_with(passed, 1).tolist()
+    return rows.tolist(), logo_rows.tolist()
 
 
 def fresh() -> np.ndarray:
@@ -89,7 +90,15 @@ def test_the_first_event_of_a_pixel_passes_trail_only(on: bool) -> None:
         assert passed_rows(fresh(), [(0, 0, 0, on)], (mode, 10))[0] == ([0] if mode in ("off", "trail") else [])
 
 
-def test_rows_of_more_events_than_a_byte_counts() -> None:
-    passed = np.arange(1000, dtype=np.uint8) & 3
-    for bit in (0, 1):
-        assert np.array_equal(kernels.rows_with(passed, bit), np.flatnonzero(passed & (1 << bit)))
+def test_rows_are_taken_from_every_column() -> None:
+    rng = np.random.default_rng(3)
+    columns = (
+        np.arange(1000),
+        rng.integers(0, 60000, 1000).astype(np.uint16),
+        rng.integers(0, 60000, 1000).astype(np.uint16),
+        rng.random(1000) < 0.5,
+    )
+    for rows in (np.flatnonzero(rng.random(1000) < 0.3), np.empty(0, np.int64)):
+        for column, kept in zip(columns, taken(rows, *columns), strict=True):
+            assert kept.dtype == column.dtype
+            assert np.array_equal(kept, column[rows])

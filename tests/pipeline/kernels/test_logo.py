@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.kernels.logo import rows_inside
+from pipeline.kernels.logo import outline_like, rows_inside
 from tests.naive_spin import naive_rows_inside
 
 
@@ -21,13 +21,21 @@ def test_equals_its_twin(seed: int, velocity: tuple[float, float], radius: float
     t = start_us + np.sort(rng.integers(0, 5000, 100))
     x, y = (rng.integers(0, 90, 100).astype(np.uint16) for _ in range(2))
     given_circle = (t, x, y, float(start_us + 4900), (45.3, 44.6), velocity, radius)
-    rows = np.empty(100, np.int64)
-    assert rows[: rows_inside(rows, *given_circle)].tolist() == naive_rows_inside(*given_circle)
+    assert rows_inside(*given_circle).tolist() == naive_rows_inside(*given_circle)
 
 
 def test_the_outline_itself_is_outside() -> None:
     x, y = np.array([13, 10, 12], np.uint16), np.array([14, 15, 14], np.uint16)
-    rows = np.empty(3, np.int64)
     t = np.zeros(3, np.int64)
-    count = rows_inside(rows, t, x, y, 0.0, (10.0, 10.0), (0.0, 0.0), 5.0)
-    assert rows[:count].tolist() == [2]
+    rows = rows_inside(t, x, y, 0.0, (10.0, 10.0), (0.0, 0.0), 5.0)
+    assert rows.tolist() == [2]
+
+
+@given(seed=st.integers(0, 100_000), speed=st.floats(200, 9000), heading=st.floats(0, 6.3))
+def test_the_rims_polarity_is_told_by_the_angle_to_the_motion(seed: int, speed: float, heading: float) -> None:
+    rng = np.random.default_rng(seed)
+    x, y, on = *rng.uniform(-20, 20, (2, 200)), rng.random(200) < 0.5
+    off = np.abs((np.arctan2(y, x) - heading + np.pi) % (2 * np.pi) - np.pi)
+    expected = np.where(on, off < np.pi / 3, off > 2 * np.pi / 3) & (np.hypot(x, y) > 10)
+    found = outline_like(x, y, on, (speed * np.cos(heading), speed * np.sin(heading)), 10.0)
+    assert np.array_equal(found, expected)
