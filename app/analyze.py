@@ -26,8 +26,8 @@ def analyze(
     """
     begin = time.perf_counter()
     session = Session.open(path, choices, on_progress)
-    load_seconds = session.load_kernels() if cold else 0.0
-    log = session.shots(on_progress)
+    load_seconds = session.load_kernels(method) if cold else 0.0
+    log = session.shots(on_progress, method)
     made = report(session, log.shots, log.no_shot_reason, method)
     made["recording"]["path"] = str(path)
     made["seconds"]["load"] = load_seconds

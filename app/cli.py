@@ -1,4 +1,4 @@
-"""The command line: `spinscope COMMAND`; without a command it shows the default sample."""
+"""The command line: `spinscope COMMAND`; without a command it tunes the default sample."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from typing import Any
 import click
 
 from pipeline.errors import ParameterError, SpinscopeError
+from pipeline.methods import METHODS
 
 from .session import DEFAULT_SAMPLE, Choices, Session
 from .simulate import KINDS, SimulateParameters
 from .terminal import ProgressBar, announce_compilation, note, print_reports
 
-METHODS = ("triplet", "normal_flow", "all")
 LAYOUTS = ("all", "tracker", "logo", "spin", "coach")
 RECORDING = click.Path(path_type=Path)
 
@@ -127,11 +127,13 @@ def _tunables(command: Callable[..., None]) -> Callable[..., None]:
 def cli(context: click.Context) -> None:
     """See every stage of an event-camera spin estimator for table tennis, side by side on one timeline.
 
-    Without a command: view the sample recording that comes with Spinscope.
+    Without a command: open a sample recording in a page with sliders beside the viewer.
     """
     if context.invoked_subcommand is None:
-        note(f"viewing the sample {DEFAULT_SAMPLE.name}; `spinscope --help` lists what else there is")
-        _view(DEFAULT_SAMPLE, None, False, "all", Choices())
+        from .tuner import serve
+
+        note(f"opening the sample {DEFAULT_SAMPLE.name}; `spinscope --help` lists what else there is")
+        serve(DEFAULT_SAMPLE, Choices(), None, open_browser=True)
 
 
 @cli.command()
@@ -160,10 +162,10 @@ def info(recording: Path, sensor: tuple[int, int] | None, output: str | None) ->
 )
 @click.option(
     "--method",
-    type=click.Choice(METHODS),
+    type=click.Choice((*METHODS, "all")),
     default="all",
     show_default=True,
-    help="Which estimates of the spin to report.",
+    help="Which estimates of the spin to report; only what they need is run.",
 )
 @_choices
 def analyze(recordings: tuple[Path, ...], output: str | None, method: str, choices: Choices) -> None:
@@ -292,7 +294,7 @@ def simulate(
 @click.option("--quick", is_flag=True, help="A thinned suite, about ten seconds.")
 @click.option("--json", "output", type=click.Path(path_type=Path), metavar="OUT", help="Write JSON, one suite a line.")
 @click.option("--figures", type=click.Path(path_type=Path), metavar="DIR", help="Write figures (PNG) and rows (CSV).")
-@click.option("--page", type=click.Path(path_type=Path), metavar="FILE.md", help="Write the tables as a page.")
+@click.option("--page", type=click.Path(path_type=Path), metavar="FILE.md", help="Write tables and figures as a page.")
 @click.option("--cluster", metavar="ADDRESS", help="Scheduler of a running Dask cluster that does the work.")
 @click.option("--workers", type=click.IntRange(0), help="Processes on this machine; one a core by default.")
 def evaluate(
@@ -311,7 +313,7 @@ def evaluate(
     """
     from . import evaluate as running
 
-    done = []
+    done, pictures = [], []
     for suite in suites:
         with ProgressBar() as bar:
             done.append(running.evaluate_suite(suite, quick=quick, workers=workers, cluster=cluster, on_progress=bar))
@@ -319,10 +321,11 @@ def evaluate(
         if figures:
             for path in running.write_figures(done[-1], figures):
                 note(f"wrote {path}")
+                pictures.append(path)
     if output:
         running.write_json(done, output)
     if page:
-        running.write_page(done, page)
+        running.write_page(done, page, pictures)
 
 
 def _write(output: str, text: str) -> None:

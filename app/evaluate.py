@@ -131,22 +131,36 @@ def write_figures(evaluation: Evaluation, folder: Path) -> list[Path]:
     return [*paths, rows]
 
 
-def write_page(evaluations: Sequence[Evaluation], path: Path) -> None:
-    """The tables of all these suites as one page of Markdown; raises RecordingError."""
-    lines = [
-        "# Results",
-        "",
-        "Made by `spinscope evaluate`. Errors: mean ± standard deviation (median).",
-        "",
-    ]
+ABOUT = """\
+# Results
+
+Made by `spinscope evaluate`: the paper's experiments on recordings of Spinscope's simulator, beside the paper's own
+numbers on its real ones. The simulator stands in for the lab; its numbers are no measurement of a real camera. The
+seeds of these recordings were used for nothing else: nothing was tuned on them.
+
+Errors: mean ± standard deviation (median). A refusal, or no ball, counts as failed in the success rate and not in the
+errors. `triplet` is the paper's method, `best` the answer that the program itself trusts.
+"""
+
+
+def write_page(evaluations: Sequence[Evaluation], path: Path, pictures: Sequence[Path] = ()) -> None:
+    """The tables of all these suites as one page of Markdown; raises RecordingError.
+
+    pictures : the suites' figures, as `write_figures` names them; shown under their suite
+    """
+    lines = [ABOUT]
     for one in evaluations:
         lines += [f"## {one.report.suite.title} (`{one.report.suite.name}`)", "", _how_made(one), ""]
+        for picture in pictures:
+            if picture.suffix == ".png" and picture.name.startswith(f"{one.report.suite.name}_"):
+                place = Path(os.path.relpath(picture, path.parent)).as_posix()
+                lines += [f"![{picture.stem.replace('_', ': ')}]({place})", ""]
         for table in one.report.tables:
             lines += [f"### {table.title}", ""]
             lines += ["| " + " | ".join(table.columns) + " |", "|" + "---|" * len(table.columns)]
             lines += ["| " + " | ".join(row) + " |" for row in table.as_text()]
             lines += ["", *([table.note, ""] if table.note else [])]
-    write_whole(path, "\n".join(lines))
+    write_whole(path, "\n".join(lines).rstrip() + "\n")
 
 
 def _how_made(one: Evaluation) -> str:

@@ -24,6 +24,7 @@ DEFAULT_SAMPLE = SAMPLES / "flight_fast_top.h5"
 
 FRAMES_BYTES = 1_500_000_000  # full frames held for the viewer: 8 s of the paper's sensor at 200 Hz
 WARM_TICKS = 4  # with flow, until the spin has been solved for and solved again
+TOGETHER = 4  # ticks that a stage works through at a time: tracking costs a quarter less; more surfaces cost more
 MARGIN_US = 50_000  # shown before and after a shot of a long recording
 
 Progress = Callable[[float, str], None]  # share done (0..1) and what is being done
@@ -97,27 +98,35 @@ class Session:
         """What a simulator knows of the ball, if the recording carries it."""
         return self.recording.truth
 
-    def ticks(self, on_progress: Progress | None = None, forget: Collection[str] = ()) -> Iterator[Tick]:
-        """Run the chain over the whole window, telling progress tick by tick."""
+    def ticks(
+        self, on_progress: Progress | None = None, forget: Collection[str] = (), without: Collection[str] = ()
+    ) -> Iterator[Tick]:
+        """Run the chain over the whole window, telling progress tick by tick; see Chain.run."""
         count = self.chain.tick_count(self.parameters)
-        for index, tick in enumerate(self.chain.run(self.parameters, forget=forget)):
+        ticks = self.chain.run(self.parameters, forget=forget, without=without, together=TOGETHER)
+        for index, tick in enumerate(ticks):
             yield tick
             if on_progress:
                 on_progress((index + 1) / count, "running the stages")
 
-    def load_kernels(self) -> float:
+    def load_kernels(self, method: str = "all") -> float:
         """Run a throw-away chain until every stage has had work, so that compiled kernels are in memory; seconds."""
-        begin, worked = time.perf_counter(), 0
-        for index, tick in enumerate(Chain(self.source).run(self.parameters, forget=("surface",))):
+        begin, worked, without = time.perf_counter(), 0, not_needed(method)
+        contrasted = bool(without)
+        for index, tick in enumerate(Chain(self.source).run(self.parameters, forget=("surface",), without=without)):
             worked += len(tick.flow.t_us) > 0
-            if worked == WARM_TICKS or index == 20 * WARM_TICKS:
+            contrasted |= tick.contrast is not None and tick.contrast.full
+            if (worked >= WARM_TICKS and contrasted) or index == 20 * WARM_TICKS:
                 break
         return time.perf_counter() - begin
 
-    def shots(self, on_progress: Progress | None = None) -> ShotLog:
-        """The shots of the window; keeps no full frames, so that it works for recordings of any length."""
+    def shots(self, on_progress: Progress | None = None, method: str = "all") -> ShotLog:
+        """The shots of the window, with the estimates of one of METHODS at least; `all` for all.
+
+        Keeps no full frames, so that it works for recordings of any length.
+        """
         log = ShotLog()
-        for tick in self.ticks(on_progress, forget=("surface",)):
+        for tick in self.ticks(on_progress, forget=("surface",), without=not_needed(method)):
             log.add(tick)
         log.close()
         return log
@@ -192,6 +201,11 @@ class Session:
             names = ("fixed_x_px", "fixed_y_px", "fixed_radius_px")
             values |= dict(zip(names, fixed_ball, strict=True))
         self.parameters = self.parameters.with_values({"track": values})
+
+
+def not_needed(method: str) -> tuple[str, ...]:
+    """The stages that need not run for this method (`all` or one of METHODS): contrast, which takes longest."""
+    return () if method in ("all", "contrast") else ("contrast",)
 
 
 def chosen_parameters(choices: Choices) -> Parameters:

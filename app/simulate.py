@@ -44,6 +44,7 @@ class SimulateParameters(ParameterGroup):
         None, 1.0, 600_000.0, 10.0, "ms", "none = spinner 100, rally 20000, flight until the ball is gone"
     )
     ball: float | None = tunable(None, 1, 7, 1, "", "how the logo sits; none = 1 (flight: any way)")
+    radius_mm: float = tunable(20.0, 1.0, 500.0, 0.5, "mm", "radius of the balls, their logos with them")
     heading_deg: float | None = tunable(None, -360.0, 360.0, 5.0, "deg", "0 = to the right, 90 = down; none = along")
     spin_decay_hz: float = tunable(0.0, 0.0, 10.0, 0.1, "Hz", "the spin falls as exp(-spin_decay_hz t)")
     shots: int = tunable(8, 1, 1000, 1, "", "shots of a rally")
@@ -61,7 +62,7 @@ class SimulateParameters(ParameterGroup):
 
 
 ALWAYS = {"seed", "background", "texture", "light_lux", "flicker_depth", "flicker_hz"}
-ALWAYS |= {"width_px", "height_px", "focal_length_mm", "duration_ms", "magnitude_rps"}
+ALWAYS |= {"radius_mm", "width_px", "height_px", "focal_length_mm", "duration_ms", "magnitude_rps"}
 USED = {
     "spinner": ALWAYS | {"spin", "ball"},
     "flight": ALWAYS | {"spin", "ball", "speed_m_s", "heading_deg", "spin_decay_hz", "second_ball", "arm", "bounce"},
@@ -112,6 +113,8 @@ def simulate_to_file(
     optics = CameraParameters(focal_length_mm=chosen.focal_length_mm)
     camera = Camera.of(optics, chosen.width_px, chosen.height_px)
     scene = _scene(kind, chosen, spin_rps, logo, camera)
+    balls = tuple(dataclasses.replace(ball, radius_m=chosen.radius_mm * 1e-3) for ball in scene.balls)
+    scene = dataclasses.replace(scene, balls=balls)
     share = (lambda done: on_progress(done, "simulating")) if on_progress else None
     made = simulate(scene, camera=camera, sensor=biases, seed=chosen.seed, progress=share)
     return _write(made, out, biases)
@@ -208,7 +211,7 @@ def _write(made: SimulatedRecording, out: Path, biases: BiasParameters | None) -
     suffix, warnings = out.suffix.lower(), []
     attributes: dict[str, str | float] = {
         DESCRIPTION: json.dumps(made.description, separators=(",", ":")),
-        "camera.focal_length_mm": made.description["camera"]["focal_px"] * CameraParameters().pixel_um / 1000,
+        "camera.focal_length_mm": round(made.description["camera"]["focal_px"] * CameraParameters().pixel_um / 1000, 9),
     }
     if biases is not None:
         attributes[BIASES] = json.dumps(biases.as_dict())

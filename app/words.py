@@ -90,8 +90,13 @@ def spin_words(estimate: SpinEstimate) -> str:
     magnitude, std = estimate.magnitude_rps, estimate.magnitude_std_rps
     if magnitude is None:
         return f"refused: {estimate.reason}"
-    margin = "" if std is None else f" ± {std:.1f}"
+    margin = "" if std is None else f" ± {std_words(std)}"
     return f"{magnitude:.1f}{margin} rps ({rpm(magnitude):.0f} rpm)"
+
+
+def std_words(std: float) -> str:
+    """One decimal, or two where one would say that there is no uncertainty."""
+    return f"{std:.1f}" if std >= 0.095 else f"{std:.2f}"
 
 
 def axis_words(estimate: SpinEstimate) -> str:

@@ -72,13 +72,14 @@ CURVES: Mapping[str, Curve] = MappingProxyType(
         "threshold_off": Curve(
             "diff_off",
             "log intensity",
-            ((-35, 0.14), (0, 0.19), (40, 0.27), (60, 0.34), (140, 0.85), (190, 1.35)),
-            _MODEL + "as threshold_on up to 60; steeper above, where the supplement sees ON and OFF part",
+            ((-35, 0.14), (0, 0.19), (40, 0.27), (60, 0.33), (90, 0.55), (140, 1.50), (190, 1.90)),
+            _MODEL + "as threshold_on from 0 to 60; steeper above, where the supplement sees the ball's ON and OFF "
+            "events part (which of them gets rarer is our choice)",
         ),
         "cutoff_hz": Curve(
             "fo",
             "Hz",
-            ((-35, 20.0), (-20, 40.0), (-10, 400.0), (0, 3000.0), (55, 8000.0)),
+            ((-35, 60.0), (-20, 120.0), (-10, 400.0), (0, 3000.0), (55, 8000.0)),
             _MODEL + "the supplement: only values below 0 change the ball's event rate, there late events of the "
             "edge lie inside the ball; the lowest setting is in use against lamps that flicker with 100 Hz",
         ),

@@ -6,9 +6,11 @@ the centre of the top-left pixel.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import ParameterError
@@ -118,14 +120,7 @@ class Camera:
         z = R sqrt((1 + u) / u), x / z = (x of the ellipse's centre) / (1 + u).
         """
         centre = self.rays(x_px, y_px)
-        x, y = centre[:, 0], centre[:, 1]
-        wide = 1 + x * x + y * y
-        g4 = (np.atleast_1d(radius_px) / self.focal_px) ** 4
-        u = np.sqrt(g4 / wide)
-        for _ in range(2 if u.max(initial=0.0) < 1e-3 else 4):  # from a relative error of u on: u^2, u^4, u^8, u^16
-            u -= ((u + wide) * u * u - g4 * (1 + u)) / ((3 * u + 2 * wide) * u - g4)
-        centre[:, :2] /= (1 + u)[:, None]
-        centre *= (ball_radius_m * np.sqrt((1 + u) / u))[:, None]
+        _set_in_space(centre, np.atleast_1d(np.asarray(radius_px, np.float64)) / self.focal_px, ball_radius_m)
         return centre
 
     def silhouette(self, centre_m: ArrayLike, ball_radius_m: float) -> tuple[Floats, Floats, Floats]:
@@ -139,6 +134,19 @@ class Camera:
         stretch = cos2_theta / q  # how much farther out the ellipse's centre is than the centre's own image
         x_px, y_px = self.project(centre * np.stack([stretch, stretch, np.ones_like(q)], axis=1)).T
         return x_px, y_px, size * self.focal_px
+
+
+@njit(cache=True)
+def _set_in_space(rays: Floats, sizes: Floats, ball_radius_m: float) -> None:
+    """Turn rays (n, 3) with z = 1 into centres; sizes (n,): radii for focal length 1. See `Camera.ball_centre_m`."""
+    for i in range(rays.shape[0]):
+        x, y, g4 = rays[i, 0], rays[i, 1], sizes[i] ** 4
+        wide = 1 + x * x + y * y
+        u = math.sqrt(g4 / wide)
+        for _ in range(4):  # from a relative error of u on: u^2, u^4, u^8, u^16
+            u -= ((u + wide) * u * u - g4 * (1 + u)) / ((3 * u + 2 * wide) * u - g4)
+        z_m = ball_radius_m * math.sqrt((1 + u) / u)
+        rays[i, 0], rays[i, 1], rays[i, 2] = x / (1 + u) * z_m, y / (1 + u) * z_m, z_m
 
 
 @dataclass(frozen=True, slots=True)

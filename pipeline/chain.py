@@ -1,6 +1,7 @@
 """The chain of stages over packets: one mechanism for batch, live and tuning.
 
-recording | camera | simulator -> packets of one tick -> filter -> surface -> track -> logo -> rate -> flow -> spin
+recording | camera | simulator -> packets of one tick
+    -> filter -> surface -> track -> logo -> rate -> flow -> spin -> contrast
 
 A column is one stage's results so far plus the state to go on. Its key is the source's identity and the chain of
 (stage, parameter values) up to it, compared by value: a changed parameter re-runs its stage and those that read
@@ -17,9 +18,10 @@ from typing import Any, Protocol
 from .camera import BallParameters, Camera, CameraParameters, Setting
 from .errors import ParameterError
 from .events import EventBatch
+from .methods import best_of
 from .parameters import ParameterSet
-from .results import Packet, nbytes
-from .stages import filter, flow, logo, rate, spin, surface, track
+from .results import Packet, SpinEstimate, nbytes
+from .stages import contrast, filter, flow, logo, rate, spin, surface, track
 
 STAGES: dict[str, ModuleType] = {
     "filter": filter,
@@ -29,6 +31,7 @@ STAGES: dict[str, ModuleType] = {
     "rate": rate,
     "flow": flow,
     "spin": spin,
+    "contrast": contrast,
 }
 CACHE_BYTES = 2 << 30
 TICKS_MAX = 4_000_000  # 5.5 hours at 200 Hz; more is a damaged clock, not a recording
@@ -47,11 +50,12 @@ class Parameters(ParameterSet):
     rate: rate.RateParameters = rate.RateParameters()
     flow: flow.FlowParameters = flow.FlowParameters()
     spin: spin.SpinParameters = spin.SpinParameters()
+    contrast: contrast.ContrastParameters = contrast.ContrastParameters()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tick:
-    """All stages' results of one tick."""
+    """All stages' results of one tick; contrast is None where the run was told to leave it out."""
 
     packet: Packet
     filter: filter.FilterResult
@@ -61,6 +65,18 @@ class Tick:
     rate: rate.RateResult
     flow: flow.FlowResult
     spin: spin.SpinResult
+    contrast: contrast.ContrastResult | None
+
+    @property
+    def estimates(self) -> dict[str, SpinEstimate]:
+        """Every method's estimate from the present shot so far, by name."""
+        own = {} if self.contrast is None else {contrast.METHOD: self.contrast.estimate}
+        return {**self.spin.estimates, **own}
+
+    @property
+    def best(self) -> str | None:
+        """The method whose answer is trusted, None where none is."""
+        return best_of(self.estimates)
 
 
 class Source(Protocol):
@@ -160,31 +176,48 @@ class Chain:
             parameters.spin.max_spin_rps,
         )
 
-    def run(self, parameters: Parameters, *, ticks: int | None = None, forget: Collection[str] = ()) -> Iterator[Tick]:
+    def run(
+        self,
+        parameters: Parameters,
+        *,
+        ticks: int | None = None,
+        forget: Collection[str] = (),
+        without: Collection[str] = (),
+        together: int = 1,
+    ) -> Iterator[Tick]:
         """Yield the first `ticks` ticks (all there are so far by default), computing only what is not yet known.
 
         Stop iterating to abandon the run: everything computed so far stays. Results of stages named in `forget`
-        are not kept beyond their tick (full frames of a long recording would not fit).
+        are not kept beyond their tick (full frames of a long recording would not fit). Stages named in `without`,
+        which no other stage may read, are not run: their results are None, and what was known of them stays.
+
+        together : how many ticks a stage works through before the next stage has them. One by one each tick comes as
+            soon as it can; in tens every stage finds its code and memory in the processor's caches.
         """
         setting = self.setting(parameters)
         keys = self.keys(parameters)
-        columns = {name: self._column(keys[name], name, parameters, setting) for name in STAGES}
+        columns = {name: self._column(keys[name], name, parameters, setting) for name in STAGES if name not in without}
         count = self.tick_count(parameters)
-        for index in range(count if ticks is None else min(ticks, count)):
-            results: dict[str, Any] = {"packet": self._packet(parameters.track.tick_us, index)}
+        count = count if ticks is None else min(ticks, count)
+        for first in range(0, count, together):
+            rows: list[dict[str, Any]] = [
+                {"packet": self._packet(parameters.track.tick_us, index), **dict.fromkeys(without)}
+                for index in range(first, min(first + together, count))
+            ]
             for name, column in columns.items():
-                if index < len(column.results):
-                    results[name] = column.results[index]
-                    continue
-                try:
-                    results[name] = self._step(name, parameters, column, results)
-                except BaseException:
-                    self._columns.pop(keys[name], None)  # its state may be half way into this tick
-                    raise
-                if name not in forget:
-                    column.results.append(results[name])
-                    column.bytes += nbytes(results[name])
-            yield Tick(**results)
+                for index, results in enumerate(rows, first):
+                    if index < len(column.results):
+                        results[name] = column.results[index]
+                        continue
+                    try:
+                        results[name] = self._step(name, parameters, column, results)
+                    except BaseException:
+                        self._columns.pop(keys[name], None)  # its state may be half way into this tick
+                        raise
+                    if name not in forget:
+                        column.results.append(results[name])
+                        column.bytes += nbytes(results[name])
+            yield from (Tick(**results) for results in rows)
             self._keep_budget(set(keys.values()))
 
     def _packet(self, tick_us: int, index: int) -> Packet:

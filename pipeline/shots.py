@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from .camera import Camera
 from .chain import Tick
+from .methods import best_of
 from .results import SpinEstimate, Truth
-from .stages.spin import SpinResult
 from .stages.track import TrackResult
 
 Floats = NDArray[np.float64]
@@ -90,7 +90,7 @@ class ShotLog:
             self.close()
         if tick.track.has_ball:
             self._rows.append(
-                _Row(tick.packet.start_us, tick.packet.end_us, tick.track, len(tick.logo.events), tick.spin)
+                _Row(tick.packet.start_us, tick.packet.end_us, tick.track, len(tick.logo.events), tick.estimates)
             )
         elif tick.track.reason:
             self._last_reason = tick.track.reason
@@ -115,7 +115,7 @@ class _Row:
     end_us: int
     track: TrackResult
     logo_events: int
-    spin: SpinResult
+    estimates: dict[str, SpinEstimate]
 
 
 def _shot(number: int, rows: list[_Row]) -> Shot:
@@ -128,6 +128,6 @@ def _shot(number: int, rows: list[_Row]) -> Shot:
         std=np.array([np.sqrt(np.diag(row.track.covariance)) for row in rows]),
         measured=np.array([row.track.measured is not None for row in rows]),
         logo_events=sum(row.logo_events for row in rows),
-        estimates=rows[-1].spin.estimates,
-        best=rows[-1].spin.best,
+        estimates=rows[-1].estimates,
+        best=best_of(rows[-1].estimates),
     )

@@ -9,7 +9,8 @@ import dataclasses
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Hashable, Iterator
+from collections.abc import Collection, Hashable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,9 @@ from pipeline.chain import STAGES, Chain, EventSource, Parameters, Source, Tick
 from pipeline.errors import ParameterError
 from pipeline.results import Packet, Truth
 
+SUFFIXES = (".h5", ".hdf5", ".raw", ".npz", ".aedat4", ".db3", ".bag")  # of recordings
+# Takes longest, and no other stage reads it: computed last, or not at all where nobody asks for spins.
+LATE = ("contrast",)
 CHAIN_BYTES = 250_000_000  # a clip's columns: a dozen settings of a flight of 100 ms
 CLIPS_KEPT = 2
 # Full frames of a clip take a quarter of that, so that A, B and a few earlier settings fit beside each other.
@@ -29,6 +33,9 @@ CLIP_FRAMES_BYTES = 75_000_000
 MOST_FRAMES_BYTES = 600_000_000  # a short tick on a long clip: what a run may hold whatever else is kept
 OVERVIEW_BINS = 1200  # about one a pixel of the page's width
 MARGIN_US = 20_000  # shown before and after a shot
+MAKE_WAY_S = 0.5
+_kernels = threading.Lock()
+_are_loaded = threading.Event()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,11 +80,14 @@ class Clip:
                 "take a longer tick or a shorter clip"
             )
 
-    def run(self, parameters: Parameters) -> Iterator[Progressed]:
-        """The clip's ticks; between two of them other threads may run theirs, and the run may be abandoned."""
+    def run(self, parameters: Parameters, without: Collection[str] = ()) -> Iterator[Progressed]:
+        """The clip's ticks; between two of them other threads may run theirs, and the run may be abandoned.
+
+        without : stages that are left out, see Chain.run
+        """
         chain = self.session.chain
         with self.lock:
-            ticks = chain.run(parameters)
+            ticks = chain.run(parameters, without=without)
         keys = self.keys(parameters)
         while True:
             with self.lock:
@@ -117,6 +127,9 @@ class Bench:
         self.choices = choices
         self.original = original
         self.found: list[tuple[int, int]] = []
+        self._pages_at_work = 0
+        self._is_quiet = threading.Event()
+        self._is_quiet.set()
         self._clips: OrderedDict[tuple[int, int], Clip] = OrderedDict()
         self._lock = threading.Lock()
 
@@ -124,6 +137,31 @@ class Bench:
     def open(cls, path: Path, choices: Choices, original: Path | None = None) -> Bench:
         """Open a recording and read it once; raises SpinscopeError."""
         return cls(Session.open(path, choices), choices, original or path)
+
+    def load_kernels(self) -> None:
+        """Have the compiled kernels in memory, once a process, so that no stage's milliseconds hold their loading."""
+        with _kernels:
+            if not _are_loaded.is_set():
+                self.clip(*self.first_clip_us()).session.load_kernels()
+                _are_loaded.set()
+
+    @contextmanager
+    def at_work(self) -> Iterator[None]:
+        """While somebody waits for a picture: what runs in the background makes way."""
+        with self._lock:
+            self._pages_at_work += 1
+            self._is_quiet.clear()
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._pages_at_work -= 1
+                if not self._pages_at_work:
+                    self._is_quiet.set()
+
+    def make_way(self) -> None:
+        """Called between two pieces of background work: waits while somebody waits for a picture, not for ever."""
+        self._is_quiet.wait(MAKE_WAY_S)
 
     @property
     def window_us(self) -> tuple[int, int]:

@@ -21,11 +21,13 @@ from pipeline.events import EventBatch
 from pipeline.recordings import Recording, open_recording
 from pipeline.simulator import simulate_again
 
-from .bench import Bench, Clip
+from .bench import LATE, SUFFIXES, Bench, Clip
 from .jobs import Job
 
 NOISE, HOT, EDGE, LOGO = 0, 4, 1, 2  # labels of the simulator's truth
 MOST_POINTS = 25
+# "Pixel sensitivity" in the paper's supplement: both thresholds at once.
+TOGETHER = {"diff_on_off": ("diff_on", "diff_off")}
 # Events this far outside the tracked outline still belong to the ball: its blurred edge and late pixels.
 BESIDE_PX = 3.0
 
@@ -85,20 +87,23 @@ def taken_again(job: Job, bench: Bench, biases: BiasParameters, folder: Path) ->
 
 def bias_curve(job: Job, bench: Bench, biases: BiasParameters, name: str, points: int) -> dict[str, Any]:
     """Noise and ball event rate, ON and OFF, against one bias, all else as given; told point by point."""
-    declared = BiasParameters.tunables().get(name)
-    if declared is None or declared.low is None or declared.high is None:
-        raise ParameterError(f"bias {name!r} is unknown: there are {', '.join(BiasParameters.tunables())}")
+    names = TOGETHER.get(name, (name,))
+    declared = BiasParameters.tunables()
+    if not set(names) <= set(declared):
+        raise ParameterError(f"bias {name!r} is unknown: there are {', '.join([*declared, *TOGETHER])}")
+    low, high = max(declared[one].low or 0 for one in names), min(declared[one].high or 0 for one in names)
     if not 2 <= points <= MOST_POINTS:
         raise ParameterError(f"{points} points are out of range: 2 to {MOST_POINTS}")
     description = scene_of(open_recording(bench.original))
     if description is None:
         raise RecordingError("the recording carries no scene that could be simulated again")
-    values = sorted({int(value) for value in np.rint(np.linspace(declared.low, declared.high, points))})
+    values = sorted({int(value) for value in np.rint(np.linspace(low, high, points))})
     found: list[dict[str, Any]] = []
     content = {"name": name, "total": len(values), "points": found, "source": "simulated"}
     job.tell(**content)
     for value in values:
-        made = simulate_again(description, sensor=biases.with_values({name: value}), progress=lambda _: job.check())
+        sensor = biases.with_values(dict.fromkeys(names, value))
+        made = simulate_again(description, sensor=sensor, progress=lambda _: job.check())
         is_ball = np.isin(made.truth.label, (EDGE, LOGO))
         seconds = float(description["scene"]["duration_s"])
         is_noise = np.isin(made.truth.label, (NOISE, HOT))
@@ -107,19 +112,25 @@ def bias_curve(job: Job, bench: Bench, biases: BiasParameters, name: str, points
     return content
 
 
-def measured_curve(job: Job, bench: Bench, parameters: Parameters) -> dict[str, Any]:
-    """The same rates from the folder's recordings that have a `.bias` file of their own name beside them."""
-    folder = bench.original.parent
-    paths = [path.with_suffix("") for path in sorted(folder.glob("*.bias"))]
-    recordings = [path for path in sorted(folder.iterdir()) if path.suffix != ".bias" and path.with_suffix("") in paths]
-    if not recordings:
+def measured_curve(
+    job: Job, bench: Bench, parameters: Parameters, own_biases: BiasParameters | None = None
+) -> dict[str, Any]:
+    """The same rates from the folder's recordings whose biases are known: stated in them, or by NAME.bias beside.
+
+    own_biases : those of the bench's recording, where the user knows better
+    """
+    known = {path: values for path in sorted(bench.original.parent.iterdir()) if (values := known_biases(path))}
+    if own_biases is not None:
+        known[bench.original] = own_biases
+    if not known:
         raise RecordingError(
-            "no recording of this folder has a .bias file of its own name beside it: put NAME.bias beside NAME.raw"
+            "no recording of this folder has a .bias file of its own name beside it: put NAME.bias beside NAME.raw, "
+            "or load the .bias file that this recording was taken with"
         )
     found: list[dict[str, Any]] = []
-    content = {"name": None, "total": len(recordings), "points": found, "source": "recorded"}
+    content = {"name": None, "total": len(known), "points": found, "source": "recorded"}
     job.tell(**content)
-    for path in recordings:
+    for path, biases in known.items():
         job.check()
         try:
             taken = Bench.open(path, bench.choices)
@@ -130,10 +141,23 @@ def measured_curve(job: Job, bench: Bench, parameters: Parameters) -> dict[str, 
             continue
         events = clip.session.source.events
         seconds = (clip.window_us[1] - clip.window_us[0]) * 1e-6
-        biases = read_biases(path.with_suffix(".bias")).as_dict()
-        found.append({"recording": path.name, "biases": biases, **_rates(events, is_ball, ~is_ball, seconds)})
+        found.append({"recording": path.name, "biases": biases.as_dict(), **_rates(events, is_ball, ~is_ball, seconds)})
         job.tell(**{**content, "points": list(found)})
     return content
+
+
+def known_biases(path: Path) -> BiasParameters | None:
+    """The biases a recording states or has in a .bias file of its name beside it; None for none, or no recording."""
+    if path.suffix.lower() not in SUFFIXES or not path.is_file():
+        return None
+    beside = path.with_suffix(".bias")
+    try:
+        if beside.is_file():
+            return read_biases(beside)
+        stated = open_recording(path).attributes.get(BIASES)
+        return None if stated is None else BiasParameters().with_values(json.loads(str(stated)))
+    except (SpinscopeError, json.JSONDecodeError, TypeError):
+        return None
 
 
 def _rates(
@@ -151,7 +175,7 @@ def _rates(
 def _on_ball(job: Job, clip: Clip, parameters: Parameters) -> NDArray[np.bool_]:
     """Which of the clip's events lie on the tracked ball or just beside it."""
     marks = [np.empty(0, np.bool_)]
-    for step in clip.run(parameters):
+    for step in clip.run(parameters, LATE):
         job.check()
         events, track = step.tick.packet.events, step.tick.track
         if not track.has_ball:

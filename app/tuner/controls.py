@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from typing import Any
 
-from pipeline.chain import Parameters
+from pipeline.chain import STAGES, Parameters
 from pipeline.parameters import Tunable
 
-# (title, group, its fields or None for all that no other section names)
-SECTIONS: tuple[tuple[str, str, tuple[str, ...] | None], ...] = (
-    ("Filter", "filter", None),
-    ("Surface (EROS)", "surface", None),
-    ("Cleaning", "surface", ("cleaning",)),
-    ("Tracker", "track", None),
-    ("Logo: pad", "logo", None),
-    ("Event rate", "rate", None),
-    ("t_acc and flow", "flow", None),
-    ("Spin", "spin", None),
-    ("Camera", "camera", None),
-    ("Ball", "ball", None),
-)
+# How a group of parameters is called where its own name says too little.
+TITLES = {
+    "surface": "Surface (EROS)",
+    "track": "Tracker",
+    "logo": "Logo: pad",
+    "rate": "Event rate",
+    "flow": "t_acc and flow",
+}
+# Fields that have a section of their own, after their group's.
+OWN_SECTIONS = {"surface": {"Cleaning": ("cleaning",)}}
 # What belongs to the set-up and not to the method: a preset leaves it alone unless it names it itself.
 SETUP = {
     "camera": None,
@@ -31,15 +28,17 @@ LOGARITHMIC_FROM = 100
 
 
 def sections() -> list[dict[str, Any]]:
-    """The page's groups of controls with everything that a control needs to know."""
-    named = {(group, field) for _, group, fields in SECTIONS for field in fields or ()}
+    """The page's groups of controls, stage by stage and then the set-up, with all that a control needs to know."""
     parameters = Parameters()
+    groups = [*STAGES, *(name for name in parameters.as_dict() if name not in STAGES)]
     made = []
-    for title, group, fields in SECTIONS:
-        declared = parameters.group(group).tunables()
-        chosen = fields or tuple(field for field in declared if (group, field) not in named)
-        controls = [_control(group, field, declared[field]) for field in chosen]
-        made.append({"title": title, "controls": controls})
+    for group in groups:
+        declared, own = parameters.group(group).tunables(), OWN_SECTIONS.get(group, {})
+        named = {field for fields in own.values() for field in fields}
+        rest = tuple(field for field in declared if field not in named)
+        for title, fields in {TITLES.get(group, group.capitalize()): rest, **own}.items():
+            controls = [_control(group, field, declared[field]) for field in fields]
+            made.append({"title": title, "is_setup": group not in STAGES, "controls": controls})
     return made
 
 

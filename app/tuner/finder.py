@@ -51,6 +51,7 @@ class ShotFinder:
         try:
             for share in self.bench.find_shots(parameters):
                 self.share = share
+                self.bench.make_way()
                 if self._closed:
                     return
                 if time.monotonic() - told > REPORT_S:

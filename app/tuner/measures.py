@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.session import Session
-from app.words import kind_of_spin
+from app.words import Kind, kind_of_spin, km_h, rpm
 from pipeline.chain import Tick
 from pipeline.results import SpinEstimate
 from pipeline.shots import Shot
@@ -27,7 +27,7 @@ def measures(
     residual_px : rms of the measured circles' distance from the filter's, centre and radius together
     jitter_px : 1 sigma of the noise of the measured centres across one axis, from their second differences
     logo_events : in all shots
-    shots : each with start_us, end_us, speed_m_s, best, kind, and the estimate of every method
+    shots : each with start_us, end_us, speed_m_s, best, kind, the coach's sentence, and every method's estimate
     """
     return {
         "ticks": len(ticks),
@@ -87,9 +87,26 @@ def _shot(session: Session, shot: Shot) -> dict[str, Any]:
         "speed_m_s": None if velocity is None else _finite(float(np.linalg.norm(velocity))),
         "best": shot.best,
         "kind": kind.name if kind else None,
-        "off_deg": kind.off_deg if kind else None,
+        "sentence": coach_sentence(trusted, kind, velocity),
         "spin": {name: _estimate(session, shot, estimate) for name, estimate in shot.estimates.items()},
     }
+
+
+def coach_sentence(estimate: SpinEstimate | None, kind: Kind | None, velocity_m_s: Floats | None) -> str:
+    """`Topspin 54 rps (3240 rpm), 32 km/h, axis 12 degrees off pure topspin, ±2 rps`, or that it is not known."""
+    speed = [] if velocity_m_s is None else [f"{km_h(float(np.linalg.norm(velocity_m_s))):.0f} km/h"]
+    if estimate is None or kind is None or estimate.magnitude_rps is None:
+        return ", ".join(["Spin not known", *speed])
+    magnitude = estimate.magnitude_rps
+    spin = f"{magnitude:.0f} rps ({rpm(magnitude):.0f} rpm)"
+    if kind.parts_rps:
+        named = [f"{kind.name.capitalize()} {spin}", *speed, f"axis {kind.off_deg:.0f} degrees off pure {kind.name}"]
+    else:
+        named = [f"Spin {spin}", *speed, f"{kind.name}, {kind.off_deg:.0f} degrees off"]
+    std = estimate.magnitude_std_rps
+    # A coach does not read hundredths: a tenth at least.
+    margin = [] if std is None else [f"±{max(std, 0.1):.1f} rps" if std < 1 else f"±{std:.0f} rps"]
+    return ", ".join([*named, *margin])
 
 
 def _estimate(session: Session, shot: Shot, estimate: SpinEstimate) -> dict[str, Any]:

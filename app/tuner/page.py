@@ -6,14 +6,14 @@ import secrets
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
 from app.viewer.tuning import Drawings, compared, note_with_a, note_without_a, rrd_bytes
 from pipeline.chain import STAGES, Parameters, Tick
 
-from .bench import Bench, Clip
+from .bench import LATE, Bench, Clip
 from .jobs import Job, fault
 from .measures import measures
 from .outbox import Outbox
@@ -24,17 +24,23 @@ REPORT_S = 0.05  # a page learns of a run's progress this often
 # The rest of a clip is worth waiting for when it takes no longer than an eye needs to see a change.
 REST_WORTH_WAITING_S = 0.25
 PICTURES_KEPT = 3
+# A dragged slider waits so long for the late stages: they are there, or take half a second.
+LATE_WORTH_WAITING_S = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What a page asks for; `serial` counts its wishes, the highest is the newest."""
+    """What a page asks for; `serial` counts its wishes, the highest is the newest.
+
+    hasty : a slider is being dragged: a picture without the slowest stages is better than waiting for them
+    """
 
     serial: int
     parameters: Parameters
     pinned: Parameters | None
     window_us: tuple[int, int]
     playhead_us: float | None = None
+    hasty: bool = False
 
 
 class Superseded(Exception):  # no error: the page wants something newer
@@ -130,42 +136,61 @@ class Page:
             assert wanted is not None
             report = _Report(self.outbox, wanted.serial)
             try:
-                self._fulfil(wanted, report)
+                with self.bench.at_work():
+                    self._fulfil(wanted, report)
             except Superseded:
                 continue
             except Exception as error:  # noqa: BLE001  # whatever a stage raises, the page goes on
                 report.tell("failed", force=True, error=fault(error))
 
     def _fulfil(self, wanted: Wanted, report: _Report) -> None:
+        report.tell("loading")
+        self.bench.load_kernels()
         clip = self.bench.clip(*wanted.window_us)
         a = None
         if wanted.pinned is not None:
-            a = self._finish(clip, wanted.pinned, wanted, report, None)
-        b = self._finish(clip, wanted.parameters, wanted, report, wanted.playhead_us if a is None else None)
+            a = self._finish(clip, wanted.pinned, wanted, report, is_alone=False)
+        b = self._finish(clip, wanted.parameters, wanted, report, is_alone=a is None)
         self.finished = b
         self._show(wanted, clip, b, a, report)
 
     def _finish(
-        self, clip: Clip, parameters: Parameters, wanted: Wanted, report: _Report, playhead_us: float | None
+        self, clip: Clip, parameters: Parameters, wanted: Wanted, report: _Report, *, is_alone: bool
     ) -> Finished:
-        """Run a clip to its end; when that takes long, first show it up to the playhead."""
+        """Run a clip to its end, the late stages last; of a run alone show before what is there, where that pays."""
         session = clip.with_parameters(parameters)
         ticks: list[Tick] = []
         count = clip.session.chain.tick_count(parameters)
-        began, previewed = time.perf_counter(), playhead_us is None
-        for step in clip.run(parameters):
-            if self._is_old(wanted):
-                raise Superseded
-            ticks.append(step.tick)
-            for stage, seconds in step.seconds.items():
-                report.seconds[stage] += seconds
+        began, playhead_us = time.perf_counter(), wanted.playhead_us if is_alone else None
+        for tick in self._steps(clip, parameters, wanted, report, LATE):
+            ticks.append(tick)
             report.tell("computing", len(ticks) / count)
-            if not previewed and playhead_us is not None and step.tick.packet.end_us >= playhead_us:
-                previewed = True
+            if playhead_us is not None and tick.packet.end_us >= playhead_us:
+                playhead_us = None
                 rest_s = (time.perf_counter() - began) / len(ticks) * (count - len(ticks))
                 if rest_s > REST_WORTH_WAITING_S:
                     self._show(wanted, clip, Finished.of(session, ticks), None, report, partial=True)
+        early, ticks = Finished.of(session, ticks), []
+        self._drawings.begin(early.run, clip.keys(parameters))
+        began, is_waiting = time.perf_counter(), is_alone and wanted.hasty
+        for tick in self._steps(clip, parameters, wanted, report, ()):
+            ticks.append(tick)
+            report.tell("computing", len(ticks) / count)
+            if is_waiting and time.perf_counter() - began > LATE_WORTH_WAITING_S:
+                is_waiting = False
+                self._show(wanted, clip, early, None, report, partial=True)
         return Finished.of(session, ticks)
+
+    def _steps(
+        self, clip: Clip, parameters: Parameters, wanted: Wanted, report: _Report, without: Collection[str]
+    ) -> Iterator[Tick]:
+        """The clip's ticks, until something newer is wanted."""
+        for step in clip.run(parameters, without):
+            if self._is_old(wanted):
+                raise Superseded
+            for stage, seconds in step.seconds.items():
+                report.seconds[stage] += seconds
+            yield step.tick
 
     def _show(
         self,
@@ -188,11 +213,12 @@ class Page:
         else:
             a_chunks = self._drawings.chunks(a.run, clip.keys(a.session.parameters))
             chunks = [*chunks, *compared(a_chunks), *note_with_a(b.run, _difference_text(a, b))]
-        recording_id = f"{self.id}-{wanted.serial}{'-part' if partial else ''}"
+        recording_id = f"{self.id}-{wanted.serial}{f'-part{len(b.ticks)}' if partial else ''}"
         picture = rrd_bytes(chunks, recording_id)
         report.seconds["drawing"] += time.perf_counter() - began
         if self._is_old(wanted):
             raise Superseded
+        is_whole = len(b.ticks) == clip.session.chain.tick_count(b.session.parameters)
         self._pictures[recording_id] = picture
         while len(self._pictures) > PICTURES_KEPT:
             self._pictures.popitem(last=False)
@@ -205,7 +231,7 @@ class Page:
             start_us=b.run.start_us,
             end_us=b.run.end_us,
             first_sight_us=b.run.first_sight_us,
-            measures=None if partial else _measured(clip, b),
+            measures=_measured(clip, b) if is_whole else None,
             pinned_measures=None if a is None else _measured(clip, a),
             differs=[] if a is None else differences(a.session.parameters, b.session.parameters),
         )

@@ -26,7 +26,7 @@ class OpenPage(Request):
 
 
 class Run(Request):
-    """Show a clip with these parameters, beside those pinned as A."""
+    """Show a clip with these parameters, beside those pinned as A; in haste while a slider is dragged."""
 
     serial: int = Field(ge=0, lt=2**53)
     parameters: Values
@@ -34,6 +34,7 @@ class Run(Request):
     start_us: int = Field(ge=-(2**62), le=2**62)
     end_us: int = Field(ge=-(2**62), le=2**62)
     playhead_us: float | None = None
+    hasty: bool = False
 
 
 class PresetText(Request):
@@ -80,9 +81,10 @@ class Biases(Request):
 
 
 class BiasCurve(Request):
-    """Rates against one bias, all others as given."""
+    """Rates against one bias, all others as given; of a finished recording those it was taken with, if known."""
 
     biases: dict[str, int]
+    is_known: bool = False
     name: str = Field(max_length=20)
     points: int = 9
 

@@ -111,7 +111,8 @@ def _suggested(trial: Any, name: str, tunable: Tunable) -> Any:
     logarithmic = scale_of(tunable) == "logarithmic"
     if tunable.kind == "whole number":
         return trial.suggest_int(name, int(tunable.low or 0), int(tunable.high or 0), log=logarithmic)
-    return trial.suggest_float(name, float(tunable.low or 0.0), float(tunable.high or 0.0), log=logarithmic)
+    value: float = trial.suggest_float(name, float(tunable.low or 0.0), float(tunable.high or 0.0), log=logarithmic)
+    return value if trial.number == 0 else float(f"{value:.4g}")  # what people would type; the start stays exact
 
 
 def _value(parameters: Parameters, name: str) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import sys
+import threading
 import webbrowser
 from pathlib import Path
 
@@ -45,7 +46,9 @@ def serve(path: Path, choices: Choices, port: int | None, open_browser: bool) ->
     open_browser : whether to open the page where there is a browser; the address is printed in any case
     """
     workshop = Workshop(path, choices)
-    workshop.bench()
+    bench = workshop.bench()
+    # While the browser loads the page and the viewer, which takes longer.
+    threading.Thread(target=bench.load_kernels, name="kernels", daemon=True).start()
     listening = _listening_socket(PORT if port is None else port)
     address = f"http://{HOST}:{listening.getsockname()[1]}/"
     config = uvicorn.Config(

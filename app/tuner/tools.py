@@ -131,8 +131,8 @@ def _add_biases(app: FastAPI, workshop: Workshop, page_of: PageOf) -> None:
         wanted = BiasParameters().with_values(request.biases)
         bench = page.bench
         if biases.scene_of(bench.session.recording) is None:
-            parameters = bench.session.parameters
-            page.start("bias_curve", lambda job: biases.measured_curve(job, bench, parameters))
+            parameters, own = bench.session.parameters, wanted if request.is_known else None
+            page.start("bias_curve", lambda job: biases.measured_curve(job, bench, parameters, own))
         else:
             arguments = wanted, request.name, request.points
             page.start("bias_curve", lambda job: biases.bias_curve(job, bench, *arguments))

@@ -101,7 +101,7 @@ def _page_routes(app: FastAPI, workshop: Workshop, version: str, page_of: PageOf
         for wanted in (parameters, pinned):
             if wanted is not None:
                 clip.check(wanted)
-        wish = Wanted(request.serial, parameters, pinned, clip.window_us, request.playhead_us)
+        wish = Wanted(request.serial, parameters, pinned, clip.window_us, request.playhead_us, request.hasty)
         if not page.ask(wish):
             raise HTTPException(409, "a newer change has come in already")
         return {"serial": request.serial, "parameters": parameters.as_dict()}

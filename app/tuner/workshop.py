@@ -13,14 +13,13 @@ from app.session import Choices
 from app.viewer.tuning import Drawings
 from pipeline.errors import ParameterError, RecordingError
 
-from .bench import Bench
+from .bench import SUFFIXES, Bench
 from .finder import ShotFinder
 from .page import Page
 
 BENCHES_KEPT = 2  # each holds its events: 20 s of a rally are 260 MB
 PAGES_MOST = 16
 ALONE_S = 20.0  # a page without its browser for so long is closed; a reload takes less
-SUFFIXES = (".h5", ".hdf5", ".raw", ".npz", ".aedat4", ".db3", ".bag")
 
 
 class Workshop:

@@ -1,32 +1,19 @@
-"""The ball in space: turning with its spin, its logo painted on, arrows, path; and the logo held still."""
+"""The ball in space: turning with its spin, arrows, path."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cache
-
-import cv2
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from pipeline.results import SpinEstimate
-
 from . import entities as at
 from .rerun_api import Chunk, columns_at, once
-from .run import Run, shown_estimate
-from .stages import PNG_QUICK
-from .still import TEXTURE_PX, Sampler, density, disc_directions, sphere, texture_directions, tone, turned
+from .run import Run, shot_starts, shown_estimate, vector_of
+from .still import sphere
 
 Floats = NDArray[np.float64]
 
 MOTION_US = 250  # the ball is placed and turned this often: 4.5 degrees at 50 rps, smooth in slow motion
-PICTURE_US = 5000  # the logo is painted this often, and every tick of 200 Hz
-EVENTS_PAINTED = 60_000  # the latest of the shot; more add nothing but time
-PAINT = np.array([32, 42, 80])
-WHITE = np.array([238, 236, 228])
-DISC = np.array([38, 43, 51])
 RPS_M = 0.00035  # an arrow's length: 100 rps reach 35 mm beyond the ball
 # From where the views in space look: as the camera does, tilted by 40 degrees towards the image's lower edge.
 TILT = np.radians(40)
@@ -34,18 +21,9 @@ EYE = np.array([0.0, np.sin(TILT), -np.cos(TILT)])
 RING_RADII, RING_POINTS = 1.18, 51  # of the ring that shows which way the ball turns
 
 
-@dataclass(frozen=True)
-class _Painted:
-    """The logo events of a shot up to one tick, in the body frame: their mean direction, ON's and OFF's densities."""
-
-    direction: Floats
-    on: NDArray[np.float32]
-    off: NDArray[np.float32]
-
-
 def ball_chunks(run: Run) -> list[Chunk]:
-    """Everything in space, and the logo held still."""
-    chunks = [_mesh(run), *_motion(run), *_arrows(run), *_ring(run), *_path(run), *_axes(run), *_painting(run)]
+    """Everything in space but the paint on the ball."""
+    chunks = [_mesh(run), *_motion(run), *_arrows(run), *_ring(run), *_path(run), *_axes(run)]
     return [once(at.WORLD, rr.ViewCoordinates.RDF), *chunks]
 
 
@@ -73,7 +51,7 @@ def _mesh(run: Run) -> Chunk:
 def _motion(run: Run) -> list[Chunk]:
     """Place and attitude of the ball between the ticks: carried on from the last tick, as a robot would have it."""
     times, places, axes, angles = [], [], [], []
-    for index, (tick, start_us) in enumerate(zip(run.ticks, _shot_starts(run), strict=True)):
+    for index, (tick, start_us) in enumerate(zip(run.ticks, shot_starts(run), strict=True)):
         if start_us is None:
             continue
         until_us = run.ends_us[index + 1] if index + 1 < len(run.ticks) else run.end_us + 1
@@ -82,7 +60,7 @@ def _motion(run: Run) -> list[Chunk]:
         ahead[:, :2] = tick.track.mean[2:4] * ((t_us - tick.packet.end_us) * 1e-6)[:, None]
         times.append(t_us)
         places.append(run.centre_m(tick.track.mean + ahead))
-        spin = _vector(shown_estimate(tick)[0])
+        spin = vector_of(shown_estimate(tick)[0])
         magnitude = float(np.linalg.norm(spin))
         axes.append(np.tile(spin / magnitude if magnitude else (0.0, 0.0, 1.0), (t_us.size, 1)))
         angles.append(2 * np.pi * magnitude * (t_us - start_us) * 1e-6)
@@ -101,32 +79,17 @@ def _motion(run: Run) -> list[Chunk]:
     ]
 
 
-def _shot_starts(run: Run) -> Iterator[int | None]:
-    """For each tick the start of the shot it belongs to: the moment of the body frame; None without a ball."""
-    shot, start_us = None, None
-    for tick in run.ticks:
-        if not tick.track.has_ball:
-            shot, start_us = None, None
-        elif tick.track.shot != shot:
-            shot, start_us = tick.track.shot, tick.packet.start_us
-        yield start_us
-
-
-def _vector(estimate: SpinEstimate | None) -> Floats:
-    return np.zeros(3) if estimate is None or estimate.vector_rps is None else estimate.vector_rps
-
-
 def _arrows(run: Run) -> list[Chunk]:
     """A thin arrow a method, out of the ball's surface along its axis, and the truth's; the shown one thick."""
     chunks: list[Chunk] = []
     for method in run.methods:
-        vectors = [_vector(tick.spin.estimates[method]) for tick in run.ticks]
+        vectors = [vector_of(tick.estimates[method]) for tick in run.ticks]
         chunks += _arrow(run, f"{at.SPIN_ARROWS}/{method}", vectors, at.method_colour(method), 0.025)
     if run.truth is not None:
         t_us = np.array([tick.track.t_us for tick in run.ticks])
         spins = np.nan_to_num(run.true_values(t_us, run.truth.spin_rps)) * run.has_ball[:, None]
         chunks += _arrow(run, f"{at.SPIN_ARROWS}/truth", list(spins), at.TRUTH_COLOUR, 0.02)
-    shown = [_vector(shown_estimate(tick)[0]) for tick in run.ticks]
+    shown = [vector_of(shown_estimate(tick)[0]) for tick in run.ticks]
     return [*chunks, *_arrow(run, at.SPIN_SHOWN, shown, at.RING_COLOUR, 0.06)]
 
 
@@ -150,7 +113,7 @@ def _ring(run: Run) -> list[Chunk]:
     """Most of a circle around the shown axis, ending in an arrow: which way the ball turns."""
     strips, lengths = [], [0]
     for tick in run.ticks:
-        spin = _vector(shown_estimate(tick)[0]) if tick.track.has_ball else np.zeros(3)
+        spin = vector_of(shown_estimate(tick)[0]) if tick.track.has_ball else np.zeros(3)
         magnitude = float(np.linalg.norm(spin))
         lengths.append(int(magnitude > 0))
         if magnitude > 0:
@@ -218,112 +181,3 @@ def path_bounds_m(run: Run) -> tuple[Floats, Floats]:
     low, high = places.min(axis=0), places.max(axis=0)
     spare = np.maximum(0.1 - (high - low), 0.0) / 2
     return low - spare, high + spare
-
-
-def _painting(run: Run) -> list[Chunk]:
-    """The logo's events turned back by the estimate of the moment: on the ball's texture, and flat on two discs."""
-    on_texture = _texture_sampler()
-    width, height = TEXTURE_PX
-    discs: dict[int, _Discs] = {}
-    times = [run.start_us]
-    textures = [np.broadcast_to(WHITE.astype(np.uint8), (height, width, 3)).tobytes()]
-    pictures = [_blank_discs()]
-    for index, painted in _painted(run):
-        shot = run.ticks[index].track.shot
-        assert shot is not None
-        if shot not in discs:
-            discs[shot] = _Discs.around(_densest(run, shot))
-        times.append(run.ticks[index].packet.end_us)
-        pictures.append(discs[shot].picture(painted))
-        textures.append(_texture(painted, on_texture).tobytes())
-    t_us = np.array(times)
-    form = rr.components.ImageFormat(width=width, height=height, color_model="RGB", channel_datatype="U8")
-    columns = rr.Mesh3D.columns(albedo_texture_buffer=textures, albedo_texture_format=[form] * len(times))
-    return [
-        columns_at(at.MESH, t_us, columns),
-        columns_at(at.STILL_LOGO, t_us, rr.EncodedImage.columns(blob=pictures)),
-        once(at.STILL_LOGO, rr.EncodedImage.from_fields(media_type="image/png")),
-    ]
-
-
-def _painted(run: Run) -> Iterator[tuple[int, _Painted]]:
-    """The ticks at which the logo is painted, with the shot's events so far in the body frame."""
-    parts: list[int] = []
-    last_us = -PICTURE_US
-    for index, (tick, start_us) in enumerate(zip(run.ticks, _shot_starts(run), strict=True)):
-        if start_us is None or (parts and run.ticks[parts[-1]].track.shot != tick.track.shot):
-            parts = []
-        if start_us is None:
-            continue
-        parts.append(index)
-        ends = index + 1 == len(run.ticks) or run.ticks[index + 1].track.shot != tick.track.shot
-        if tick.packet.end_us - last_us >= PICTURE_US or ends:
-            last_us = tick.packet.end_us
-            yield index, _turned_back(run, parts, start_us, _vector(shown_estimate(tick)[0]))
-
-
-def _turned_back(run: Run, parts: list[int], start_us: int, spin_rps: Floats) -> _Painted:
-    logos = [run.ticks[i].logo for i in parts]
-    normals = np.concatenate([logo.normals for logo in logos])[-EVENTS_PAINTED:]
-    t_us = np.concatenate([logo.events.t_us for logo in logos])[-EVENTS_PAINTED:]
-    on = np.concatenate([logo.events.on for logo in logos])[-EVENTS_PAINTED:]
-    normals = turned(normals, spin_rps, (start_us - t_us) * 1e-6)
-    return _Painted(normals.sum(axis=0), density(normals[on]), density(normals[~on]))
-
-
-def _densest(run: Run, shot: int) -> Floats:
-    """The direction in which a shot's logo lies, by its last estimate; towards the camera where there is none."""
-    parts = [i for i, tick in enumerate(run.ticks) if tick.track.shot == shot]
-    start_us = run.ticks[parts[0]].packet.start_us
-    painted = _turned_back(run, parts, start_us, _vector(shown_estimate(run.ticks[parts[-1]])[0]))
-    return painted.direction if np.linalg.norm(painted.direction) > 0 else np.array([0.0, 0.0, -1.0])
-
-
-def _full(counts: Floats) -> float:
-    """The count that is shown in full colour: what a twentieth of the marked places exceed."""
-    marked = counts[counts > 0]
-    return float(np.quantile(marked, 0.95)) if marked.size else 0.0
-
-
-@cache
-def _texture_sampler() -> Sampler:
-    return Sampler(texture_directions())
-
-
-@cache
-def _blank_discs() -> bytes:
-    return _Discs.around(np.array([0.0, 0.0, -1.0])).picture(None)
-
-
-def _texture(painted: _Painted, sampler: Sampler) -> NDArray[np.uint8]:
-    counts = sampler(painted.on + painted.off)
-    strength = tone(counts, _full(counts))[..., None]
-    texture: NDArray[np.uint8] = (WHITE + strength * (PAINT - WHITE)).astype(np.uint8)
-    return texture
-
-
-@dataclass(frozen=True)
-class _Discs:
-    """The two halves of the ball, flat, side by side."""
-
-    sampler: Sampler
-    mask: NDArray[np.bool_]
-
-    @classmethod
-    def around(cls, middle: Floats) -> _Discs:
-        """The left one around this direction of the body frame."""
-        directions, mask = disc_directions(middle)
-        return cls(Sampler(directions[mask]), mask)
-
-    def picture(self, painted: _Painted | None) -> bytes:
-        """PNG with ON and OFF in their colours."""
-        colours = np.tile(DISC.astype(np.float32), (int(self.mask.sum()), 1))
-        if painted is not None:
-            for density_of, colour in ((painted.on, at.ON), (painted.off, at.OFF)):
-                counts = self.sampler(density_of)
-                seen = np.flatnonzero(counts)
-                strength = tone(counts[seen], _full(counts))[:, None]
-                colours[seen] += strength * (np.array(colour) - DISC).astype(np.float32)
-        picture = np.full((*self.mask.shape, 3), at.BACKGROUND, np.uint8)
-        picture[self.mask] = colours.clip(0, 255)
-        return bytes(cv2.imencode(".png", picture[..., ::-1], PNG_QUICK)[1])

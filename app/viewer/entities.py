@@ -25,6 +25,11 @@ LOGO_MASK = "/image/ball/mask"
 FLOW = "/image/ball/flow"
 FLOW_WHEEL = "/image/ball/wheel"
 STILL_LOGO = "/still_logo"
+UNROLLED = "/unrolled"
+GRATICULE = "/unrolled/graticule"
+# The score of contrast, over magnitudes and over directions of the axis.
+SCORE_MAGNITUDE = "/score"
+SCORE_AXES = "/score_axes"
 
 # Plots.
 STATUS = "/tracker"

@@ -100,10 +100,11 @@ def _spin(run: Run) -> rrb.Container:
     if run.truth is not None:
         plots.append(_axis_error())
     return rrb.Horizontal(
-        rrb.Vertical(_ball(run), _still(), row_shares=[3, 2]),
+        rrb.Vertical(_ball(run), _unrolled(), row_shares=[3, 2]),
+        rrb.Vertical(_score_over_magnitude(), _score_over_axes(), row_shares=[4, 3]),
         rrb.Vertical(*plots),
         _summary(),
-        column_shares=[4, 4, 4],
+        column_shares=[4, 4, 3, 4],
         name=NAMES["spin"],
     )
 
@@ -167,6 +168,21 @@ def _flow(run: Run) -> rrb.View:
 def _still() -> rrb.View:
     name = "Spin taken out: logo stands still"
     return rrb.Spatial2DView(origin=at.STILL_LOGO, name=name, background=at.BACKGROUND)
+
+
+def _unrolled() -> rrb.View:
+    name = "Logo unrolled about the axis, grid 90°"
+    return rrb.Spatial2DView(origin=at.UNROLLED, name=name, background=at.BACKGROUND)
+
+
+def _score_over_magnitude() -> rrb.View:
+    corner = rrb.PlotLegend(corner="LeftTop")  # the top is in the middle
+    return rrb.BarChartView(origin=at.SCORE_MAGNITUDE, name="Score over magnitude [rps]", plot_legend=corner)
+
+
+def _score_over_axes() -> rrb.View:
+    name = "Score over axes: towards camera, away"
+    return rrb.Spatial2DView(origin=at.SCORE_AXES, name=name, background=at.BACKGROUND)
 
 
 def _plot(
@@ -237,7 +253,7 @@ def _rhythm(run: Run) -> rrb.View:
 
 
 def _magnitude(run: Run) -> rrb.View:
-    values = [e.magnitude_rps for tick in run.ticks for e in tick.spin.estimates.values()]
+    values = [e.magnitude_rps for tick in run.ticks for e in tick.estimates.values()]
     values += [tick.rate.spin_rps for tick in run.ticks]
     known = np.array([value for value in values if value is not None])
     top = 1.2 * float(np.quantile(known, 0.95)) if known.size else 100.0
@@ -247,7 +263,7 @@ def _magnitude(run: Run) -> rrb.View:
 
 
 def _parts(run: Run) -> rrb.View:
-    trusted = [t.spin.estimates[t.spin.best].vector_rps for t in run.ticks if t.spin.best is not None]
+    trusted = [t.estimates[t.best].vector_rps for t in run.ticks if t.best is not None]
     y_range = _range(np.concatenate([np.zeros(1), *(vector for vector in trusted if vector is not None)]))
     return _plot(at.SPIN_PARTS, "Trusted spin vector, camera frame [rps]", y_range, legend=True)
 

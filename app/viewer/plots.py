@@ -70,7 +70,7 @@ def spin_chunks(run: Run) -> list[Chunk]:
     """Plots of each method's magnitude with its +-1 sigma, of the trusted vector, and of the axes' errors."""
     chunks: list[Chunk] = []
     for method in run.methods:
-        estimates = [tick.spin.estimates[method] for tick in run.ticks]
+        estimates = [tick.estimates[method] for tick in run.ticks]
         values = from_start([_number(e.magnitude_rps) for e in estimates])
         stds = from_start([_number(e.magnitude_std_rps) for e in estimates])
         entity, colour = f"{at.SPIN_MAGNITUDE}/{method}", at.method_colour(method)
@@ -79,8 +79,8 @@ def spin_chunks(run: Run) -> list[Chunk]:
     chunks += line(f"{at.SPIN_MAGNITUDE}/rate", run.times_us, rhythm, "rhythm of the event rate", at.RATE_COLOUR)
     vectors = np.full((len(run.ticks), 3), np.nan)
     for i, tick in enumerate(run.ticks):
-        if tick.spin.best is not None:
-            vectors[i] = tick.spin.estimates[tick.spin.best].vector_rps
+        if tick.best is not None:
+            vectors[i] = tick.estimates[tick.best].vector_rps
     for i, (axis, colour) in enumerate(zip("xyz", (at.ON, at.KALMAN_COLOUR, at.OFF), strict=True)):
         values = from_start(vectors[:, i])
         chunks += line(f"{at.SPIN_PARTS}/{axis}", run.times_us, values, f"{axis} [rps]", colour, 2.0)
@@ -150,7 +150,7 @@ def _true_spin(run: Run) -> list[Chunk]:
     for method in run.methods:
         errors = np.full(len(run.ticks), np.nan)
         for i, tick in enumerate(run.ticks):
-            axis = tick.spin.estimates[method].axis
+            axis = tick.estimates[method].axis
             if axis is not None:
                 errors[i] = np.degrees(np.arccos(np.clip(axis @ spin[i] / magnitude[i], -1, 1)))
         entity, colour = f"{at.AXIS_ERROR}/{method}", at.method_colour(method)

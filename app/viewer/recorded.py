@@ -9,15 +9,19 @@ from pipeline.errors import RecordingError
 
 from .ball import ball_chunks
 from .layouts import blueprint
+from .painting import painting_chunks
 from .rerun_api import Chunk, file_with
 from .run import Run
+from .score import score_chunks
 from .stages import STAGES
 from .summary import summary_chunks
 
 
 def chunks(run: Run) -> list[Chunk]:
     """Everything there is to see of a run."""
-    return [chunk for stage in (*STAGES, ball_chunks, summary_chunks) for chunk in stage(run)]
+    return [
+        chunk for stage in (*STAGES, score_chunks, ball_chunks, painting_chunks, summary_chunks) for chunk in stage(run)
+    ]
 
 
 def write_rrd(run: Run, path: Path, layout: str) -> None:

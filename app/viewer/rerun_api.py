@@ -36,11 +36,12 @@ class _NoPandas:
 def _leave_pandas_out() -> None:
     """Keep pyarrow from loading pandas, which takes a second, only to ask whether our columns are pandas' own.
 
-    It looks for pandas once, at its first array, and remembers what it found.
+    It looks for pandas at its first array, and at its first list of one, and remembers what it found.
     """
     sys.meta_path.insert(0, _NoPandas)
     try:
         pa.array(np.zeros(1))
+        pa.ListArray.from_arrays(pa.array([0, 1]), np.zeros(1))
     finally:
         sys.meta_path.remove(_NoPandas)
 
@@ -120,6 +121,41 @@ def band(
     style = rr.Measurements.from_fields(names=name, units=unit, colors=[colour], widths=1.5, aggregation_policy="Off")
     columns = rr.Measurements.columns(values=values, variances=variances)
     return [columns_at(entity, t_us, columns), once(entity, style)]
+
+
+def bars(
+    entity: str,
+    t_us: NDArray[Any],
+    rows: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]],
+    widths: Sequence[float],
+    colour: Colour,
+) -> list[Chunk]:
+    """Bars over an axis of their own: places and heights in every row, all of a row equally wide; none for no places.
+
+    A row of no bars would leave the last one's standing: it gets a bar without height.
+    """
+    batches = []
+    for (places, heights), width in zip(rows, widths, strict=True):
+        if not places.size:
+            places = heights = np.zeros(1)
+        bar = rr.BarChart(heights, abscissa=places, widths=np.full(places.size, width), color=colour)
+        batches.append(bar.as_component_batches())
+    columns = []
+    for column in zip(*batches, strict=True):  # Rerun's own columns know of one tensor only
+        arrays = [batch.as_arrow_array() for batch in column]
+        whole = rr.DescribedComponentBatch(_Arrow(pa.concat_arrays(arrays)), column[0].component_descriptor())
+        columns.append(whole.partition([len(array) for array in arrays]))
+    return [columns_at(entity, t_us, columns)]
+
+
+class _Arrow:
+    """An Arrow array as one of Rerun's batches."""
+
+    def __init__(self, array: pa.Array) -> None:
+        self._array = array
+
+    def as_arrow_array(self) -> pa.Array:
+        return self._array
 
 
 def states(entity: str, t_us: NDArray[Any], names: Sequence[str], colours: dict[str, Colour]) -> list[Chunk]:

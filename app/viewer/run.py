@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -101,7 +101,7 @@ class Run:
     @cached_property
     def methods(self) -> list[str]:
         """The names of the methods that estimate the spin."""
-        return list(self.ticks[0].spin.estimates)
+        return list(self.ticks[0].estimates)
 
     @cached_property
     def largest_radius_px(self) -> float:
@@ -136,7 +136,23 @@ def shown_estimate(tick: Tick) -> tuple[SpinEstimate | None, bool]:
 
     Where no method is trusted the last one that answers is shown all the same, for the eye to judge.
     """
-    if tick.spin.best is not None:
-        return tick.spin.estimates[tick.spin.best], True
-    answers = [estimate for estimate in tick.spin.estimates.values() if estimate.vector_rps is not None]
+    if tick.best is not None:
+        return tick.estimates[tick.best], True
+    answers = [estimate for estimate in tick.estimates.values() if estimate.vector_rps is not None]
     return (answers[-1] if answers else None), False
+
+
+def vector_of(estimate: SpinEstimate | None) -> Floats:
+    """(3,) its spin in rps; zeros where there is none."""
+    return np.zeros(3) if estimate is None or estimate.vector_rps is None else estimate.vector_rps
+
+
+def shot_starts(run: Run) -> Iterator[int | None]:
+    """For each tick the start of the shot it belongs to: the moment of the body frame; None without a ball."""
+    shot, start_us = None, None
+    for tick in run.ticks:
+        if not tick.track.has_ball:
+            shot, start_us = None, None
+        elif tick.track.shot != shot:
+            shot, start_us = tick.track.shot, tick.packet.start_us
+        yield start_us

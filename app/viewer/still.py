@@ -16,6 +16,7 @@ Floats = NDArray[np.float64]
 CELLS = 64
 TEXTURE_PX = (192, 96)  # 1.9 degrees a texel
 DISC_PX = 128
+MAP_PX = (240, 120)  # 1.5 degrees a pixel
 GAP_PX = 12
 
 
@@ -89,6 +90,34 @@ def sphere(longitude: Floats, latitude: Floats) -> Floats:
     longitude, latitude = np.broadcast_arrays(longitude, latitude)
     across = np.cos(latitude)
     return np.stack([across * np.sin(longitude), np.sin(latitude), -across * np.cos(longitude)], axis=-1)
+
+
+def map_directions() -> Floats:
+    """(height, width, 3) unit vectors behind the pixels of the unrolled map, in the map's frame.
+
+    Longitude runs from left to right in the sense of the spin, latitude from +90 degrees, where the axis pierces the
+    ball, down to -90.
+    """
+    width, height = MAP_PX
+    longitude = ((np.arange(width) + 0.5) / width - 0.5) * 2 * np.pi
+    latitude = (0.5 - (np.arange(height) + 0.5) / height) * np.pi
+    longitude, latitude = np.broadcast_arrays(longitude[None, :], latitude[:, None])
+    across = np.cos(latitude)
+    return np.stack([across * np.cos(longitude), across * np.sin(longitude), np.sin(latitude)], axis=-1)
+
+
+def map_frame(spin_rps: Floats, middle: Floats) -> Floats:
+    """(3, 3) rows: the map's longitudes 0 and 90 degrees, and its pole, in the frame of the spin.
+
+    The direction `middle` has longitude 0. Without a spin the pole is the image's up.
+    """
+    magnitude = float(np.linalg.norm(spin_rps))
+    pole = spin_rps / magnitude if magnitude else np.array([0.0, -1.0, 0.0])
+    out = middle - (middle @ pole) * pole
+    if np.linalg.norm(out) < 1e-6 * np.linalg.norm(middle):
+        out = np.cross(pole, [1.0, 0.0, 0.0] if abs(pole[0]) < 0.9 else [0.0, 1.0, 0.0])
+    out = out / np.linalg.norm(out)
+    return np.stack([out, np.cross(pole, out), pole])
 
 
 def disc_directions(middle: Floats) -> tuple[Floats, NDArray[np.bool_]]:

@@ -14,7 +14,7 @@ from pipeline.chain import Tick
 from pipeline.results import SpinEstimate
 from pipeline.shots import Shot
 
-from ..words import axis_words, kind_of_spin, km_h, rpm, speed_words
+from ..words import axis_words, kind_of_spin, km_h, rpm, speed_words, std_words
 from . import entities as at
 from .rerun_api import Chunk, columns_at, once
 from .run import Run, shown_estimate
@@ -30,7 +30,7 @@ SLOWEST_M_S = 0.2
 
 def summary_chunks(run: Run) -> list[Chunk]:
     """The summary and the card at the start and at the end of every tick."""
-    texts, cards = [_opening(run)], [_card(("–", "–", "No ball yet"), ("spin", "speed", run.no_shot_reason or ""))]
+    texts, cards = [_opening(run)], [_card(("-", "-", "No ball yet"), ("spin", "speed", run.no_shot_reason or ""))]
     finals = {shot.end_us: shot for shot in run.shots}
     result: list[str] = []
     card = cards[0]
@@ -126,8 +126,8 @@ def _sentence(text: str) -> str:
 def _table(run: Run, tick: Tick) -> list[str]:
     """Every method's answer or refusal, and the truth where there is one."""
     lines = ["| method | spin [rps] | axis (x, y, z) |", "|---|---|---|"]
-    for method, estimate in tick.spin.estimates.items():
-        name = f"**{method} ✔**" if tick.spin.best == method else method
+    for method, estimate in tick.estimates.items():
+        name = f"**{method} ✔**" if tick.best == method else method
         lines.append(f"| {name} | {_magnitude(estimate)} | {axis_words(estimate)} |")
     return [*lines, *_truth_rows(run, tick), ""]
 
@@ -141,7 +141,7 @@ def _truth_rows(run: Run, tick: Tick) -> list[str]:
         return []
     truth = SpinEstimate("truth", spin, None, None)
     lines = [f"| truth | {_magnitude(truth)} | {axis_words(truth)} |", ""]
-    for method, estimate in tick.spin.estimates.items():
+    for method, estimate in tick.estimates.items():
         if estimate.axis is not None:
             angle = np.degrees(np.arccos(np.clip(estimate.axis @ spin / np.linalg.norm(spin), -1, 1)))
             off = abs((estimate.magnitude_rps or 0) - (truth.magnitude_rps or 0))
@@ -153,7 +153,7 @@ def _magnitude(estimate: SpinEstimate) -> str:
     magnitude, std = estimate.magnitude_rps, estimate.magnitude_std_rps
     if magnitude is None:
         return f"refused: {estimate.reason}"
-    return f"{magnitude:.1f}" if std is None else f"{magnitude:.1f} ± {std:.1f}"
+    return f"{magnitude:.1f}" if std is None else f"{magnitude:.1f} ± {std_words(std)}"
 
 
 def _evidence(run: Run, tick: Tick) -> list[str]:
@@ -171,18 +171,32 @@ def _evidence(run: Run, tick: Tick) -> list[str]:
         "",
         f"{_sentence(rhythm)}{slices}.",
         "",
+        *_contrast_words(tick),
         *_origin(run),
     ]
+
+
+def _contrast_words(tick: Tick) -> list[str]:
+    """How sharp the logo is, over which time, and how near the next best spin comes."""
+    result = tick.contrast
+    if result is None or not np.isfinite(result.best_rps).all():
+        return []
+    stretch = f"from {result.start_us / 1000:.1f} to {result.end_us / 1000:.1f} ms"
+    rivals = "no rival"
+    if result.rival_sigmas.size:
+        count = result.rival_sigmas.size
+        rivals = f"{count} rival{'s' if count > 1 else ''}, {result.rival_sigmas.min():.1f} σ behind"
+    return [f"Contrast {result.contrast:.2f} an event over chance, {stretch}; {rivals}.", ""]
 
 
 def _tick_card(run: Run, tick: Tick, velocity: Vector | None) -> bytes:
     """Spin, speed and kind, each in big letters with its small print."""
     estimate, trusted = shown_estimate(tick)
     speed = None if velocity is None else float(np.linalg.norm(velocity))
-    speed_big = "In place" if run.fixed else "–" if speed is None else f"{km_h(speed):.0f} km/h"
+    speed_big = "In place" if run.fixed else "-" if speed is None else f"{km_h(speed):.0f} km/h"
     speed_small = "" if speed is None else f"{speed:.1f} m/s"
     if estimate is None or estimate.vector_rps is None or not trusted:
-        return _card(("–", speed_big, "Spin not known"), ("", speed_small, "yet, or too little to trust"))
+        return _card(("-", speed_big, "Spin not known"), ("", speed_small, "yet, or too little to trust"))
     kind = kind_of_spin(estimate.vector_rps, velocity, run.camera.up)
     magnitude, std = estimate.magnitude_rps or 0.0, estimate.magnitude_std_rps
     margin = "" if std is None else f" ± {rpm(std):.0f}"

@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -20,8 +20,10 @@ from rerun.chunk import ChunkStore
 from . import entities as at
 from .ball import ball_chunks
 from .layouts import NAMES, blueprint
+from .painting import painting_chunks
 from .rerun_api import Chunk, columns_at, once
 from .run import Run
+from .score import score_chunks
 from .stages import STAGES
 from .summary import summary_chunks
 
@@ -34,11 +36,18 @@ KEPT_BYTES = 120_000_000  # some forty surfaces' worth of pictures
 # Series of A are drawn in the colour of the same series of B, mixed with this.
 PALE, PALENESS = (235, 235, 235), 0.55
 
+COLOUR_WORDS = (
+    "truth violet, Kalman filter green, refined circle orange, Hough yellow; spin by triplet orange, by normal_flow "
+    "blue-green, by contrast pink, rhythm of the event rate light green"
+)
+
 # Each drawer with the last stage whose results it shows: what comes later cannot change its picture.
 DRAWERS: tuple[tuple[Drawer, str], ...] = (
-    *zip(STAGES, ("filter", "surface", "track", "logo", "rate", "flow", "spin"), strict=True),
-    (ball_chunks, "spin"),
-    (summary_chunks, "spin"),
+    *zip(STAGES, ("filter", "surface", "track", "logo", "rate", "flow", "contrast"), strict=True),
+    (score_chunks, "contrast"),
+    (ball_chunks, "contrast"),
+    (painting_chunks, "contrast"),
+    (summary_chunks, "contrast"),
 )
 
 
@@ -47,8 +56,8 @@ class Drawings:
 
     def __init__(self, budget_bytes: int = KEPT_BYTES) -> None:
         self._budget_bytes = budget_bytes
-        self._made: OrderedDict[Hashable, tuple[list[Chunk], int]] = OrderedDict()
-        self._bytes = 0
+        self._made: OrderedDict[Hashable, Future[list[Chunk]]] = OrderedDict()
+        self._sizes: dict[Hashable, int] = {}
         self._lock = threading.Lock()
         self._threads = ThreadPoolExecutor(2, "drawing")
 
@@ -56,31 +65,52 @@ class Drawings:
         """End the threads."""
         self._threads.shutdown(cancel_futures=True)
 
+    def begin(self, run: Run, keys: Mapping[str, Hashable]) -> None:
+        """Draw what is known already of a run whose last stages are still to come, while they are computed."""
+        for drawer, stage, key in _wanted(run, keys):
+            if getattr(run.ticks[0], stage) is not None:
+                self._drawn(drawer, run, key)
+
     def chunks(self, run: Run, keys: Mapping[str, Hashable]) -> list[Chunk]:
         """Everything there is to see of a run.
 
         keys : what each stage's results were made from; what comes from the same looks alike
         """
-        wanted = [(drawer, (number, len(run.ticks), keys[stage])) for number, (drawer, stage) in enumerate(DRAWERS)]
         # The ball and the words take longest, each in its own thread; numpy, OpenCV and Pillow let go of Python.
-        last_first = [self._threads.submit(self._drawn, drawer, run, key) for drawer, key in reversed(wanted)]
+        last_first = [self._drawn(drawer, run, key) for drawer, _, key in reversed(_wanted(run, keys))]
         return [chunk for drawn in reversed(last_first) for chunk in drawn.result()]
 
-    def _drawn(self, drawer: Drawer, run: Run, key: Hashable) -> list[Chunk]:
-        with self._lock:
-            if key in self._made:
-                self._made.move_to_end(key)
-                return self._made[key][0]
-        drawn = drawer(run)
-        size = sum(chunk.to_record_batch().nbytes for chunk in drawn)
+    def _drawn(self, drawer: Drawer, run: Run, key: Hashable) -> Future[list[Chunk]]:
         with self._lock:
             if key not in self._made:
-                self._made[key] = drawn, size
-                self._bytes += size
-            while self._bytes > self._budget_bytes and len(self._made) > 1:
-                _, (_, freed) = self._made.popitem(last=False)
-                self._bytes -= freed
+                self._made[key] = self._threads.submit(self._draw, drawer, run, key)
+            self._made.move_to_end(key)
+            return self._made[key]
+
+    def _draw(self, drawer: Drawer, run: Run, key: Hashable) -> list[Chunk]:
+        try:
+            drawn = drawer(run)
+        except BaseException:
+            with self._lock:
+                self._made.pop(key, None)
+            raise
+        with self._lock:
+            self._sizes[key] = sum(chunk.to_record_batch().nbytes for chunk in drawn)
+            total = sum(self._sizes.values())
+            for old in [old for old in self._made if old in self._sizes and old != key]:
+                if total <= self._budget_bytes:
+                    break
+                total -= self._sizes.pop(old)
+                del self._made[old]
         return drawn
+
+
+def _wanted(run: Run, keys: Mapping[str, Hashable]) -> list[tuple[Drawer, str, Hashable]]:
+    """Each drawer with its stage, and what tells its drawing from all others."""
+    return [
+        (drawer, stage, (number, len(run.ticks), keys[stage], getattr(run.ticks[0], stage) is None))
+        for number, (drawer, stage) in enumerate(DRAWERS)
+    ]
 
 
 def compared(a: Sequence[Chunk]) -> list[Chunk]:
@@ -143,8 +173,8 @@ def note_without_a(run: Run) -> list[Chunk]:
 
 
 def note_with_a(run: Run, text: str) -> list[Chunk]:
-    """The Compare tab's words about A and B."""
-    return _note(run, text)
+    """The Compare tab's words about A and B, and which colour is which curve."""
+    return _note(run, f"{text}\n\nCurves: {COLOUR_WORDS}. A is paler.")
 
 
 def _note(run: Run, text: str) -> list[Chunk]:
@@ -199,5 +229,5 @@ def _plots(quantity: str, name: str) -> rrb.View:
         contents=[f"{path}/**", f"{A}{path}/**"],
         name=name,
         axis_x=rrb.TimeAxis(link="LinkToGlobal"),
-        plot_legend=rrb.PlotLegend(corner="LeftTop"),
+        plot_legend=rrb.PlotLegend(visible=False),  # of twice the usual curves it would hide the plot
     )

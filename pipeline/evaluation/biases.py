@@ -34,6 +34,7 @@ PICTURES = {
     "refr": ((120, 80, -20), 2000),
     "fo": ((-35, 55), 1000),
 }
+NEEDS = ("simulator", "biases.py", "evaluation/biases.py")  # the estimators have no part in it
 PICTURE_PX = 64  # side of a picture; the ball has a radius of about 17 px
 
 
@@ -45,12 +46,14 @@ def tasks(quick: bool) -> list[Task]:
     for sweep, (_, values, few) in SWEEPS.items():
         for value in few if quick else values:
             common = {"sweep": sweep, "value": value}
-            every.append(Task(measure_noise, {**common, "seed": SEED}))
+            every.append(Task(measure_noise, {**common, "seed": SEED}, needs=NEEDS))
             for number in range(flights):
-                every.append(Task(measure_ball, {**common, "seed": SEED + number, "duration_ms": duration_ms}))
+                arguments = {**common, "seed": SEED + number, "duration_ms": duration_ms}
+                every.append(Task(measure_ball, arguments, needs=NEEDS))
     pictures = [(sweep, value) for sweep, (shown, _) in PICTURES.items() for value in shown]
     for sweep, value in pictures[-2:] if quick else pictures:
-        every.append(Task(take_picture, {"sweep": sweep, "value": value, "duration_ms": duration_ms}))
+        arguments = {"sweep": sweep, "value": value, "duration_ms": duration_ms}
+        every.append(Task(take_picture, arguments, needs=NEEDS))
     return every
 
 

@@ -22,6 +22,7 @@ SEED = 73_000  # of this suite alone: nothing was tuned on these recordings
 SPEEDS_M_S = tuple(float(speed) for speed in range(4, 21, 2))
 SCENES = ("one ball", "two balls", "arm")
 FLIGHTS = 3  # of each speed and scene
+AFTER_TRACK = ("logo", "rate", "flow", "spin", "contrast")  # of no concern here
 STAGES = ("hough", "hough + kalman", "refined", "refined + kalman")
 
 # The paper's filter, fed with the Hough circle: its error is about a pixel, its start knows nothing of the velocity.
@@ -38,8 +39,6 @@ def tasks(quick: bool) -> list[Task]:
         chosen = [("one ball", 8.0), ("two balls", 16.0)]
     else:
         chosen = [(scene, speed) for scene in SCENES for speed in SPEEDS_M_S for _ in range(FLIGHTS)]
-        # The second ball flies at up to 5 m/s: where it is the faster one, it is rightly the one that is tracked.
-        chosen = [(scene, speed) for scene, speed in chosen if scene != "two balls" or speed > 5.0]
     return [
         Task(measure, {"scene": scene, "speed_m_s": speed, "seed": SEED + number})
         for number, (scene, speed) in enumerate(chosen)
@@ -62,7 +61,7 @@ def measure(bench: Bench, scene: str, speed_m_s: float, seed: int) -> list[Row]:
     focal_px = chain.setting(bench.parameters).camera.focal_px
     follower = HoughKalman(bench.parameters.ball, focal_px)
     rows: list[Row] = []
-    for tick in chain.run(bench.parameters, forget=("surface",)):
+    for tick in chain.run(bench.parameters, forget=("surface",), without=AFTER_TRACK):
         found = _found(tick, follower)
         truth = _truth_at(recording, tick.track.t_us)
         if truth is not None:
@@ -168,20 +167,25 @@ def tables(rows: Sequence[Row]) -> list[Table]:
     ]
     by_scene += [(scene, *_line(where(rows, scene=scene, stage=stage), stage)) for scene in scenes for stage in STAGES]
     by_speed = [
-        (speed, *_line(part, stage))
+        (scene, speed, *_line(part, stage))
+        for scene in scenes
         for speed in sorted(speeds)
-        for stage in STAGES
-        if (part := where(rows, scene="one ball", speed_m_s=speed, stage=stage))
+        for stage in (STAGES if scene == SCENES[0] else STAGES[-1:])
+        if (part := where(rows, scene=scene, speed_m_s=speed, stage=stage))
     ]
     return [
         Table("Ball detector by scene", ("scene", *columns), by_scene, NOTE),
-        Table("Ball detector by speed, one ball", ("speed [m/s]", *columns), by_speed),
+        Table("Ball detector by speed", ("scene", "speed [m/s]", *columns), by_speed, NOTE_OF_TWO),
     ]
 
 
 NOTE = (
     "Absolute errors over all ticks with the whole ball in view, at the end of the tick, as a robot would have them; "
     "along the motion signed (negative = behind). Found: a circle whose centre lies on the ball."
+)
+NOTE_OF_TWO = (
+    "Two balls: the second one crosses at 2 to 6 m/s. One ball is tracked at a time, so a first ball that is hardly "
+    "faster than the second may be missed for all of its flight."
 )
 
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import statistics
 from collections.abc import Sequence
 
 import numpy as np
 
 from ..chain import Chain, EventSource, Parameters
+from ..methods import METHODS
 from ..results import Truth
 from ..shots import Shot, ShotLog
-from ..stages.spin import METHODS
 from .rendering import Rendered
-from .tables import Cell, Row, Table, share, summary, where
+from .tables import Cell, Row, share, summary, where
 
 LOGO = 2  # the truth's label of the logo's events
 BEST = "best"  # what the program itself trusts
@@ -92,32 +91,6 @@ def method_line(rows: Sequence[Row], label: str) -> tuple[Cell, ...]:
         summary(rows, "magnitude_error_rps"),
         summary(rows, "axis_error_deg"),
     )
-
-
-def calibration(rows: Sequence[Row], methods: Sequence[str]) -> Table:
-    """How large the errors are beside what the methods themselves expected."""
-    lines: list[tuple[Cell, ...]] = []
-    for method in methods:
-        own = where(rows, method=method)
-        cells: list[Cell] = []
-        for error, std in (("magnitude_error_rps", "magnitude_std_rps"), ("axis_error_deg", "axis_std_deg")):
-            ratios = [ratio for row in own if (ratio := _ratio(row, error, std)) is not None]
-            cells.append(statistics.median(ratios) if ratios else None)
-            cells.append(sum(ratio > 3 for ratio in ratios) / len(ratios) if ratios else None)
-        lines.append((method, *cells))
-    return Table(
-        "Error over expected error (1 sigma)",
-        ("method", "magnitude, median", "above 3", "axis, median", "above 3"),
-        lines,
-        "Honest errors give medians of 0.67 for the magnitude and about 0.8 for the axis, and hardly any above 3.",
-    )
-
-
-def _ratio(row: Row, error: str, std: str) -> float | None:
-    value, expected = row[error], row[std]
-    if not isinstance(value, float) or not isinstance(expected, float):
-        return None
-    return value / max(expected, 1e-9)
 
 
 def _answered(row: Row) -> bool:

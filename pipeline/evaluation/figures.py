@@ -13,8 +13,10 @@ import numpy as np
 
 from ..errors import RecordingError
 from . import biases, detector, filters, runtime
+from .honesty import by_coverage
 from .spinner import group_of
 from .tables import Row, distinct, summary, where
+from .thrower import THROWER
 
 if TYPE_CHECKING:
     from .suites import Report
@@ -22,7 +24,9 @@ if TYPE_CHECKING:
 Figure = Any  # matplotlib's; it has no business here before it is needed
 WIDTH_IN, HEIGHT_IN, DPI = 5.0, 3.4, 120  # of one panel
 BIN_RPS = 20.0  # errors against the spin are averaged over so much of it
+LEAST = 1e-3  # errors below are drawn there, for the logarithm
 STYLES = ("-", "--", "-.", ":")
+BEST = "best"  # nearly always `contrast`: its curve would hide that one
 ERRORS = (("magnitude_error_rps", "magnitude error [rps]"), ("axis_error_deg", "axis error [deg]"))
 
 
@@ -36,7 +40,7 @@ def draw(report: Report, folder: Path) -> list[Path]:
         folder.mkdir(parents=True, exist_ok=True)
         for name, figure in DRAWINGS[report.suite.name](report.rows).items():
             content = io.BytesIO()
-            figure.savefig(content, format="png", dpi=DPI)
+            _legend(figure).savefig(content, format="png", dpi=DPI)
             path = folder / f"{report.suite.name}_{name}.png"
             part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
             try:
@@ -59,7 +63,7 @@ def _panels(rows: int, columns: int) -> tuple[Figure, Any]:
 
 
 def _curve(axes: Any, rows: Sequence[Row], x: str, y: str, label: str, style: str = "-", color: int = 0) -> None:
-    """Mean of y at each x with a band of one standard deviation, as in the paper's figures."""
+    """Mean of y at each x with a band up to one standard deviation above it, as in the paper's figures."""
     points = [(value, summary(where(rows, **{x: value}), y)) for value in sorted(distinct(rows, x))]
     points = [(value, errors) for value, errors in points if errors.mean is not None]
     if not points:
@@ -68,7 +72,29 @@ def _curve(axes: Any, rows: Sequence[Row], x: str, y: str, label: str, style: st
     mean = np.array([errors.mean for _, errors in points])
     sd = np.array([errors.sd or 0.0 for _, errors in points])
     axes.plot(place, mean, style, color=f"C{color}", marker="o", markersize=3, label=label)
-    axes.fill_between(place, np.maximum(mean - sd, 0.0), mean + sd, color=f"C{color}", alpha=0.12)
+    # As far down as up on a logarithmic axis: a standard deviation may be larger than the mean.
+    below = mean**2 / np.maximum(mean + sd, LEAST)
+    axes.fill_between(place, below, mean + sd, color=f"C{color}", alpha=0.12)
+
+
+def _methods(rows: Sequence[Row]) -> list[tuple[int, str]]:
+    """(colour, method) of the curves."""
+    return list(enumerate(method for method in distinct(rows, "method") if method != BEST))
+
+
+def _coverage(groups: Sequence[tuple[str, Sequence[Row]]]) -> Figure:
+    """Mean error when only the answers with the smallest stated errors are given, against the share given."""
+    figure, axes = _panels(len(groups), len(ERRORS))
+    for line, (what, rows) in enumerate(groups):
+        for column, (name, label) in enumerate(ERRORS):
+            for color, method in _methods(rows):
+                coverage, error = by_coverage(where(rows, method=method), name, name.replace("_error_", "_std_"))
+                if coverage.size:
+                    axes[line, column].plot(coverage, np.maximum(error, LEAST), color=f"C{color}", label=method)
+            axes[line, column].set_yscale("log")
+            axes[line, column].set_xlim(0.0, 1.0)
+            _finish(axes[line, column], what, "share answered, the surest first", f"mean {label}")
+    return figure
 
 
 def _finish(axes: Any, title: str, x: str, y: str) -> None:
@@ -76,8 +102,17 @@ def _finish(axes: Any, title: str, x: str, y: str) -> None:
     axes.set_xlabel(x)
     axes.set_ylabel(y)
     axes.grid(alpha=0.3)
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(fontsize=7)
+
+
+def _legend(figure: Figure) -> Figure:
+    """One legend for all panels, below them."""
+    known: dict[str, Any] = {}
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            known.setdefault(label, handle)
+    if known:
+        figure.legend(known.values(), known.keys(), loc="outside lower center", ncols=min(len(known), 6), fontsize=8)
+    return figure
 
 
 def _spinner(rows: Sequence[Row]) -> dict[str, Figure]:
@@ -88,11 +123,18 @@ def _spinner(rows: Sequence[Row]) -> dict[str, Figure]:
     for column, window_ms in enumerate(windows):
         for line, (name, label) in enumerate(ERRORS):
             for group, style in (("top/back", "-"), ("side", "--")):
-                for color, method in enumerate(distinct(rows, "method")):
+                for color, method in _methods(rows):
                     part = [r for r in where(chosen, window_ms=window_ms, method=method) if group_of(r) == group]
                     _curve(axes[line, column], part, "rps", name, f"{method}, {group}", style, color)
+            axes[line, column].set_yscale("log")
             _finish(axes[line, column], f"ball spinner, {window_ms} ms", "spin [rps]", label)
-    return {"errors": figure}
+    groups = [(f"ball spinner, {window_ms} ms", where(rows, window_ms=window_ms)) for window_ms in windows]
+    return {"errors": figure, "coverage": _coverage(groups)}
+
+
+def _thrower(rows: Sequence[Row]) -> dict[str, Figure]:
+    """The paper's figure of the thrower's flights, and error against coverage of all flights."""
+    return _flights(where(rows, by=THROWER)) | {"coverage": _coverage([("flying balls", rows)])}
 
 
 def _flights(rows: Sequence[Row]) -> dict[str, Figure]:
@@ -101,7 +143,7 @@ def _flights(rows: Sequence[Row]) -> dict[str, Figure]:
         row | {"bin_rps": (row["rps"] // BIN_RPS + 0.5) * BIN_RPS} for row in rows if isinstance(row["rps"], float)
     ]
     figure, axes = _panels(1, 3)
-    for color, method in enumerate(distinct(rows, "method")):
+    for color, method in _methods(rows):
         part = where(binned, method=method)
         for column, (name, _) in enumerate(ERRORS):
             _curve(axes[0, column], part, "bin_rps", name, method, color=color)
@@ -109,6 +151,8 @@ def _flights(rows: Sequence[Row]) -> dict[str, Figure]:
         success = [summary(where(part, bin_rps=b), "axis_error_deg").success for b in bins]
         axes[0, 2].plot(bins, success, color=f"C{color}", marker="o", markersize=3, label=method)
     axes[0, 2].set_ylim(0.0, 1.05)
+    for column in range(len(ERRORS)):
+        axes[0, column].set_yscale("log")
     for column, (_, label) in enumerate((*ERRORS, ("success", "success rate"))):
         _finish(axes[0, column], "flying balls", "spin [rps]", label)
     return {"errors": figure}
@@ -149,11 +193,13 @@ def _biases(rows: Sequence[Row]) -> dict[str, Figure]:
     result = {"rates": figure}
     pictures = where(rows, what="picture")
     if pictures:
-        figure, axes = _panels(1, len(pictures))
-        for column, row in enumerate(pictures):
-            axes[0, column].imshow(biases.picture_of(row), cmap="coolwarm", vmin=-1, vmax=1)
-            axes[0, column].set_axis_off()
-            axes[0, column].set_title(f"bias_{row['sweep']}: {row['value']}", fontsize=10)
+        columns = min(len(pictures), 4)
+        figure, axes = _panels(-(-len(pictures) // columns), columns)
+        for panel in axes.flat:
+            panel.set_axis_off()
+        for panel, row in zip(axes.flat, pictures, strict=False):
+            panel.imshow(biases.picture_of(row), cmap="coolwarm", vmin=-1, vmax=1)
+            panel.set_title(f"bias_{row['sweep']}: {row['value']} ({row['span_us']} us)", fontsize=10)
         result["pictures"] = figure
     return result
 
@@ -199,7 +245,7 @@ def _runtime(rows: Sequence[Row]) -> dict[str, Figure]:
 DRAWINGS: dict[str, Callable[[Sequence[Row]], dict[str, Figure]]] = {
     "detector": _detector,
     "spinner": _spinner,
-    "thrower": _flights,
+    "thrower": _thrower,
     "frames": _flights,
     "biases": _biases,
     "filters": _filters,

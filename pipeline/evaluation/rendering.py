@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from ..biases import PAPER, BiasParameters
@@ -10,7 +10,7 @@ from ..errors import RecordingError
 from ..events import EventBatch
 from ..recordings import open_recording, write_recording
 from ..results import Truth
-from ..simulator import Scene, simulate
+from ..simulator import Scene, Sensor, simulate
 from .work import Bench, digest, text_of
 
 
@@ -31,7 +31,8 @@ class Rendered:
 
 def rendered(bench: Bench, scene: Scene, *, seed: int, biases: BiasParameters = PAPER) -> Rendered:
     """The scene before the paper's camera at these biases, from the cache where it is there."""
-    identity = digest([scene.to_dict(), biases.as_dict(), seed, text_of("simulator")])
+    sensor = asdict(Sensor.of(biases))
+    identity = digest([scene.to_dict(), sensor, seed, text_of("simulator")])
     duration_us = round(scene.duration_s * 1e6)
     place = None if bench.cache is None else bench.cache / "recordings" / f"{identity}.h5"
     if place is not None and place.exists():

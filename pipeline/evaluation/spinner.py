@@ -8,7 +8,8 @@ import numpy as np
 
 from ..simulator import spinner
 from . import paper
-from .estimating import COLUMNS, calibration, estimate_rows, logo_events, method_line, shots_of
+from .estimating import COLUMNS, estimate_rows, logo_events, method_line, shots_of
+from .honesty import Goal, goals, honesty
 from .rendering import Rendered, rendered
 from .tables import Cell, Row, Table, distinct, summary, where
 from .work import Bench, Task
@@ -75,7 +76,7 @@ def known_circle(recording: Rendered, seed: int) -> dict[str, str | float]:
 
 
 def tables(rows: Sequence[Row]) -> list[Table]:
-    """Table 1 by quantity, the methods over all balls, and how honest their uncertainties are."""
+    """Table 1 by quantity, the methods over all balls, how honest their uncertainties are, and the goals."""
     methods = distinct(rows, "method")
     return [
         _table_1(rows, "magnitude_error_rps", "Table 1: error of the spin magnitude [rps]", 0),
@@ -93,8 +94,25 @@ def tables(rows: Sequence[Row]) -> list[Table]:
             "Success counts answers over recordings; 'of those with logo' leaves out windows with fewer than 1,000 "
             "(100 ms) or 100 (10 ms) logo events.",
         ),
-        calibration(rows, methods),
+        honesty([(f"{ms} ms", where(rows, window_ms=ms)) for ms in sorted(distinct(rows, "window_ms"))], methods),
+        _goals(rows),
     ]
+
+
+def _goals(rows: Sequence[Row]) -> Table:
+    """What is asked of `contrast`; of windows with a visible logo, and of those without one a refusal."""
+    own = where(rows, method="contrast")
+    long, short = (where(own, window_ms=ms, visible=True) for ms in (100, 10))
+    asked = [Goal("100 ms, all balls", long, answered=0.95, rps=0.2, deg=3.0)]
+    for ball in sorted(distinct(long, "ball")):
+        asked.append(Goal(f"100 ms, ball {ball}", where(long, ball=ball), answered=0.95, rps=0.2, deg=3.0))
+    for group, rps in (("top/back", 2.0), ("side", 0.7)):
+        part = [row for row in short if group_of(row) == group]
+        asked.append(Goal(f"10 ms, {group}", part, answered=0.7, rps=rps, deg=4.0))
+    unseen = [row for row in own if row["logo_events"] == 0]
+    asked.append(Goal("logo never seen", unseen, answered=0.0, refuse=True))
+    note = "Recordings with a visible logo (see above), so many; mean absolute errors."
+    return goals("`contrast` beside its goals", asked, note)
 
 
 def group_of(row: Row) -> str:

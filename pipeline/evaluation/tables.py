@@ -90,6 +90,8 @@ def text(cell: Cell) -> str:
 def rounded(value: float) -> str:
     """Three digits, no more than the statistics carry."""
     size = abs(value)
+    if 0 < size < 0.1:
+        return f"{value:.3f}"
     return f"{value:.0f}" if size >= 100 else f"{value:.1f}" if size >= 10 else f"{value:.2f}"
 
 

@@ -44,11 +44,14 @@ class Task:
     """A call that gives rows: function(bench, **arguments), with arguments that JSON can hold.
 
     keep : whether its rows may be kept for the next run (not so for times)
+    needs : the parts of `pipeline` (files and packages) whose text the kept rows depend on; "" = all of it, and the
+        bench's parameters
     """
 
     function: Callable[..., list[Row]]
     arguments: Mapping[str, Any] = field(default_factory=dict)
     keep: bool = True
+    needs: tuple[str, ...] = ("",)
 
 
 @contextmanager
@@ -66,9 +69,21 @@ def executor(workers: int = 1, cluster: str | None = None) -> Iterator[Executor 
     else:
         # Fresh processes: a copy of this one would share its threads' locks (progress bars, HDF5).
         fresh = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(workers, fresh) as pool:
+        with ProcessPoolExecutor(workers, fresh, initializer=_end_with_parent) as pool:
             _start_deaf(pool)
             yield pool
+
+
+def _end_with_parent() -> None:
+    """Let a worker end when the process that started it is gone, however it ended; it would wait for work for ever."""
+    parent = multiprocessing.parent_process()
+
+    def wait() -> None:
+        if parent is not None:
+            parent.join()
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
 
 
 def _start_deaf(pool: Executor) -> None:
@@ -86,7 +101,7 @@ def _of_cluster(address: str) -> Iterator[Executor]:
     try:
         dask = importlib.import_module("distributed")  # an extra: not everybody has a cluster
     except ImportError:
-        raise ParameterError("a cluster needs Dask: install it with `pip install distributed`") from None
+        raise ParameterError("a cluster needs Dask: install it with `pip install spinscope[cluster]`") from None
     try:
         client = dask.Client(address, timeout=10)
     except (OSError, ValueError) as error:
@@ -161,7 +176,9 @@ def _place(bench: Bench, task: Task) -> Path | None:
     if bench.cache is None or not task.keep:
         return None
     name = f"{task.function.__module__}.{task.function.__qualname__}"
-    everything = [name, dict(task.arguments), bench.parameters.as_dict(), text_of("")]
+    everything = [name, dict(task.arguments), *(text_of(part) for part in task.needs)]
+    if "" in task.needs:
+        everything.append(bench.parameters.as_dict())
     return bench.cache / "results" / f"{digest(everything)}.json"
 
 
@@ -172,10 +189,11 @@ def digest(value: Any) -> str:
 
 
 @lru_cache
-def text_of(package: str) -> str:
-    """Digest of the text of `pipeline` or of one package in it: results are only good for the version they are of."""
+def text_of(part: str) -> str:
+    """Digest of the text of `pipeline`, of a package or a file in it: results are good for one version only."""
     hashed = hashlib.blake2b(digest_size=12)
-    for path in sorted((PIPELINE / package).rglob("*.py")):
+    place = PIPELINE / part
+    for path in [place] if place.is_file() else sorted(place.rglob("*.py")):
         hashed.update(path.relative_to(PIPELINE).as_posix().encode() + b"\0" + path.read_bytes())
     return hashed.hexdigest()
 

@@ -182,3 +182,21 @@ def best_circle(
     x, y, radius = refined(votes, a, b, k)
     share = min(1.0, votes[b, a, k] / (2.0 * math.pi * (radius0_px + k)))
     return left_px + x, top_px + y, radius0_px + radius, share
+
+
+@njit(cache=True, nogil=True)
+def best_in_window(
+    window: NDArray[np.uint8],
+    x0_px: int,
+    y0_px: int,
+    least: int,
+    most_pixels: int,
+    left_px: int,
+    top_px: int,
+    side_px: int,
+    radius0_px: int,
+    radii: int,
+) -> tuple[float, float, float, float]:
+    """`best_circle` through the `bright_pixels` of a window whose first pixel is (x0, y0), in a square of centres."""
+    xs, ys = bright_pixels(window, least, most_pixels)
+    return best_circle(xs + x0_px, ys + y0_px, left_px, top_px, side_px, side_px, radius0_px, radii)

@@ -74,7 +74,7 @@ def _pole(spin_rad_s: Floats, t_s: Floats, normals: Floats) -> tuple[float, floa
     stride = max(1, t_s.size // POLE_EVENTS)
     some = np.ascontiguousarray(normals[:, ::stride])
     turned = np.empty_like(some)
-    turn_back(turned, spin_rad_s, t_s[::stride], some)
+    turn_back(turned, spin_rad_s, np.ascontiguousarray(t_s[::stride]), some)
     px, py, pz = 0.0, 0.0, 1e-9
     for k in range(turned.shape[1]):
         px, py, pz = px + turned[0, k], py + turned[1, k], pz + turned[2, k]

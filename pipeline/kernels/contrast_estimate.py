@@ -9,13 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .contrast_events import Answer, LogoEvents, Place, Settings
-from .contrast_refine import NO_OFFSETS, Hill, bend_and_noise, climb, spread_of_estimate
+from .contrast_place import place_slopes
+from .contrast_refine import NO_OFFSETS, climb, scores_near, spread_of_estimate
 from .contrast_scan import followed, hill_of, ranked, scanned
 from .contrast_search import NEAR, TURN, bursts, narrowed, search
 
 Floats = NDArray[np.float64]
 
-TRACK_MEMORY_S = 0.02  # over which a track's errors hang together: four steps of the Kalman filter
+# The kernel blurs the logo's two sides differently as it comes and goes; the last refinement has a finer one. From
+# 0.04 to 0.025 rad the axis gained a quarter, less than that brought nothing but noise.
+FINE = 0.625
+# What the model lacks (the logo's blurred edges look different from each side) leaves errors that more events do not
+# lessen, as parts of the kernel: of the axis, and of the turn over the stretch's spread in time. From the errors of
+# two simulators' balls with exact tracks.
+AXIS_FLOOR, TURN_FLOOR = 0.35, 0.04
+TRACK_MEMORY_S = 0.01  # over which a track's errors hang together: two steps of the Kalman filter
 # Longer stretches may hold steady shading for the search to be rid of, and bursts to tell it by.
 BURSTS_FROM_S = 0.015
 # Below this part of a turn there are no other visits of the logo to be confused with; `search` has seen all of it.
@@ -23,12 +31,19 @@ SCAN_FROM_TURNS = 0.7
 
 
 def estimate_spin(
-    events: LogoEvents, place: Place, settings: Settings, *, starts_rps: Floats | None = None, searching: bool = True
+    events: LogoEvents,
+    place: Place,
+    settings: Settings,
+    *,
+    starts_rps: Floats | None = None,
+    searching: bool = True,
+    scanning: bool = True,
 ) -> Answer:
     """The spin that explains the events best.
 
     starts_rps : (k, 3) spins to try first
     searching : look everywhere, not only around the starts and their aliases; always so without starts
+    scanning : look at the starts' aliases; without it and without a search at the starts only
     """
     if len(events) < settings.fewest:
         return Answer(None, None, len(events))
@@ -41,14 +56,14 @@ def estimate_spin(
         grid, _ = search(*parts, settings.fastest_rps, floor, most)
         spins = np.concatenate([spins, narrowed(*parts, grid, floor, most, 6)])
         spins = followed(lively, spins, settings)
-    if not searching or span_s * float(np.linalg.norm(spins[0])) > SCAN_FROM_TURNS * TURN:
+    seen_again = span_s * float(np.linalg.norm(spins[0])) > SCAN_FROM_TURNS * TURN
+    if scanning and (not searching or seen_again):
         spins = scanned(lively, spins, settings)
     spins, margins = ranked(events, spins, settings)
     some = events.thinned(settings.most)
-    hill = hill_of(some, settings, settings.sigma)
-    spins[0], _, _ = climb(hill, spins[0], NO_OFFSETS, 1)
+    spins[0], _, _, _ = climb(hill_of(some, settings, settings.sigma), spins[0], NO_OFFSETS, 1)
     stretch = (len(events), reference_s, span_s)
-    return _refined(hill, some, spins, margins, place, settings, stretch, np.zeros(3), 2)
+    return _refined(some, spins, margins, place, settings, stretch, np.zeros(3), 4)
 
 
 def follow_spin(events: LogoEvents, place: Place, settings: Settings, before: Answer) -> Answer:
@@ -59,12 +74,10 @@ def follow_spin(events: LogoEvents, place: Place, settings: Settings, before: An
     assert before.spin_rps is not None
     events, reference_s, span_s = _centred(events)
     some = events.thinned(settings.quick_most)
-    hill = hill_of(some, settings, settings.sigma)
-    spin, _, _ = climb(hill, before.spin_rps * TURN, NO_OFFSETS, 1)
-    spins = np.concatenate([spin[None], before.rivals_rps * TURN])
+    spins = np.concatenate([before.spin_rps[None], before.rivals_rps]) * TURN
     margins = np.concatenate([[0.0], before.margins])
     stretch = (len(events), reference_s, span_s)
-    return _refined(hill, some, spins, margins, place, settings, stretch, before.offsets_px, 1)
+    return _refined(some, spins, margins, place, settings, stretch, before.offsets_px, 1)
 
 
 def _centred(events: LogoEvents) -> tuple[LogoEvents, float, float]:
@@ -82,7 +95,6 @@ def _lively(events: LogoEvents, span_s: float, settings: Settings) -> LogoEvents
 
 
 def _refined(
-    hill: Hill,
     events: LogoEvents,
     spins: Floats,
     margins: Floats,
@@ -94,14 +106,20 @@ def _refined(
 ) -> Answer:
     """The answer around spins[0], with the ball's offsets; `events` of the hill are thinned from stretch[0]."""
     given, reference_s, span_s = stretch
-    hill.prior_px = np.array([place.centre_std_px, place.centre_std_px, place.radius_std_px])
-    hill.trust = settings.trust
-    spin, offsets, _ = climb(hill, spins[0], offsets_px, iterations)
-    bend, noise = bend_and_noise(hill, spin, offsets, settings.repeats)
-    covariance = spread_of_estimate(hill, spin, bend, noise * len(events) / given) + _drift(events, place, span_s)
-    sharp = hill.score(spin, offsets)
-    hill.part = hill.part._replace(t_s=np.random.default_rng(0).permutation(hill.part.t_s))
-    contrast = (sharp - hill.score(spin, offsets)) / len(events)
+    hill = hill_of(events, settings, FINE * settings.sigma)._replace(
+        slopes_px=place_slopes(events.normals, events.facing, events.radius_px),
+        prior_px=np.array([place.centre_std_px, place.centre_std_px, place.radius_std_px]),
+        trust=settings.trust,
+    )
+    spin, offsets, sharp, seen = climb(hill, spins[0], offsets_px, iterations)
+    covariance = spread_of_estimate(hill, seen, settings.repeats * len(events) / given)
+    covariance += _drift(events, place, span_s)
+    along = np.outer(spin, spin) / (spin @ spin)
+    covariance += (AXIS_FLOOR * settings.sigma) ** 2 * (spin @ spin) * (np.eye(3) - along)
+    covariance += (TURN_FLOOR * settings.sigma / max(float(np.std(events.t_s)), 1e-5)) ** 2 * along
+    chance = hill._replace(part=hill.part._replace(t_s=np.random.default_rng(0).permutation(hill.part.t_s)))
+    by_chance = scores_near(np.empty((1, len(events))), chance, spin, offsets, np.zeros((1, 6)))
+    contrast = (sharp - float(by_chance[0])) / len(events)
     gaps = spins[1:] - spins[0]
     near = np.linalg.norm(gaps, axis=1) < NEAR * np.linalg.norm(spins[0])
     for gap, margin in zip(gaps[near], margins[1:][near], strict=True):

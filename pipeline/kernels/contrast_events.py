@@ -31,10 +31,10 @@ class Settings:
     fewest: int = 40
     most: int = 3000
     search_most: int = 800
-    scan_most: int = 500
-    quick_most: int = 600
-    trust: float = 0.3
-    repeats: float = 4.0
+    scan_most: int = 250
+    quick_most: int = 1000
+    trust: float = 0.1
+    repeats: float = 8.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

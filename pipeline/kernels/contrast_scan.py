@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .contrast_events import LogoEvents, Settings
-from .contrast_refine import NO_OFFSETS, Hill, climb
+from .contrast_refine import NO_OFFSETS, Hill, climb, climb_all
 from .contrast_search import NEAR, TURN, distinct, scored, spread_directions
 from .contrast_window import Window, segmented, whole
 
@@ -22,15 +22,17 @@ COMB_LOW, COMB_HIGH, COMB_STEP, COMB_MOST = 0.45, 2.2, 0.1, 300
 SCAN_DIRECTIONS = 100
 MAGNITUDES = 6  # at which all axes are looked at
 FOLLOW_TURNS, FOLLOW_RATIO = 1.6, 2.5
+OTHERS = 300
+# A top of the coarse scores below this part of the best one is no rival.
+RIVAL = 0.5
 # A climb ends within this of its top, relative to the spin; farther tops are others.
 SAME = 0.03
 
 
 def hill_of(events: LogoEvents, settings: Settings, sigma: float) -> Hill:
-    """The score of all these events together; B from at least 600 exchanged ones."""
-    n = len(events)
-    part, others = whole(events.t_s, events.normals, events.layers, max(1, round(600 / n)))
-    return Hill(part, others, events.facing, events.radius_px, sigma, settings.floor, NO_OFFSETS, 1.0, np.empty(n))
+    """The score of all these events together; B from at least OTHERS exchanged ones."""
+    part, others = whole(events.t_s, events.normals, events.layers, max(1, round(OTHERS / len(events))))
+    return Hill(part, others, np.empty((3, 3, 0)), sigma, settings.floor, NO_OFFSETS, 1.0)
 
 
 def followed(events: LogoEvents, spins_rad_s: Floats, settings: Settings) -> Floats:
@@ -38,23 +40,23 @@ def followed(events: LogoEvents, spins_rad_s: Floats, settings: Settings) -> Flo
     events = events.thinned(settings.most // 2)
     span_s, n = float(events.t_s[-1] - events.t_s[0]), len(events)
     hill = hill_of(events, settings, 1.5 * settings.sigma)
-    everything, spins, turns = hill.part, spins_rad_s, FOLLOW_TURNS
+    everything, spins, turns = hill, spins_rad_s, FOLLOW_TURNS
     while True:
         last = turns * TURN > span_s * float(np.linalg.norm(spins[0]))
-        tops = []
-        for spin in spins:
+        tops = np.empty_like(spins)
+        values = np.empty(len(spins))
+        for k, spin in enumerate(spins):
             if not last:
                 segment_s = turns * TURN / float(np.linalg.norm(spin))
-                hill.part = segmented(
-                    events.t_s, events.normals, events.layers, segment_s=segment_s, most=n, most_each=n
-                )
-            tops.append(climb(hill, spin, NO_OFFSETS, 4 if last else 2))
-        spins = np.array([top[0] for top in tops])[np.argsort([-top[2] for top in tops], kind="stable")]
-        spins = spins[distinct(spins, NEAR, 3)]
+                part, others = segmented(events.t_s, events.normals, events.layers, segment_s, n, n)
+                hill = everything._replace(part=part, others=others)
+            tops[k], _, values[k], _ = climb(hill, spin, NO_OFFSETS, 4 if last else 2)
+        spins = tops[np.argsort(-values, kind="stable")]
+        spins = spins[distinct(spins, NEAR, 3, 0)]
         if last:
             return spins
         turns *= FOLLOW_RATIO
-        hill.part = everything
+        hill = everything
 
 
 def scanned(events: LogoEvents, spins_rad_s: Floats, settings: Settings) -> Floats:
@@ -63,8 +65,8 @@ def scanned(events: LogoEvents, spins_rad_s: Floats, settings: Settings) -> Floa
     A logo that shows in short visits fixes the spin within a visit only roughly, and between visits only up to whole
     turns. So magnitudes are looked for along each given axis, and all axes at each of these magnitudes.
     """
-    sigma = 2.0 * settings.sigma
-    part = hill_of(events.thinned(settings.scan_most), settings, sigma).part
+    sigma, some = 2.0 * settings.sigma, events.thinned(settings.scan_most)
+    part = hill_of(some, settings, sigma).part
     magnitudes: list[float] = []
     for spin in spins_rad_s[:2]:
         factors, values = comb(part, spin, sigma, settings.floor)
@@ -77,11 +79,13 @@ def scanned(events: LogoEvents, spins_rad_s: Floats, settings: Settings) -> Floa
     order = np.argsort(-scored(candidates, part, sigma, settings.floor), kind="stable")
     candidates = candidates[order][distinct(candidates[order], 0.1, 6, 2)]
     candidates = np.concatenate([spins_rad_s, candidates])
-    candidates = candidates[distinct(candidates, SAME, len(candidates))]
-    hill = hill_of(events.thinned(settings.scan_most), settings, 1.5 * settings.sigma)
-    tops = [climb(hill, spin, NO_OFFSETS, 3) for spin in candidates]
-    spins = np.array([top[0] for top in tops])[np.argsort([-top[2] for top in tops], kind="stable")]
-    return spins[distinct(spins, SAME, 6, 2)]
+    candidates = candidates[distinct(candidates, SAME, len(candidates), 0)]
+    hill = hill_of(some, settings, 1.5 * settings.sigma)
+    tops, values, _ = climb_all(hill, candidates, 3)
+    order = np.argsort(-values, kind="stable")
+    spins = tops[order[values[order] >= RIVAL * values.max()]]
+    rivals: Floats = spins[distinct(spins, SAME, 6, 2)]
+    return rivals
 
 
 def ranked(events: LogoEvents, spins_rad_s: Floats, settings: Settings) -> tuple[Floats, Floats]:
@@ -89,18 +93,13 @@ def ranked(events: LogoEvents, spins_rad_s: Floats, settings: Settings) -> tuple
 
     The margin is in standard deviations of the difference of the two scores, over the events that tell them apart.
     """
-    hill = hill_of(events.thinned(settings.search_most), settings, settings.sigma)
-    tops, shares = [], []
-    for spin in spins_rad_s:
-        top, _, _ = climb(hill, spin, NO_OFFSETS, 3)
-        hill.score(top, NO_OFFSETS)
-        tops.append(top)
-        shares.append(hill.ratios.copy())
-    order = np.argsort([-float(share.sum()) for share in shares], kind="stable")
-    order = order[distinct(np.array(tops)[order], SAME, 6, 2)]
-    gaps = np.array([shares[order[0]] - shares[row] for row in order])
+    hill = hill_of(events.thinned(settings.quick_most), settings, settings.sigma)
+    tops, values, shares = climb_all(hill, spins_rad_s, 3)
+    order = np.argsort(-values, kind="stable")
+    order = order[distinct(tops[order], SAME, 6, 2)]
+    gaps = shares[order[0]] - shares[order]
     margins = gaps.sum(axis=1) / np.sqrt(settings.repeats * np.sum(gaps**2, axis=1) + 1e-12)
-    return np.array(tops)[order], margins
+    return tops[order], margins
 
 
 def comb(part: Window, spin_rad_s: Floats, sigma: float, floor: float) -> tuple[Floats, Floats]:

@@ -8,7 +8,6 @@ while the segments double, which is the usual doubling of the window without bet
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numba
@@ -58,20 +57,33 @@ def scored(spins_rad_s: Floats, part: Window, sigma: float, floor: float) -> Flo
     return out
 
 
-def distinct(spins: Floats, apart: float, most: int, crowd: int = 0) -> Integers:
+@numba.njit(cache=True, nogil=True)
+def distinct(spins: Floats, apart: float, most: int, crowd: int) -> Integers:
     """Rows of at most `most` spins, in order, each farther than `apart` (relative to the faster) from those before.
 
     crowd : if not 0, of spins within NEAR of each other no more than so many, or one broad top takes every place
     """
-    rows: list[int] = []
-    size = np.linalg.norm(spins, axis=1)
+    rows, count = np.empty(spins.shape[0], np.int64), 0
+    squares = spins[:, 0] ** 2 + spins[:, 1] ** 2 + spins[:, 2] ** 2
     for row in range(spins.shape[0]):
-        gap = np.linalg.norm(spins[rows] - spins[row], axis=1) / np.maximum(size[rows], size[row])
-        if np.all(gap > apart) and (not crowd or np.count_nonzero(gap < NEAR) < crowd):
-            rows.append(row)
-            if len(rows) == most:
+        near, alone = 0, True
+        for k in range(count):
+            other = rows[k]
+            gap2 = (
+                (spins[row, 0] - spins[other, 0]) ** 2
+                + (spins[row, 1] - spins[other, 1]) ** 2
+                + (spins[row, 2] - spins[other, 2]) ** 2
+            ) / max(squares[row], squares[other])
+            near += gap2 < NEAR * NEAR
+            if gap2 <= apart * apart:
+                alone = False
                 break
-    return np.array(rows, np.int64)
+        if alone and (crowd == 0 or near < crowd):
+            rows[count] = row
+            count += 1
+            if count == most:
+                break
+    return rows[:count].copy()
 
 
 @numba.njit(cache=True, nogil=True)
@@ -130,29 +142,38 @@ def narrowed(
 ) -> Floats:
     """At most `keep` distinct spins (k, 3), best first, from the best cells of `search` by halving them."""
     span_s = float(t_s[-1] - t_s[0])
-    corners = np.array(list(itertools.product((-0.25, 0.25), repeat=3)))
     spins, turns, sigma = spins_rad_s[:KEPT], SEARCH_TURNS, SEARCH_SIGMA
     ratio, spacing = math.log(MAGNITUDE_RATIO), DIRECTION_SPACING
     for _ in range(HALVINGS):
         turns, sigma = 2.0 * turns, SHRINK * sigma
-        spins = np.concatenate([_children(spin, corners, ratio, spacing) for spin in spins])
+        spins = _halved(spins, ratio, spacing)
         values = _over_turns(t_s, normals, layers, spins, turns, sigma, floor, most, EACH_SEGMENT)
         spins = spins[np.argsort(-values, kind="stable")]
         ratio, spacing = 0.5 * ratio, 0.5 * spacing
         spins = spins[distinct(spins, 0.6 * spacing, KEPT, CROWD)]
         if turns * TURN > span_s * np.linalg.norm(spins, axis=1).max():
             break
-    return spins[distinct(spins, NEAR, keep)]
+    return spins[distinct(spins, NEAR, keep, 0)]
 
 
-def _children(spin: Floats, corners: Floats, ratio: float, spacing: float) -> Floats:
-    axes = axes_of(spin)
-    directions = axes[0] + spacing * (corners[:, 1:2] * axes[1] + corners[:, 2:3] * axes[2])
-    directions /= np.linalg.norm(directions, axis=1)[:, None]
-    children: Floats = directions * (np.linalg.norm(spin) * np.exp(corners[:, 0] * ratio))[:, None]
-    return children
+@numba.njit(cache=True, nogil=True)
+def _halved(spins: Floats, ratio: float, spacing: float) -> Floats:
+    """(8 m, 3) the middles of the eighths of the cells around spins (m, 3), whose log magnitudes are ratio wide."""
+    parts, at = np.empty((8 * spins.shape[0], 3)), 0
+    for k in range(spins.shape[0]):
+        axes = axes_of(spins[k])
+        magnitude = math.sqrt(spins[k, 0] ** 2 + spins[k, 1] ** 2 + spins[k, 2] ** 2)
+        for larger in (-0.25, 0.25):
+            for right in (-0.25, 0.25):
+                for up in (-0.25, 0.25):
+                    direction = axes[0] + spacing * (right * axes[1] + up * axes[2])
+                    length = math.sqrt(direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2)
+                    parts[at] = direction * (magnitude * math.exp(larger * ratio) / length)
+                    at += 1
+    return parts
 
 
+@numba.njit(cache=True, nogil=True)
 def _over_turns(
     t_s: Floats,
     normals: Floats,
@@ -165,12 +186,36 @@ def _over_turns(
     most_each: int,
 ) -> Floats:
     """(m,) scores over segments of so many turns of each spin, as if no events had been left out."""
-    speed = np.round(np.log(np.linalg.norm(spins_rad_s, axis=1)) / SHARED)
-    values = np.full(speed.size, -np.inf)
-    for one in np.unique(speed):
-        segment_s = turns * TURN / math.exp(one * SHARED)
-        part = segmented(t_s, normals, layers, segment_s=segment_s, most=most, most_each=most_each)
-        if part.t_s.size:
-            mine = speed == one
-            values[mine] = scored(spins_rad_s[mine], part, sigma, floor) * (t_s.size / part.t_s.size)
+    count = spins_rad_s.shape[0]
+    values, done = np.full(count, -np.inf), np.zeros(count, np.bool_)
+    speed = np.empty(count, np.int64)
+    for k in range(count):
+        squares = spins_rad_s[k, 0] ** 2 + spins_rad_s[k, 1] ** 2 + spins_rad_s[k, 2] ** 2
+        speed[k] = math.floor(0.5 * math.log(squares) / SHARED + 0.5)
+    for first in range(count):
+        if done[first]:
+            continue
+        segment_s = turns * TURN / math.exp(speed[first] * SHARED)
+        part, _ = segmented(t_s, normals, layers, segment_s, most, most_each)
+        ratios = np.empty(part.t_s.size)
+        for k in range(first, count):
+            if speed[k] != speed[first]:
+                continue
+            done[k] = True
+            if part.t_s.size:
+                one = score(
+                    ratios,
+                    spins_rad_s[k],
+                    part.t_s,
+                    part.normals,
+                    part.layers,
+                    part.starts,
+                    part.other_t_s,
+                    part.other_normals,
+                    part.other_layers,
+                    part.other_starts,
+                    sigma * CELLS_PER_SIGMA,
+                    floor,
+                )
+                values[k] = one * (t_s.size / part.t_s.size)
     return values

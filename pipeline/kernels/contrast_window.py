@@ -54,40 +54,69 @@ def exchanged(t_s: Floats, starts: Integers, times_each: int) -> tuple[Floats, I
     return other_t_s, rows, other_starts
 
 
+@numba.njit(cache=True, nogil=True)
 def segment_starts(t_s: Floats, segment_s: float) -> Integers:
     """(k + 1,) int64, rows at which the segments that hold events start, and the number of events."""
-    number = np.floor((t_s - t_s[:1]) / segment_s)
-    starts = np.flatnonzero(np.diff(number, prepend=-1.0))
-    return np.append(starts, t_s.size).astype(np.int64)
+    starts = np.empty(t_s.size + 1, np.int64)
+    count, number = 0, -1
+    for i in range(t_s.size):
+        at = int((t_s[i] - t_s[0]) / segment_s)
+        if at != number:
+            starts[count] = i
+            count, number = count + 1, at
+    starts[count] = t_s.size
+    return starts[: count + 1]
 
 
+@numba.njit(cache=True, nogil=True)
 def whole(t_s: Floats, normals: Floats, layers: Integers, times_each: int) -> tuple[Window, Integers]:
     """All events (normals (3, n)) as one segment, and the rows of its exchanged events."""
     starts = np.array([0, t_s.size], np.int64)
     return _window(t_s, normals, layers, starts, times_each)
 
 
-def segmented(t_s: Floats, normals: Floats, layers: Integers, *, segment_s: float, most: int, most_each: int) -> Window:
+@numba.njit(cache=True, nogil=True)
+def segmented(
+    t_s: Floats, normals: Floats, layers: Integers, segment_s: float, most: int, most_each: int
+) -> tuple[Window, Integers]:
     """The events (normals (3, n)) in segments no longer than segment_s, thinned evenly.
 
     Events within a segment are thinned to about `most_each` on average, then whole segments are left out, evenly,
     until about `most` events are left: thinning alone would leave no pairs.
     """
-    starts = segment_starts(t_s, segment_s)
-    stride = max(1, round(t_s.size / max(starts.size - 1, 1) / most_each))
-    rows = np.arange(0, t_s.size, stride)
-    segment = np.searchsorted(starts, rows, side="right")
-    if rows.size > most:
-        keep = segment % -(-rows.size // most) == 0
-        rows, segment = rows[keep], segment[keep]
-    starts = np.append(np.flatnonzero(np.diff(segment, prepend=-1)), rows.size).astype(np.int64)
-    return _window(t_s[rows], np.ascontiguousarray(normals[:, rows]), layers[rows], starts, 1)[0]
+    bounds = segment_starts(t_s, segment_s)
+    segments = bounds.size - 1
+    stride = max(1, int(t_s.size / max(segments, 1) / most_each + 0.5))
+    left = (t_s.size + stride - 1) // stride
+    every = max(1, -(-left // most))
+    rows, starts = np.empty(left, np.int64), np.empty(segments + 1, np.int64)
+    kept, count = 0, 0
+    for k in range(0, segments, every):
+        starts[count] = kept
+        for i in range(-(-bounds[k] // stride) * stride, bounds[k + 1], stride):
+            rows[kept] = i
+            kept += 1
+        if kept > starts[count]:
+            count += 1
+    starts[count] = kept
+    rows = rows[:kept]
+    return _window(t_s[rows], _columns(normals, rows), layers[rows], starts[: count + 1], 1)
 
 
+@numba.njit(cache=True, nogil=True)
+def _columns(table: Floats, rows: Integers) -> Floats:
+    """Columns of a (3, n) table."""
+    picked = np.empty((3, rows.size))
+    for row in range(3):
+        for i in range(rows.size):
+            picked[row, i] = table[row, rows[i]]
+    return picked
+
+
+@numba.njit(cache=True, nogil=True)
 def _window(
     t_s: Floats, normals: Floats, layers: Integers, starts: Integers, times_each: int
 ) -> tuple[Window, Integers]:
     other_t_s, rows, other_starts = exchanged(t_s, starts, times_each)
-    other_normals = np.ascontiguousarray(normals[:, rows])
-    part = Window(t_s, normals, layers, starts, other_t_s, other_normals, layers[rows], other_starts)
+    part = Window(t_s, normals, layers, starts, other_t_s, _columns(normals, rows), layers[rows], other_starts)
     return part, rows

@@ -106,7 +106,7 @@ def flight(
     balls = [Ball((shot,), logo=_logo(logo))]
     if second_ball:
         away = heading + float(random.choice([-1, 1]) * random.uniform(60.0, 120.0))
-        other, its_middle_s, _ = draw.shot("mixed", 20.0, None, float(random.uniform(2.0, 5.0)), away, None, False)
+        other, its_middle_s = _second(draw, float(random.uniform(2.0, 5.0)), away)
         # It comes through the middle a quarter of the flight before or after the first, so that they do not
         # collide.
         start = middle_s + float(random.choice([-0.25, 0.25])) * shot.end_s - its_middle_s
@@ -121,6 +121,18 @@ def flight(
         up=triple(np.array(camera.up)),
         description=f"flight, {kind if spin_rps is None else 'given spin'}",
     )
+
+
+def _second(draw: Shots, speed_m_s: float, heading_deg: float) -> tuple[Flight, float]:
+    """A second ball's flight and the time of its middle; one so slow that it would fall before it has crossed the
+    image is taken faster."""
+    while True:
+        try:
+            return draw.shot("mixed", 20.0, None, speed_m_s, heading_deg, None, False)[:2]
+        except ParameterError:
+            if speed_m_s > 10.0:
+                raise
+            speed_m_s *= 1.25
 
 
 def rally(

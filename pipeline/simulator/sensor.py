@@ -7,12 +7,14 @@ dead time during which the reference follows the signal, a slower OFF after ON, 
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..biases import PAPER, BiasParameters, physical
+from ..biases import CURVES, PAPER, BiasParameters, Curve, physical
 from ..errors import ParameterError
 from ..events import EventBatch
 
@@ -55,6 +57,7 @@ class Sensor:
     cutoff_hz : of the low-pass in bright light; dark_tau_us : time constant added at intensity 1, growing as
         1 / intensity
     highpass_hz : rate at which the reference forgets; refractory_us : dead time after an event
+    reset_settling : time constants of the low-pass for which a reset lasts at least, see `dead_us`
     off_after_on_us : an OFF event waits until this long after an ON event of its pixel (the paper's
         limitation)
     contrast_noise : sigma of the temporal noise in log intensity at intensity 1; grows as intensity ** -0.5
@@ -73,6 +76,7 @@ class Sensor:
     dark_tau_us: float = 5.0
     highpass_hz: float = 0.0
     refractory_us: float = 150.0
+    reset_settling: float = 2.5
     off_after_on_us: float = 350.0
     contrast_noise: float = 0.015
     delay_us: float = 20.0
@@ -98,10 +102,26 @@ class Sensor:
         if not (self.noise_on_share <= 1 and self.hot_share <= 1 and self.mismatch <= 0.3):
             raise ParameterError("sensor noise_on_share and hot_share are at most 1, mismatch at most 0.3")
 
+    @property
+    def tau_us(self) -> float:
+        """Time constant of the low-pass in bright light."""
+        return 1e6 / (2 * math.pi * self.cutoff_hz)
+
+    @property
+    def dead_us(self) -> float:
+        """Time after an event during which the reference follows the signal.
+
+        After a reset the follower that makes the low-pass charges the capacitor of the difference again
+        (Lichtsteiner 2008), so a pixel slower than its refractory period is free only when that has settled. Without
+        it a slow pixel would hand out an edge piece by piece, each in a dead time of its own, and give more events
+        than a fast one; the supplement sees fewer below bias_fo 0, and no difference above.
+        """
+        return max(self.refractory_us, self.reset_settling * self.tau_us)
+
     @classmethod
-    def of(cls, biases: BiasParameters = PAPER) -> Sensor:
-        """The sensor at these biases (`pipeline.biases.CURVES`)."""
-        pixel = physical(biases)
+    def of(cls, biases: BiasParameters = PAPER, curves: Mapping[str, Curve] = CURVES) -> Sensor:
+        """The sensor at these biases; `curves` may hold one's own measurements."""
+        pixel = physical(biases, curves)
         base = cls()
         noise = 0.5 * (pixel.noise_on + pixel.noise_off)
         return cls(
@@ -125,6 +145,7 @@ class Sensor:
             cutoff_hz=1e7,
             dark_tau_us=0.0,
             refractory_us=0.0,
+            reset_settling=0.0,
             off_after_on_us=0.0,
             contrast_noise=0.0,
             delay_us=0.0,
@@ -182,7 +203,7 @@ def noise(
     time = random.integers(0, duration_us, count)
 
     hot, rate = hot_rates_hz(sensor, pixels, pattern)
-    dead_s = max(sensor.refractory_us, 1.0) * 1e-6
+    dead_s = max(sensor.dead_us, 1.0) * 1e-6
     counts = random.poisson(rate / (1 + rate * dead_s) * duration_us * 1e-6)
     where_hot = np.repeat(hot, counts)
     time_hot = random.integers(0, duration_us, where_hot.size)

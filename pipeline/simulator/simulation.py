@@ -31,7 +31,7 @@ TRUTH_STEP_US = 500
 DARK_FLOOR = 1e-3  # dark current as an intensity: lets the logarithm live without light
 NORMALS = 1 << 16
 REFERENCE_LUX = 1930.0  # the paper's setup, section 4.1
-VERSION = 1  # of the model: raised whenever the same scene and seed give other events
+VERSION = 2  # of the model: raised whenever the same scene and seed give other events
 
 Progress = Callable[[float], None]
 
@@ -170,10 +170,10 @@ class _Simulation:
         )
         light = scene.light
         self.physics = kernels_light.Physics(
-            tau_us=1e6 / (2 * math.pi * sensor.cutoff_hz),
+            tau_us=sensor.tau_us,
             dark_tau_us=sensor.dark_tau_us,
             forget_per_us=2 * math.pi * sensor.highpass_hz * 1e-6,
-            refractory_us=sensor.refractory_us,
+            refractory_us=sensor.dead_us,
             off_after_on_us=sensor.off_after_on_us,
             contrast_noise=sensor.contrast_noise,
             up_x=float(scene.up[0]),

@@ -35,7 +35,12 @@ Floats = NDArray[np.float64]
 STAGES_US = (5000, 10_000, 20_000, 50_000)
 LATER = 1.5
 # After a refusal it is worth trying again with so many more events.
-MORE = 1.25
+MORE = 1.5
+# A search over all spins is repeated with so many times the events of the last one.
+SEARCH_MORE = 2.0
+# An answer over so many turns that beats its rivals so many times as clearly as asked for is not scanned for others
+# again: the logo has come back to where the spin brings it.
+SETTLED_TURNS, SETTLED = 2.0, 3.0
 # ON and OFF, bright and dark pixels report 25 us sooner or later than the mean latency: what the ball flies meanwhile
 # is an error of its place that the tracker, which sees the outline, does not know of.
 LATENCY_SPREAD_S = 25e-6
@@ -54,9 +59,9 @@ class ContrastParameters(ParameterGroup):
     weakest: float = tunable(
         0.25, 0.0, 5.0, 0.05, "", "contrast an event must gain over exchanged times (natural log), on average"
     )
-    rival_sigmas: float = tunable(2.0, 0.0, 20.0, 0.1, "sigma", "lead that the best spin must have over any other")
+    rival_sigmas: float = tunable(1.6, 0.0, 20.0, 0.1, "sigma", "lead that the best spin must have over any other")
     smallest_patch_rad: float = tunable(
-        0.2, 0.0, 1.5, 0.01, "rad", "spread of the logo's events over the ball (rms) below which it is not seen"
+        0.18, 0.0, 1.5, 0.01, "rad", "spread of the logo's events over the ball (rms) below which it is not seen"
     )
     axis_std_deg: float = tunable(12.0, 0.1, 180.0, 0.5, "deg", "largest stated error of the axis (1 sigma)")
     magnitude_std_rps: float = tunable(
@@ -108,7 +113,7 @@ class State:
     """The present shot's logo events, tick by tick, and the last answers.
 
     full_us : age of the shot, us, at which the next full estimate is due
-    tried : number of events at the last full estimate
+    tried, searched : number of events at the last full estimate and at the last search over all spins
     """
 
     setting: Setting
@@ -118,6 +123,7 @@ class State:
     places: list[tuple[float, float, float, float]] = field(default_factory=list)
     full_us: float = STAGES_US[0]
     tried: int = 0
+    searched: int = 0
     answer: Answer | None = None
     reason: str | None = None
     picture: Picture = field(default_factory=Picture.empty)
@@ -230,10 +236,24 @@ def _estimate(
         starts.append(normal_flow)
     answer = None
     if starts:
-        answer = estimate_spin(events, _place(state), settings, starts_rps=np.array(starts), searching=False)
-    if answer is None or _doubt(parameters, answer) is not None:
+        scanning = not _settled(parameters, state)
+        answer = estimate_spin(
+            events, _place(state), settings, starts_rps=np.array(starts), searching=False, scanning=scanning
+        )
+    worth_it = len(events) >= SEARCH_MORE * state.searched
+    if answer is None or (worth_it and _doubt(parameters, answer) is not None):
+        state.searched = len(events)
         answer = estimate_spin(events, _place(state), settings, starts_rps=np.array(starts) if starts else None)
     state.answer, state.reason = answer, _doubt(parameters, answer)
+
+
+def _settled(parameters: ContrastParameters, state: State) -> bool:
+    """Whether the last answer has no rival worth looking for."""
+    answer = state.answer
+    if answer is None or answer.spin_rps is None or state.reason is not None:
+        return False
+    clear = not answer.margins.size or float(answer.margins.min()) >= SETTLED * parameters.rival_sigmas
+    return clear and answer.span_s * float(np.linalg.norm(answer.spin_rps)) >= SETTLED_TURNS
 
 
 def _doubt(parameters: ContrastParameters, answer: Answer) -> str | None:

@@ -34,14 +34,9 @@ class SpinParameters(ParameterGroup):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpinResult:
-    """The estimates from the present shot so far.
-
-    estimates : one SpinEstimate a method, by name
-    best : the method whose answer is trusted, None where none is
-    """
+    """The estimates of these methods from the present shot so far, by name."""
 
     estimates: dict[str, SpinEstimate]
-    best: str | None
 
 
 @dataclass(slots=True)
@@ -52,12 +47,6 @@ class State:
     shot: int | None = None
     triplet: TripletSpin | None = None
     normal_flow: NormalFlowSpin | None = None
-
-
-# The program trusts an answer whose axis it knows to 7 degrees (1 sigma) and whose magnitude to 3 rps or a tenth: as
-# good as the best of the paper's table at 100 ms. On simulated shots the error beyond which one answer in ten lies is
-# 1.4 of these sigmas.
-TRUSTED_AXIS_DEG, TRUSTED_RPS, TRUSTED_SHARE = 7.0, 3.0, 0.1
 
 
 def start(parameters: SpinParameters, setting: Setting) -> State:
@@ -74,24 +63,18 @@ def step(
     rate: RateResult,
     flow: FlowResult,
 ) -> SpinResult:
-    """Every method's estimate from the present shot up to the end of this tick."""
+    """Both methods' estimates from the present shot up to the end of this tick."""
     if not track.has_ball:
         state.shot, state.triplet, state.normal_flow = None, None, None
         reason = track.reason or "no ball"
-        return SpinResult({method: SpinEstimate.refused(method, reason) for method in METHODS}, None)
+        return SpinResult({method: SpinEstimate.refused(method, reason) for method in METHODS})
     if state.triplet is None or state.normal_flow is None or state.shot != track.shot:
         state.shot = track.shot
         state.triplet = TripletSpin(parameters, state.setting)
         state.normal_flow = NormalFlowSpin(parameters, state.setting)
-    estimates = {
-        "triplet": state.triplet.estimate(packet.end_us, flow, rate),
-        "normal_flow": state.normal_flow.estimate(packet.end_us, logo, flow, rate),
-    }
-    return SpinResult(estimates, "normal_flow" if _trusted(estimates["normal_flow"]) else None)
-
-
-def _trusted(estimate: SpinEstimate) -> bool:
-    magnitude, std, axis_std = estimate.magnitude_rps, estimate.magnitude_std_rps, estimate.axis_std_deg
-    if magnitude is None or std is None or axis_std is None:
-        return False
-    return axis_std <= TRUSTED_AXIS_DEG and std <= max(TRUSTED_RPS, TRUSTED_SHARE * magnitude)
+    return SpinResult(
+        {
+            "triplet": state.triplet.estimate(packet.end_us, flow, rate),
+            "normal_flow": state.normal_flow.estimate(packet.end_us, logo, flow, rate),
+        }
+    )

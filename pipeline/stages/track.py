@@ -23,7 +23,7 @@ from ..results import Circle, Packet, frozen
 from .filter import FilterResult
 from .surface import SurfaceResult
 from .track_hough import hough_near
-from .track_kalman import OBSERVED, BallFilter, kalman_class
+from .track_kalman import OBSERVED, OBSERVED_BLOCK, BallFilter, load_filter
 from .track_outline import VOTE_US, Edge, Limits, Sighting, measure
 from .track_search import MOST_CANDIDATES, Rivals, agree, look
 
@@ -101,6 +101,7 @@ LEAST_AHEAD = 0.3
 MOST_SURPRISE = 25.0
 # Scatter of an outline's centre and radius from tick to tick beyond the statistical one, on the samples.
 OUTLINE_STD_PX = 0.05
+OUTLINE_COVARIANCE = OUTLINE_STD_PX**2 * np.eye(3)
 # What no filtering takes away: the calibration of latency, place and radius, which differs from shot to shot.
 LATENCY_STD_US = 12.0
 PLACE_STD_PX, RADIUS_STD_PX = 0.06, 0.1
@@ -145,7 +146,7 @@ def start(parameters: TrackParameters, setting: Setting) -> TrackState:
         parameters.speed_max_m_s * per_m,
     )
     if parameters.ball == "flying":
-        kalman_class()  # loaded now and not in the middle of a shot
+        load_filter()  # loaded now and not in the middle of a shot
     return TrackState(setting, limits)
 
 
@@ -256,7 +257,7 @@ def _update(
     observed = _edge(parameters).ball(sighting.ring)[OBSERVED]
     # Outlines taken further back than one tick share events with the tick before and so count for less.
     shared = max(1.0, parameters.contour_us / (packet.end_us - packet.start_us))
-    noise = sighting.covariance[OBSERVED[:, None], OBSERVED] + OUTLINE_STD_PX**2 * np.eye(3)
+    noise = sighting.covariance[OBSERVED_BLOCK] + OUTLINE_COVARIANCE
     if not ball.update(observed, noise * shared, MOST_SURPRISE):
         return None
     state.seen_us = packet.end_us
@@ -294,10 +295,9 @@ def _end(parameters: TrackParameters, state: TrackState, packet: Packet, reason:
 
 def _honest(ball: BallFilter) -> NDArray[np.float64]:
     """The filter's covariance plus the errors that every tick has in common."""
-    covariance = ball.covariance
     late = ball.mean[2:4] * LATENCY_STD_US * 1e-6
+    covariance = ball.covariance + COMMON_COVARIANCE
     covariance[:2, :2] += late[:, None] * late
-    covariance += COMMON_COVARIANCE
     return covariance
 
 

@@ -45,9 +45,10 @@ def hough_near(
     x1, y1 = min(width, round(x_px) + margin + 1), min(height, round(y_px) + margin + 1)
     if x0 >= x1 or y0 >= y1:
         return None
-    xs, ys = kernels.bright_pixels(surface.cleaned(x0, y0, x1, y1), EDGE_LEVEL, MOST_PIXELS)
-    left, top, side = round(x_px) - reach_px, round(y_px) - reach_px, 2 * reach_px + 1
-    return _circle(kernels.best_circle(xs + x0, ys + y0, left, top, side, side, first_radius, radii))
+    window = surface.cleaned(x0, y0, x1, y1)
+    corner = round(x_px) - reach_px, round(y_px) - reach_px
+    limits = first_radius, radii
+    return _circle(kernels.best_in_window(window, x0, y0, EDGE_LEVEL, MOST_PIXELS, *corner, 2 * reach_px + 1, *limits))
 
 
 def candidates(

@@ -7,49 +7,44 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.contour import inverse_of
+
 Floats = NDArray[np.float64]
 OBSERVED = np.array([0, 1, 4])
+OBSERVED_BLOCK = np.ix_(OBSERVED, OBSERVED)
+OBSERVATION = np.eye(5)[OBSERVED]
 
 
-def kalman_class() -> Any:
-    """filterpy's KalmanFilter; the first call loads scipy.stats with it, which takes two seconds."""
-    from filterpy.kalman import KalmanFilter
+def load_filter() -> Any:
+    """filterpy's Kalman equations; the first call loads scipy.stats with them, which takes two seconds."""
+    from filterpy import kalman
 
-    return KalmanFilter
+    return kalman
 
 
 class BallFilter:
-    """filterpy's Kalman filter with the paper's F and H, and process noise from what moves a ball.
+    """filterpy's Kalman equations with the paper's F and H, and process noise from what moves a ball.
 
     acceleration_px_s2 : 1 sigma of the ball's acceleration, constant over one step
     growth_px_s : 1 sigma of the rate at which the radius changes, constant over one step
+    mean, covariance : (5,) and (5, 5) float64, never written into
     """
 
     def __init__(self, mean: Floats, covariance: Floats, acceleration_px_s2: float, growth_px_s: float) -> None:
-        kalman = kalman_class()(dim_x=5, dim_z=3)
-        kalman.x = np.array(mean, np.float64)
-        kalman.P = np.array(covariance, np.float64)
-        kalman.H = np.eye(5)[OBSERVED]
-        self._kalman = kalman
+        self.mean: Floats = np.array(mean, np.float64)
+        self.covariance: Floats = np.array(covariance, np.float64)
         self._acceleration_px_s2 = acceleration_px_s2
         self._growth_px_s = growth_px_s
         self._dt_s = 0.0
-
-    @property
-    def mean(self) -> Floats:
-        """(5,) float64, a copy."""
-        return np.array(self._kalman.x, np.float64)
-
-    @property
-    def covariance(self) -> Floats:
-        """(5, 5) float64, a copy."""
-        return np.array(self._kalman.P, np.float64)
+        self._transition, self._push_covariance = np.eye(5), np.zeros((5, 5))
 
     def predict(self, dt_s: float) -> None:
         """Advance by dt_s."""
         if dt_s != self._dt_s:
             self._set_step(dt_s)
-        self._kalman.predict()
+        self.mean, self.covariance = load_filter().predict(
+            self.mean, self.covariance, self._transition, self._push_covariance
+        )
 
     def _set_step(self, dt_s: float) -> None:
         transition = np.eye(5)
@@ -58,8 +53,7 @@ class BallFilter:
         push[0, 0] = push[1, 1] = self._acceleration_px_s2 * dt_s**2 / 2
         push[2, 0] = push[3, 1] = self._acceleration_px_s2 * dt_s
         push[4, 2] = self._growth_px_s * dt_s
-        self._kalman.F = transition
-        self._kalman.Q = push @ push.T
+        self._transition, self._push_covariance = transition, push @ push.T
         self._dt_s = dt_s
 
     def update(self, observed: Floats, noise: Floats, most_surprise: float) -> bool:
@@ -68,10 +62,8 @@ class BallFilter:
         Returns False, and leaves the state as predicted, when its squared Mahalanobis distance from the
         prediction exceeds most_surprise.
         """
-        kalman = self._kalman
-        mean, covariance = kalman.x, kalman.P
-        kalman.update(observed, R=noise)
-        if kalman.y @ kalman.SI @ kalman.y <= most_surprise:
-            return True
-        kalman.x, kalman.P = mean, covariance
-        return False
+        off = observed - self.mean[OBSERVED]
+        if off @ inverse_of(self.covariance[OBSERVED_BLOCK] + noise) @ off > most_surprise:
+            return False
+        self.mean, self.covariance = load_filter().update(self.mean, self.covariance, observed, noise, OBSERVATION)
+        return True

@@ -54,12 +54,10 @@ class Edge:
         return self._shifted(ring, -1.0)
 
     def _shifted(self, ring: Floats, sign: float) -> Floats:
-        shifted = ring.copy()
-        shifted[4] += sign * self.outline_px
-        speed = math.hypot(ring[2], ring[3])
-        if speed > 0:
-            shifted[:2] -= sign * self.lag_px / speed * ring[2:4]
-        return shifted
+        x, y, vx, vy, radius = ring.tolist()
+        speed = math.hypot(vx, vy)
+        lag_s = sign * self.lag_px / speed if speed > 0 else 0.0
+        return np.array([x - lag_s * vx, y - lag_s * vy, vx, vy, radius + sign * self.outline_px])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -60,8 +60,11 @@ def test_json_csv_and_page(evaluation: Evaluation, tmp_path: Path) -> None:
     write_csv(evaluation, tmp_path / "rows.csv")
     rows = list(csv.DictReader((tmp_path / "rows.csv").read_text().splitlines()))
     assert [row["error_px"] for row in rows] == ["0.0", "0.5", "1.0", "1.5"] and "picture" not in rows[0]
-    write_page([evaluation], tmp_path / "page.md")
-    assert "| all | 0.75 ± 0.65 (0.75) |" in (tmp_path / "page.md").read_text()
+    pictures = [tmp_path / "figures" / name for name in ("made_up_errors.png", "made_up.csv", "other_errors.png")]
+    write_page([evaluation], tmp_path / "page.md", pictures)
+    page = (tmp_path / "page.md").read_text()
+    assert "| all | 0.75 ± 0.65 (0.75) |" in page and evaluation.machine in page and evaluation.date in page
+    assert page.count("](figures/made_up_errors.png)") == page.count("![") == 1
 
 
 def test_quick_is_said(evaluation: Evaluation, tmp_path: Path) -> None:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +30,17 @@ def test_same_seed_and_options_same_events(tmp_path: Path) -> None:
     simulate_to_file("flight", other, spin="mixed", **(SMALL | {"seed": 6}))
     assert one.read_bytes() == two.read_bytes()
     assert open_recording(one).read().t_us.tobytes() != open_recording(other).read().t_us.tobytes()
+
+
+def test_a_larger_ball_is_larger_in_the_image(tmp_path: Path) -> None:
+    radius_px = []
+    for radius_mm in (20.0, 22.0):
+        out = tmp_path / f"{radius_mm}.h5"
+        simulate_to_file("spinner", out, radius_mm=radius_mm, duration_ms=5.0, **SMALL)
+        truth = open_recording(out).truth
+        assert truth is not None
+        radius_px.append(truth.radius_px[0])
+    assert radius_px[1] == pytest.approx(1.1 * radius_px[0], rel=1e-3)
 
 
 def test_spinner_has_the_spin_asked_for(tmp_path: Path) -> None:
@@ -100,6 +114,7 @@ def test_rally_has_its_shots(tmp_path: Path) -> None:
         ("flight", {"logo": "nobody"}, "logo 'nobody' is unknown"),
         ("flight", {"logo": "missing.png"}, "logo cannot be read"),
         ("flight", {"speed_m_s": -3.0}, "speed_m_s = -3 is out of range: 0.5 to 50 m/s"),
+        ("flight", {"radius_mm": -20.0}, "radius_mm = -20 is out of range: 1 to 500 mm"),
         ("flight", {"magnitude_rps": -1.0}, "magnitude_rps = -1 is out of range"),
         ("flight", {"spin_rps": (0.0, 0.0, 4000.0)}, "the simulator's time step allows 1000 rps"),
         ("flight", {"spin_rps": (0.0, float("nan"), 0.0)}, "out of range"),
@@ -126,6 +141,27 @@ def test_places_that_cannot_be_written(tmp_path: Path) -> None:
     for name in ("no/such/folder.h5", "folder.h5", "suffix.txt"):
         with pytest.raises(RecordingError, match="give another"):
             simulate_to_file("spinner", tmp_path / name, **SMALL)
+
+
+@contextmanager
+def little_room(size: int) -> Iterator[None]:
+    """As on a disk that is full after so many bytes of one file."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.mark.parametrize("suffix", [".h5", ".raw", ".npz"])
+def test_a_full_disk_gets_one_line_and_no_half_file(tmp_path: Path, suffix: str) -> None:
+    simulate_to_file("spinner", tmp_path / "room.h5", duration_ms=5.0, **SMALL)  # kernels and plugins are loaded
+    (tmp_path / "room.h5").unlink()
+    with little_room(4096), pytest.raises(RecordingError, match=r"cannot be written.*free space") as caught:
+        simulate_to_file("spinner", tmp_path / f"ball{suffix}", duration_ms=200.0, **SMALL)
+    assert "\n" not in str(caught.value)
+    assert not list(tmp_path.iterdir())
 
 
 def test_interruption_leaves_nothing(tmp_path: Path) -> None:

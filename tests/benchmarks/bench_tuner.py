@@ -11,7 +11,7 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -116,11 +116,12 @@ def _drive(page: Any, pid: int) -> None:
     for number in range(CHANGES):
         began = time.perf_counter()
         pad = round(2 + 0.01 * (number % 150), 2)
+        before = page.evaluate("window.spinscope.runner.serial")
         page.evaluate(f"window.spinscope.settings.set('logo.pad_px', {pad})")
-        serial = page.evaluate("window.spinscope.runner.serial")
-        page.wait_for_selector(f"body[data-done='{serial}']", state="attached")
+        serial = _until(page, lambda: page.evaluate("window.spinscope.runner.serial"), lambda now, b=before: now > b)
+        _until(page, lambda: page.get_attribute("body", "data-done"), lambda done, n=serial: done == str(n))
         server.append(1000 * (time.perf_counter() - began))
-        page.wait_for_selector(f"body[data-shown='{serial}']", state="attached")
+        _until(page, lambda: page.get_attribute("body", "data-shown"), lambda seen, n=serial: seen == str(n))
         shown.append(1000 * (time.perf_counter() - began))
         if number % 25 == 24:
             heap = page.evaluate("performance.memory?.usedJSHeapSize ?? 0") / 1e6
@@ -129,6 +130,16 @@ def _drive(page: Any, pid: int) -> None:
             )
     answer_ms, picture_ms = statistics.median(server), statistics.median(shown)
     print(f"change to answer {answer_ms:.0f} ms, change to picture {picture_ms:.0f} ms (medians)")
+
+
+def _until(page: Any, read: Callable[[], Any], holds: Callable[[Any], bool]) -> Any:
+    """Read every 5 ms until it holds; what was read."""
+    end = time.monotonic() + 180
+    while time.monotonic() < end:
+        if holds(found := read()):
+            return found
+        page.wait_for_timeout(5)
+    raise AssertionError("the page does not answer")
 
 
 def _status(pid: int, name: str) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -32,4 +33,5 @@ def test_a_sample_gives_its_golden_numbers(path: Path) -> None:
             if spin is None:
                 assert shot["spin_rps"][method] is None
             else:
-                assert shot["spin_rps"][method] == pytest.approx(spin, abs=0.5)
+                # Last bits that differ may end a search elsewhere near the top: by a degree or so.
+                assert shot["spin_rps"][method] == pytest.approx(spin, abs=max(0.5, 0.02 * math.hypot(*spin)))

@@ -22,6 +22,7 @@ INPUTS = {
     "rate": ("packet", "track", "logo"),
     "flow": ("packet", "track", "logo", "rate"),
     "spin": ("packet", "track", "logo", "rate", "flow"),
+    "contrast": ("packet", "track", "logo", "spin"),
 }
 
 
@@ -73,17 +74,18 @@ def test_an_unchanged_run_computes_nothing_again(calls: dict[str, int]) -> None:
     counted = dict(calls)
     again = list(chain.run(DEFAULT))
     assert calls == counted == dict.fromkeys(INPUTS, 20)
-    assert all(a.spin is b.spin for a, b in zip(first, again, strict=True))
+    assert all(a.contrast is b.contrast for a, b in zip(first, again, strict=True))
 
 
 @pytest.mark.parametrize(
     ("assignment", "rerun"),
     [
-        ("logo.pad_px=3", {"logo", "rate", "flow", "spin"}),
-        ("surface.k_px=5", {"surface", "track", "logo", "rate", "flow", "spin"}),
-        ("spin.triplet_solve=least_squares", {"spin"}),
-        ("spin.max_spin_rps=90", {"flow", "spin"}),
-        ("rate.bin_us=1000", {"rate", "flow", "spin"}),
+        ("logo.pad_px=3", {"logo", "rate", "flow", "spin", "contrast"}),
+        ("surface.k_px=5", {"surface", "track", "logo", "rate", "flow", "spin", "contrast"}),
+        ("spin.triplet_solve=least_squares", {"spin", "contrast"}),
+        ("spin.max_spin_rps=90", {"flow", "spin", "contrast"}),
+        ("rate.bin_us=1000", {"rate", "flow", "spin", "contrast"}),
+        ("contrast.kernel_rad=0.05", {"contrast"}),
         ("filter.mode=off", set(INPUTS)),
     ],
 )
@@ -107,7 +109,7 @@ def test_equal_values_share_a_column_however_they_were_made(calls: dict[str, int
 
 
 def test_an_abandoned_run_goes_on_where_it_stopped(calls: dict[str, int]) -> None:
-    whole = [tick.spin for tick in Chain(source()).run(DEFAULT)]
+    whole = [tick.contrast for tick in Chain(source()).run(DEFAULT)]
     calls.update(dict.fromkeys(calls, 0))
     chain = Chain(source())
     assert len(list(chain.run(DEFAULT, ticks=7))) == 7
@@ -115,28 +117,39 @@ def test_an_abandoned_run_goes_on_where_it_stopped(calls: dict[str, int]) -> Non
     for _ in range(9):
         next(run)
     run.close()
-    assert [tick.spin for tick in chain.run(DEFAULT)] == whole
+    assert [tick.contrast for tick in chain.run(DEFAULT)] == whole
     assert calls == dict.fromkeys(INPUTS, 20)
 
 
 def test_a_growing_source_gives_the_same_as_a_finished_one(calls: dict[str, int]) -> None:
     whole = source()
-    expected = [tick.spin for tick in Chain(whole).run(DEFAULT)]
+    expected = [tick.contrast for tick in Chain(whole).run(DEFAULT)]
     chain = Chain(dataclasses.replace(whole, growing=True, end_us=0))
     for end_us in range(0, whole.end_us, 3700):
         chain.source = dataclasses.replace(whole, growing=True, end_us=end_us)
         assert len(list(chain.run(DEFAULT))) == end_us // 5000
     chain.source = whole
-    assert [tick.spin for tick in chain.run(DEFAULT)] == expected
-    assert calls["spin"] == 40, "every tick once for the batch and once for the growing source"
+    assert [tick.contrast for tick in chain.run(DEFAULT)] == expected
+    assert calls["contrast"] == 40, "every tick once for the batch and once for the growing source"
 
 
 def test_forgotten_results_are_made_again_when_asked_for(calls: dict[str, int]) -> None:
     chain = Chain(source())
-    without = [tick.spin for tick in chain.run(DEFAULT, forget=("surface",))]
-    assert [tick.spin for tick in chain.run(DEFAULT)] == without
+    without = [tick.contrast for tick in chain.run(DEFAULT, forget=("surface",))]
+    assert [tick.contrast for tick in chain.run(DEFAULT)] == without
     assert calls["surface"] == 40
     assert calls["track"] == 20
+
+
+def test_a_stage_left_out_is_not_run_and_what_was_known_of_it_stays(calls: dict[str, int]) -> None:
+    chain = Chain(source())
+    whole = [tick.contrast for tick in Chain(source()).run(DEFAULT)]
+    calls.update(dict.fromkeys(calls, 0))
+    assert len(list(chain.run(DEFAULT, ticks=7))) == 7
+    assert all(tick.contrast is None for tick in chain.run(DEFAULT, without=("contrast",)))
+    assert calls == {**dict.fromkeys(INPUTS, 20), "contrast": 7}
+    assert [tick.contrast for tick in chain.run(DEFAULT)] == whole
+    assert calls == dict.fromkeys(INPUTS, 20)
 
 
 def test_a_stage_that_raises_leaves_no_half_column(calls: dict[str, int]) -> None:
@@ -154,19 +167,19 @@ def test_a_stage_that_raises_leaves_no_half_column(calls: dict[str, int]) -> Non
     with pytest.raises(ValueError, match="broken"):
         list(chain.run(DEFAULT))
     stage.step = sound
-    assert [tick.spin for tick in chain.run(DEFAULT)] == [tick.spin for tick in Chain(source()).run(DEFAULT)]
+    assert [tick.contrast for tick in chain.run(DEFAULT)] == [tick.contrast for tick in Chain(source()).run(DEFAULT)]
 
 
 def test_the_budget_drops_what_was_not_used_for_longest(calls: dict[str, int], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(chain_module, "nbytes", lambda result: 1000)
-    chain = Chain(source(), budget_bytes=7 * 20 * 1000 + 4 * 20 * 1000)  # one whole run and one from logo on
+    chain = Chain(source(), budget_bytes=8 * 20 * 1000 + 5 * 20 * 1000)  # one whole run and one from logo on
     for pad in (1, 2, 3):
         list(chain.run(DEFAULT.with_assignments([f"logo.pad_px={pad}"])))
     before = dict(calls)
     list(chain.run(DEFAULT.with_assignments(["logo.pad_px=2"])))
     assert calls == before
     list(chain.run(DEFAULT.with_assignments(["logo.pad_px=1"])))
-    assert {name for name in calls if calls[name] > before[name]} == {"logo", "rate", "flow", "spin"}
+    assert {name for name in calls if calls[name] > before[name]} == {"logo", "rate", "flow", "spin", "contrast"}
 
 
 def test_a_damaged_clock_is_refused_instead_of_running_forever(calls: dict[str, int]) -> None:

@@ -26,9 +26,10 @@ def tick(number: int, shot: int | None, x_px: float = 100.0, reason: str | None 
         covariance=np.eye(5),
         measured=None if number % 2 else object(),
     )
-    spin = SimpleNamespace(estimates={"triplet": SpinEstimate.refused("triplet", f"tick {number}")}, best=None)
+    estimates = {"triplet": SpinEstimate.refused("triplet", f"tick {number}")}
     packet = SimpleNamespace(start_us=5000 * number, end_us=5000 * (number + 1))
-    return SimpleNamespace(packet=packet, track=track, logo=SimpleNamespace(events=[0] * number), spin=spin)
+    logo = SimpleNamespace(events=[0] * number)
+    return SimpleNamespace(packet=packet, track=track, logo=logo, estimates=estimates)
 
 
 def gathered(*ticks: Any) -> ShotLog:

@@ -2,7 +2,6 @@
 
 import { element } from "./elements.js";
 
-const SLOW_MS = 4000;
 
 export class Bar {
   constructor(parent, stages) {
@@ -19,7 +18,7 @@ export class Bar {
   }
 
   show({ state, share, stages, total, error, bytes }) {
-    const busy = state === "computing" || state === "drawing" || state === "partial";
+    const busy = ["loading", "computing"].includes(state) || state === "drawing" || state === "partial";
     for (const [stage, { cell, time }] of this.cells) {
       const took = stages[stage] ?? 0;
       const grown = took > (this.before?.[stage] ?? 0);
@@ -32,7 +31,8 @@ export class Bar {
     this.share.style.width = busy ? `${100 * share}%` : "0";
     this.status.classList.toggle("failed", state === "failed");
     this.status.textContent = {
-      computing: total > SLOW_MS ? "computing; the first run on a machine compiles" : "computing",
+      loading: "loading the kernels; on a new machine they are compiled first, half a minute",
+      computing: "computing",
       drawing: "drawing",
       partial: "the rest",
       done: `${milliseconds(total)}${bytes ? `, ${(bytes / 1e6).toFixed(1)} MB` : ""}`,

@@ -4,6 +4,8 @@ import { chart } from "./chart.js";
 import { download, element, notice } from "./elements.js";
 import { post } from "./server.js";
 
+// "Pixel sensitivity" in the paper's supplement: both thresholds at once.
+const TOGETHER = { diff_on_off: ["diff_on", "diff_off"] };
 const COLOURS = { on: "#ef5350", off: "#4295f5" };
 
 export class Biases extends EventTarget {
@@ -18,7 +20,10 @@ export class Biases extends EventTarget {
     this.stop = element("button", { hidden: true, onclick: () => this.#cancel() }, "Cancel");
     const rows = Object.entries(this.state.ranges).map(([name, range]) => this.#row(name, range));
     this.file = element("input", { type: "file", accept: ".bias", hidden: true, onchange: () => this.#load() });
-    this.which = element("select", { "aria-label": "Bias of the curve" }, ...Object.keys(this.state.ranges).map((name) => element("option", { value: name }, name)));
+    this.which = element("select", { "aria-label": "Bias of the curve" }, 
+      element("option", { value: "diff_on_off" }, "diff_on = diff_off"),
+      ...Object.keys(this.state.ranges).map((name) => element("option", { value: name }, name)),
+    );
     this.draw = element("button", { onclick: () => this.#curve() });
     this.charts = element("div.charts");
     parent.append(
@@ -67,8 +72,8 @@ export class Biases extends EventTarget {
       row.classList.toggle("locked", Boolean(locked));
     }
     this.note.textContent = locked ?? `Moving a slider takes the scene again with the new setting.${calibrated ? "" : " What a bias means in physical units is a model, not calibrated."}`;
-    this.which.hidden = Boolean(locked);
-    this.draw.textContent = locked ? "Rates of this folder's recordings with .bias files" : "Rates against this bias";
+    this.draw.textContent = locked ? "Rates of this folder's recordings" : "Rates against it";
+    this.draw.title = locked ? "Of those whose biases are known: stated in the recording, or in a .bias file of its name beside it" : "Simulates the scene over the whole range of this bias";
   }
 
   // Takes values, from a link too.
@@ -84,7 +89,8 @@ export class Biases extends EventTarget {
   }
 
   #put(name, value) {
-    this.values[name] = value;
+    for (const one of TOGETHER[name] ?? [name]) this.values[one] = value;
+    this.which.value = name;
     this.#refresh();
     this.#again();
   }
@@ -114,7 +120,7 @@ export class Biases extends EventTarget {
 
   async #curve() {
     try {
-      await post(this.connection.path("bias_curve"), { biases: this.values, name: this.which.value });
+      await post(this.connection.path("bias_curve"), { biases: this.values, name: this.which.value, is_known: this.state.known });
     } catch (error) {
       notice(error.message);
     }
@@ -127,19 +133,23 @@ export class Biases extends EventTarget {
     if (!points) return;
     const good = points.filter((point) => !point.error);
     const wrong = points.filter((point) => point.error).map((point) => element("p.note", {}, `${point.recording}: ${point.error}`));
-    const names = source === "recorded" ? Object.keys(this.state.ranges).filter((bias) => new Set(good.map(({ biases }) => biases[bias])).size > 1) : [name];
+    const varies = Object.keys(this.state.ranges).filter((bias) => new Set(good.map(({ biases }) => biases?.[bias])).size > 1);
+    const names = source === "recorded" && varies.length ? varies : [name ?? this.which.value];
     const charts = names.flatMap((bias) => this.#charts(bias, good));
-    if (source === "recorded" && good.length && !names.length) wrong.push(element("p.note", {}, "All recordings have the same biases: nothing to draw over."));
+    if (source === "recorded" && good.length && !varies.length) wrong.push(element("p.note", {}, "All of them have the same biases: a point, not a curve."));
     this.charts.replaceChildren(...charts, ...wrong);
   }
 
   #charts(bias, points) {
-    const x = (point) => point.value ?? point.biases[bias];
+    const [first, ...others] = TOGETHER[bias] ?? [bias];
+    const x = (point) => point.value ?? point.biases[first];
+    const isKnown = (!this.state.locked || this.state.known) && others.every((other) => this.values[other] === this.values[first]);
     return ["ball", "noise"].map((kind) => chart({
-      title: `${kind === "ball" ? "Ball's events" : "Noise"} [kev/s] against bias_${bias}`,
-      low: 0,
+      title: `${kind === "ball" ? "Ball's events" : "Noise"} [kev/s] against ${bias.replace("diff_on_off", "diff_on = diff_off")}`,
+      low: kind === "ball" ? 0 : null,
+      isLogarithmic: kind === "noise", // as the supplement draws it
       whole: true,
-      present: this.state.locked && !this.state.known ? null : this.values[bias],
+      present: isKnown ? this.values[first] : null,
       onpick: this.state.locked ? null : ({ x: value }) => this.#put(bias, value),
       series: ["on", "off"].map((polarity) => ({
         name: polarity.toUpperCase(),
@@ -154,12 +164,16 @@ export class Biases extends EventTarget {
     if (!file) return;
     try {
       const { biases } = await post("/api/biases/read", { text: await file.text() });
-      if (this.state.locked) notice(this.state.locked, "warning");
-      else await this.take(biases);
+      if (!this.state.locked) return await this.take(biases);
+      // What the recording was taken with: it cannot be changed, but be shown and marked in the plots.
+      Object.assign(this.values, biases);
+      this.state.known = true;
+      this.#refresh();
     } catch (error) {
       notice(error.message);
+    } finally {
+      this.file.value = "";
     }
-    this.file.value = "";
   }
 
   async #save() {

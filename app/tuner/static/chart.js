@@ -9,15 +9,16 @@ const BOTTOM = 17;
 const TOP = 6;
 
 // series: [{name, colour, points: [{x, y, low, high}]}]; x is a number, or the index into `categories`.
-export function chart({ title, series, present = null, scale = "linear", categories = null, low = null, whole = false, onpick = null }) {
+export function chart({ title, series, present = null, scale = "linear", categories = null, low = null, whole = false, isLogarithmic = false, onpick = null }) {
   const all = series.flatMap(({ points }) => points).filter(({ y }) => y !== null && y !== undefined && Number.isFinite(y));
   if (!all.length) return null;
   const known = series.flatMap(({ points }) => points.map(({ x }) => x));
   const place = placing(known, scale);
   const values = all.flatMap(({ y, low: a, high: b }) => [y, a ?? y, b ?? y]);
   const shown = whole ? values : usual(values);
-  const spread = scaleOf(low === null ? shown : [...shown, low]);
-  const y = (value) => HEIGHT - BOTTOM - (HEIGHT - BOTTOM - TOP) * Math.min(Math.max((value - spread.low) / (spread.high - spread.low), -0.05), 1.05);
+  const spread = isLogarithmic ? decadesOf(shown) : scaleOf(low === null ? shown : [...shown, low]);
+  const along = (value) => (isLogarithmic ? Math.log(Math.max(value, 1e-9) / spread.low) / Math.log(spread.high / spread.low) : (value - spread.low) / (spread.high - spread.low));
+  const y = (value) => HEIGHT - BOTTOM - (HEIGHT - BOTTOM - TOP) * Math.min(Math.max(along(value), -0.05), 1.05);
   const svg = drawing("svg", { class: "chart", viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": title });
   for (const tick of spread.ticks) {
     svg.append(drawing("line", { class: "grid", x1: LEFT, x2: WIDTH - 4, y1: y(tick), y2: y(tick) }));
@@ -89,4 +90,14 @@ function scaleOf(values) {
     if (tick >= high - 1e-9 * step) break;
   }
   return { low: ticks[0], high: ticks[ticks.length - 1], ticks };
+}
+
+// Powers of ten around the values above zero.
+function decadesOf(values) {
+  const logs = values.filter((value) => value > 0).map(Math.log10);
+  const first = logs.length ? Math.floor(Math.min(...logs)) : 0;
+  const last = Math.max(logs.length ? Math.ceil(Math.max(...logs)) : 1, first + 1);
+  const ticks = [];
+  for (let power = first; power <= last; power += Math.max(1, Math.ceil((last - first) / 4))) ticks.push(10 ** power);
+  return { low: 10 ** first, high: 10 ** last, ticks };
 }

@@ -36,11 +36,10 @@ export class Controls {
     return JSON.stringify(this.settings.get(name)) !== JSON.stringify(this.settings.presetValue(name));
   }
 
-  #section({ title, controls }) {
+  #section({ title, is_setup, controls }) {
     const mark = element("span.mark");
     const body = element("div.body");
-    const setup = ["Camera", "Ball"].includes(title);
-    const made = element("details.section", { open: !setup }, element("summary", {}, title, mark), body);
+    const made = element("details.section", { open: !is_setup }, element("summary", {}, title, mark), body);
     made.dataset.title = title;
     for (const description of controls) {
       const control = new Control(description, this);
@@ -96,7 +95,8 @@ class Control {
     this.box = element("input.number", { ...typed, id, placeholder: "auto", "aria-label": label });
     this.box.addEventListener("change", () => this.#typed());
     this.box.addEventListener("keydown", (event) => this.#keys(event));
-    this.box.addEventListener("blur", () => this.refresh());
+    this.box.addEventListener("keyup", () => this.#stepped());
+    this.box.addEventListener("blur", () => this.#stepped() || this.refresh());
     const unit = element("span.unit", {}, this.unit);
     if (this.scale === "none") {
       this.box.classList.add("long");
@@ -106,6 +106,7 @@ class Control {
     this.slider.addEventListener("input", () => this.#dragged());
     this.slider.addEventListener("change", () => this.#released());
     this.slider.addEventListener("keydown", (event) => this.#keys(event));
+    for (const end of ["keyup", "blur"]) this.slider.addEventListener(end, () => this.#stepped());
     return [this.slider, this.box, unit];
   }
 
@@ -150,8 +151,16 @@ class Control {
     event.preventDefault();
     value = Math.min(Math.max(value, this.low ?? -Infinity), this.high ?? Infinity);
     value = Number(value.toPrecision(12));
-    if (inBox) this.box.value = this.#text(value);
-    this.#put(value);
+    // A key that is held down moves on like a drag.
+    this.stepping = true;
+    this.box.value = this.#text(value);
+    this.settings.set(this.name, value, false);
+  }
+
+  #stepped() {
+    if (!this.stepping) return;
+    this.stepping = false;
+    this.settings.settle();
   }
 
   #put(value) {

@@ -57,7 +57,7 @@ async function start() {
   app.runner = new Runner(connection, settings, () => viewer.playhead_us());
   listen(link);
   viewer.start(opening.viewer, byId("viewer")).catch((error) => {
-    app.blind = true; // the numbers are still there
+    app.runner.isBlind = true; // the numbers are still there
     notice(`The viewer does not start: ${error.message}`, "error", 0);
   });
   if (Object.keys(link.biases).length) app.biases.take(link.biases);
@@ -104,7 +104,7 @@ function listen(link) {
   let first = true;
   let latest = null;
   settings.addEventListener("change", ({ detail }) => {
-    app.runner.want(detail.settled);
+    app.runner.change(detail.settled);
     if (detail.settled) rememberLater();
     buttons();
   });
@@ -112,10 +112,10 @@ function listen(link) {
     if (detail.serial !== app.runner.serial) return;
     app.bar.show(detail);
     if (detail.error) notice(detail.error);
-    if (detail.state === "done") app.results.show(detail);
+    app.results.show(detail);
     if (["done", "failed"].includes(detail.state)) document.body.dataset.done = detail.serial;
     if (detail.measures && !app.opening.recording.is_long) showShots(detail.measures);
-    if (!detail.recording || app.blind) return;
+    if (!detail.recording || app.runner.isBlind) return;
     latest = detail.recording;
     try {
       const picture = await bytes(connection.path(`pictures/${detail.recording}`));
@@ -123,9 +123,10 @@ function listen(link) {
       if (first) await viewer.layout(await bytes(connection.path(`layout?tab=${encodeURIComponent(link.tab ?? "")}`)));
       await viewer.show(picture, detail.recording, (first && link.time) || detail.first_sight_us);
       first = false;
-      document.body.dataset.shown = detail.serial;
+      if (detail.state === "done") document.body.dataset.shown = detail.serial;
+      app.runner.shown(detail.serial);
     } catch (error) {
-      if (app.blind || (error instanceof Refused && error.status === 404)) return;
+      if (app.runner.isBlind || (error instanceof Refused && error.status === 404)) return;
       throw error;
     }
   });

@@ -3,8 +3,12 @@
 import { milliseconds } from "./bar.js";
 import { element, number } from "./elements.js";
 
-export class Results {
+export class Results extends EventTarget {
+  sentence = null; // of the largest shot, for the coach
+  #methods = new Set(); // of all runs so far: what is still being computed keeps its place
+
   constructor(parent) {
+    super();
     this.parent = parent;
   }
 
@@ -13,11 +17,14 @@ export class Results {
     const both = pinned_measures ? [pinned_measures, measures] : [measures];
     const parts = [];
     if (pinned_measures) parts.push(...differing(differs));
-    parts.push(table(both));
+    for (const shot of both.flatMap(({ shots }) => shots)) Object.keys(shot.spin).forEach((method) => this.#methods.add(method));
+    parts.push(table(both, [...this.#methods]));
     for (const warning of new Set(both.map((m) => m.no_shot_reason).filter(Boolean))) {
       parts.push(element("p.note", {}, `No shot: ${warning}`));
     }
     this.parent.replaceChildren(...parts);
+    this.sentence = mainShot(measures)?.sentence ?? null;
+    this.dispatchEvent(new CustomEvent("shown"));
   }
 }
 
@@ -31,19 +38,18 @@ function differing(differs) {
   return [element("table.numbers", {}, heading("Parameter", ["A", "B"]), ...rows)];
 }
 
-function table(both) {
+function table(both, methods) {
   const columns = both.length > 1 ? ["A", "B"] : [""];
   const values = (make) => both.map((m) => make(m) ?? "–");
   const shots = both.map(mainShot);
   const rows = [
-    row("Ticks tracked", values((m) => `${Math.round(m.tracked_share * m.ticks)} of ${m.ticks}`)),
+    row("Frames tracked", values((m) => `${Math.round(m.tracked_share * m.ticks)} of ${m.ticks} (${Math.round(100 * m.tracked_share)} %)`)),
     row("Residual of the circle", values((m) => unit(m.residual_px, "px", 2))),
     row("Track jitter", values((m) => unit(m.jitter_px, "px", 2))),
     row("Logo events", values((m) => number(m.logo_events))),
     row("Speed", shots.map((s) => (s?.speed_m_s ? `${number(s.speed_m_s, 3)} m/s` : "–"))),
   ];
-  const methods = [...new Set(shots.flatMap((shot) => Object.keys(shot?.spin ?? {})))];
-  for (const method of methods) {
+  for (const method of shots.some(Boolean) ? methods : []) {
     const estimates = shots.map((shot) => shot?.spin[method]);
     const trusted = shots.map((shot) => shot?.best === method);
     rows.push(element("tr.method", {}, element("th", { colSpan: 1 + both.length }, method.replace("_", " "))));
@@ -65,15 +71,17 @@ const unit = (value, name, digits) => (value === null ? null : `${number(value, 
 const reasons = (estimates) => estimates.map((e) => e?.reason).filter(Boolean).join("\n");
 
 function spin(estimate) {
-  if (!estimate) return "–";
+  if (!estimate) return "…";
   if (estimate.status !== "ok") return `refused: ${estimate.reason}`;
   const std = estimate.magnitude_std_rps;
-  return `${estimate.magnitude_rps.toFixed(1)}${std === null ? "" : ` ± ${std.toFixed(1)}`} rps`;
+  return `${estimate.magnitude_rps.toFixed(std < 0.05 ? 2 : 1)}${std === null ? "" : ` ± ${margin(std)}`} rps`;
 }
 
 function axis(estimate) {
   if (!estimate?.axis) return "–";
   const std = estimate.axis_std_deg;
   const parts = estimate.axis.map((v) => v.toFixed(2).replace("-", "−")).join(", ");
-  return `${parts}${std === null ? "" : ` ± ${std.toFixed(1)}°`}`;
+  return `${parts}${std === null ? "" : ` ± ${margin(std)}°`}`;
 }
+
+const margin = (std) => std.toFixed(std < 0.05 ? 2 : 1);

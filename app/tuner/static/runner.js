@@ -3,17 +3,19 @@
 import { notice } from "./elements.js";
 import { post, Refused } from "./server.js";
 
-const SLOWEST_PACE_MS = 700;
+const PATIENCE_MS = 5000; // as long as a picture takes to draw where there is no graphics card
 
 export class Runner extends EventTarget {
   #serial = 0;
   #dirty = false;
   #settled = false;
+  #last = null; // what was asked for last
   #sending = false;
   #sentAt = 0;
   #running = false;
-  #lastTook = 100;
   #timer = null;
+
+  isBlind = false; // there is no viewer: numbers alone
 
   constructor(connection, settings, playhead) {
     super();
@@ -25,6 +27,11 @@ export class Runner extends EventTarget {
     return this.#serial;
   }
 
+  // The settings changed; where a drag ends at what it has already asked for, there is nothing more to ask.
+  change(settled) {
+    if (!settled || this.#dirty || this.#last !== JSON.stringify(this.#what())) this.want(settled);
+  }
+
   want(settled) {
     this.#dirty = true;
     this.#settled ||= settled;
@@ -34,26 +41,27 @@ export class Runner extends EventTarget {
   #schedule() {
     clearTimeout(this.#timer);
     if (!this.#dirty || this.#sending) return;
-    // While a run is under way its end is awaited, so that a drag shows pictures; not for long, and not once settled.
-    const patience = Math.min(1.5 * this.#lastTook, SLOWEST_PACE_MS);
-    const wait = this.#settled || !this.#running ? 0 : this.#sentAt + patience - performance.now();
+    // While a slider is dragged its last picture is awaited; a change that is meant to stay does not wait.
+    const wait = this.#settled || !this.#running ? 0 : this.#sentAt + PATIENCE_MS - performance.now();
     if (wait <= 0) this.#send();
     else this.#timer = setTimeout(() => this.#schedule(), wait);
   }
 
   async #send() {
     const { settings, connection } = this;
+    const hasty = !this.#settled;
     this.#dirty = false;
     this.#settled = false;
     this.#sending = true;
     this.#running = true;
     this.#sentAt = performance.now();
-    const [start_us, end_us] = settings.clip;
-    const wish = { serial: ++this.#serial, parameters: settings.parameters, pinned: settings.pinned, start_us, end_us };
+    this.#last = JSON.stringify(this.#what());
+    const wish = { serial: ++this.#serial, ...JSON.parse(this.#last), hasty };
     try {
       await post(connection.path("run"), { ...wish, playhead_us: await this.playhead() });
     } catch (error) {
       this.#running = false;
+      this.#last = null;
       if (error instanceof Refused && error.status !== 409 && error.status !== 404) {
         notice(error.message);
         settings.revert();
@@ -64,12 +72,25 @@ export class Runner extends EventTarget {
     }
   }
 
-  #told(message) {
-    if (message.serial !== this.#serial) return;
-    if (["done", "failed"].includes(message.state)) {
-      this.#running = false;
-      this.#lastTook = performance.now() - this.#sentAt;
-      this.#schedule();
-    }
+  #what() {
+    const { parameters, pinned, clip } = this.settings;
+    return { parameters, pinned, start_us: clip[0], end_us: clip[1] };
+  }
+
+  #told({ serial, state, recording }) {
+    if (serial !== this.#serial) return;
+    if (state === "failed") this.#last = null;
+    // A first picture is enough to let a dragged slider go on, but it is to be seen before the next one is made.
+    if (state === "failed" || (["partial", "done"].includes(state) && (!recording || this.isBlind))) this.#ended();
+  }
+
+  // The picture of a wish is on the screen.
+  shown(serial) {
+    if (serial === this.#serial) this.#ended();
+  }
+
+  #ended() {
+    this.#running = false;
+    this.#schedule();
   }
 }

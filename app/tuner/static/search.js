@@ -9,7 +9,7 @@ const COMMON = ["logo.pad_px", "flow.reach_px", "rate.ema_us"];
 export class Search {
   constructor(parent, { connection, settings, opening }) {
     Object.assign(this, { connection, settings, names: [], before: null });
-    const fit = opening.sections.filter(({ title }) => !["Camera", "Ball"].includes(title)).flatMap(({ controls }) => controls);
+    const fit = opening.sections.filter(({ is_setup }) => !is_setup).flatMap(({ controls }) => controls);
     const options = fit.filter(({ kind }) => kind !== "numbers").map(({ name }) => element("option", { value: name }, name));
     this.add = element("select", { "aria-label": "Parameter to tune", onchange: () => this.#add(this.add.value) }, element("option", { value: "" }, "add a parameter ..."), ...options);
     this.chips = element("div.chips");

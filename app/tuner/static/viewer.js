@@ -107,14 +107,15 @@ export class Viewer extends EventTarget {
     return this.#next(() => this.#viewer.set_time({ play_state }));
   }
 
-  // The tab of this name without the others and without the time line; returns what `together` takes to undo it.
-  alone(name) {
+  // The tab of this name without the others, without the time line and without its view of that origin; returns what
+  // `together` takes to undo it.
+  alone(name, left_out) {
     return this.#next(async () => {
       const where = await this.where();
-      const { blueprint } = await this.#viewer.get_blueprint();
+      const blueprint = await this.#layout();
       const tab = tabs(blueprint).find(({ title }) => title === name);
       if (!where || !tab) return null;
-      await this.#take(only(blueprint, tab.id), where);
+      await this.#take(only(blueprint, tab.id, left_out), where);
       this.#viewer.override_panel_state("time", "hidden");
       return blueprint;
     });
@@ -132,16 +133,26 @@ export class Viewer extends EventTarget {
     return this.#viewer.set_blueprint(blueprint, { kind: "recording", recording: store });
   }
 
+  // The layout; right after its recording the viewer may still show one of its own making, without our tabs.
+  async #layout() {
+    const until = performance.now() + PICTURE_MS;
+    for (;;) {
+      const { blueprint } = await this.#viewer.get_blueprint();
+      if (performance.now() > until || tabs(blueprint).some(({ title }) => title)) return blueprint;
+      await pause(POLL_MS);
+    }
+  }
+
   // The name of the tab in front, and bringing another one there.
   async tab() {
-    const { blueprint } = await this.#viewer.get_blueprint();
+    const blueprint = await this.#layout();
     return tabs(blueprint).find(({ front }) => front)?.title ?? null;
   }
 
   takeTab(name) {
     return this.#next(async () => {
       const where = await this.where();
-      const { blueprint } = await this.#viewer.get_blueprint();
+      const blueprint = await this.#layout();
       const found = tabs(blueprint).find(({ title }) => title === name);
       if (!where || !found) return;
       rootOf(blueprint).active_tab = `container/${found.id}`;
@@ -190,8 +201,8 @@ export class Viewer extends EventTarget {
 }
 
 function rootOf(blueprint) {
-  const { root_container } = blueprint["/viewport"].ViewportBlueprint;
-  return blueprint[`/container/${root_container}`].ContainerBlueprint;
+  const { root_container } = blueprint["/viewport"]?.ViewportBlueprint ?? {};
+  return blueprint[`/container/${root_container}`]?.ContainerBlueprint ?? {};
 }
 
 // The tabs of the layout: [{id, title, front}].
@@ -204,15 +215,29 @@ function tabs(blueprint) {
   });
 }
 
-// The layout with one container for its root: panels, and what can be reached from there.
-function only(blueprint, root) {
+const NEARER = 0.62; // the ball as large as its ring allows
+
+// The layout with one container for its root: panels, and the views in it side by side, but for those of an origin;
+// the first one seen from nearer by.
+function only(blueprint, root, left_out) {
   const kept = {};
   for (const [path, content] of Object.entries(blueprint)) if (!/^\/(container|view)\//.test(path)) kept[path] = content;
-  const keep = (path) => {
-    for (const [name, content] of Object.entries(blueprint)) if (name === path || name.startsWith(`${path}/`)) kept[name] = content;
-    for (const inner of blueprint[path]?.ContainerBlueprint?.contents ?? []) keep(`/${inner}`);
+  const views = [];
+  const gather = (path) => {
+    const inner = blueprint[path]?.ContainerBlueprint?.contents;
+    if (inner) return inner.forEach((next) => gather(`/${next}`));
+    if (blueprint[path]?.ViewBlueprint?.space_origin !== left_out) views.push(path);
   };
-  keep(`/container/${root}`);
+  gather(`/container/${root}`);
+  for (const [name, content] of Object.entries(blueprint)) if (views.some((path) => name === path || name.startsWith(`${path}/`))) kept[name] = content;
+  const eye = structuredClone(kept[`${views[0]}/EyeControls3D`]);
+  if (eye?.EyeControls3D.position) {
+    eye.EyeControls3D.position = eye.EyeControls3D.position.map((value) => NEARER * value);
+    kept[`${views[0]}/EyeControls3D`] = eye;
+  }
+  const { ContainerBlueprint, ...rest } = structuredClone(blueprint[`/container/${root}`]);
+  const contents = views.map((path) => path.slice(1));
+  kept[`/container/${root}`] = { ...rest, ContainerBlueprint: { ...ContainerBlueprint, contents, col_shares: views.map((_, i) => (i ? 2 : 3)) } };
   kept["/viewport"] = structuredClone(blueprint["/viewport"]);
   kept["/viewport"].ViewportBlueprint.root_container = root;
   return kept;

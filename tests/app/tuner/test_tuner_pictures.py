@@ -13,14 +13,15 @@ import numpy as np
 import pytest
 
 from app.session import Choices
-from app.tuner.bench import Bench
+from app.tuner.bench import LATE, Bench
 from app.tuner.jobs import Job, fault
-from app.tuner.measures import _jitter_px, measures
+from app.tuner.measures import _jitter_px, coach_sentence, measures
 from app.tuner.outbox import Outbox
 from app.tuner.runs import Finished, finish
 from app.viewer.tuning import Drawings, compared, layout_bytes, rrd_bytes, tab_names
+from app.words import kind_of_spin
 from pipeline.errors import ParameterError
-from pipeline.results import Circle
+from pipeline.results import Circle, SpinEstimate
 
 from .conftest import Client
 
@@ -168,3 +169,75 @@ def test_what_is_seen_at_the_playhead_comes_first_when_the_rest_takes_long(
     assert len(parts) == 1
     assert middle_us <= parts[0]["end_us"] < done["end_us"]
     assert client.http.get(client.path(f"pictures/{parts[0]['recording']}")).status_code == 200
+
+
+def test_a_dragged_slider_gets_a_picture_without_the_slowest_stage_first(
+    client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.tuner.page.LATE_WORTH_WAITING_S", 0.0)
+    done = client.run({"logo": {"pad_px": 3.3}}, hasty=True)
+    assert set(done["measures"]["shots"][0]["spin"]) == {"triplet", "normal_flow", "contrast"}
+    first = client.wait("run", lambda m: m["serial"] == done["serial"] and m["state"] == "partial")
+    assert set(first["measures"]["shots"][0]["spin"]) == {"triplet", "normal_flow"}
+    assert first["end_us"] == done["end_us"] and first["recording"] != done["recording"]
+    again = client.run({"logo": {"pad_px": 3.3}})
+    assert not [m for m in client.messages if m["serial"] == again["serial"] and m["state"] == "partial"]
+
+
+def test_what_is_drawn_early_is_drawn_once(bench: Bench) -> None:
+    clip = bench.clip(*bench.first_clip_us())
+    parameters = bench.session.parameters.with_assignments(["logo.pad_px=3.7"])
+    early = Finished.of(clip.with_parameters(parameters), [step.tick for step in clip.run(parameters, LATE)])
+    whole = finish(clip, parameters, lambda: None)
+    assert early.ticks[0].contrast is None and whole.ticks[0].contrast is not None
+    drawings, keys = Drawings(), clip.keys(parameters)
+    try:
+        drawings.begin(early.run, keys)
+        without, with_late = drawings.chunks(early.run, keys), drawings.chunks(whole.run, keys)
+    finally:
+        drawings.close()
+    same = {chunk.entity_path for chunk in with_late if any(chunk is other for other in without)}
+    assert {"/image/events", "/image/surface", "/image/ball/logo"} <= same
+    assert not {path for path in same if "contrast" in path or path.startswith("/world")}
+
+
+def test_a_drawing_that_fails_is_tried_again(finished: Finished, bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(_: Any) -> list[Any]:
+        raise ValueError("no paint")
+
+    drawings, keys = Drawings(), bench.clip(*bench.first_clip_us()).keys(bench.session.parameters)
+    try:
+        with monkeypatch.context() as patch:
+            patch.setattr("app.viewer.tuning.DRAWERS", ((broken, "filter"),))
+            with pytest.raises(ValueError, match="no paint"):
+                drawings.chunks(finished.run, keys)
+        assert drawings.chunks(finished.run, keys)
+    finally:
+        drawings.close()
+
+
+def test_the_coach_is_told_in_one_sentence() -> None:
+    up, forward = (0.0, 0.0, -1.0), np.array([8.9, 0.0, 0.0])
+    spin = 54.0 * np.array([0.0, -np.cos(np.radians(12)), np.sin(np.radians(12))])
+    estimate = SpinEstimate("contrast", spin, 4.0 * np.eye(3), None)
+    said = coach_sentence(estimate, kind_of_spin(spin, forward, up), forward)
+    assert said == "Topspin 54 rps (3240 rpm), 32 km/h, axis 12 degrees off pure topspin, ±2 rps"
+    in_place = coach_sentence(estimate, kind_of_spin(spin, None, up), None)
+    assert in_place == "Spin 54 rps (3240 rpm), axis up the image, 12 degrees off, ±2 rps"
+    assert coach_sentence(None, None, forward) == "Spin not known, 32 km/h"
+
+
+def test_the_background_makes_way_while_somebody_waits(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.tuner.bench.MAKE_WAY_S", 60.0)
+    done = threading.Event()
+
+    def background() -> None:
+        bench.make_way()
+        done.set()
+
+    with bench.at_work(), bench.at_work():
+        thread = threading.Thread(target=background)
+        thread.start()
+        assert not done.wait(0.05)
+    assert done.wait(10)
+    thread.join()

@@ -8,9 +8,11 @@ from typing import Any
 import pytest
 
 from app.simulate import simulate_to_file
+from app.tuner.biases import known_biases
 from app.tuner.controls import scale_of, sections
 from app.tuner.curve import values_over
 from app.tuner.search import REFUSED, cost_of
+from pipeline.biases import BiasParameters
 from pipeline.chain import Parameters
 from pipeline.errors import ParameterError
 
@@ -21,8 +23,8 @@ def test_every_parameter_has_one_control() -> None:
     names = [control["name"] for section in sections() for control in section["controls"]]
     wanted = [f"{group}.{field}" for group, fields in Parameters().as_dict().items() for field in fields]
     assert sorted(names) == sorted(wanted)
-    stages = [section["title"] for section in sections()][:8]
-    assert stages[0] == "Filter" and stages[-1] == "Spin"
+    titles = [section["title"] for section in sections() if not section["is_setup"]]
+    assert titles[:3] == ["Filter", "Surface (EROS)", "Cleaning"] and titles[-2:] == ["Spin", "Contrast"]
 
 
 @pytest.mark.parametrize("name", ["logo.pad_px", "filter.threshold_us", "surface.k_px", "track.coast_us"])
@@ -112,6 +114,10 @@ def test_biases_of_a_finished_recording_are_locked_and_say_why(client: Client) -
     assert answer.status_code == 400 and "carries no scene" in answer.json()["error"]
 
 
+def test_a_simulated_recording_states_its_biases(simulated: Path) -> None:
+    assert known_biases(simulated) == BiasParameters()
+
+
 @pytest.fixture(scope="module")
 def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A short spinner on a small sensor, with its scene."""
@@ -139,6 +145,10 @@ def test_a_simulated_scene_is_taken_again_with_other_biases(simulated: Path) -> 
         assert curve["state"] == "done", curve
         noise = [point["noise_on_hz"] for point in curve["points"]]
         assert noise[0] > noise[1] > noise[2]
+        client.post("bias_curve", biases=biases, name="diff_on_off", points=2)
+        both = client.wait("bias_curve", lambda m: m["state"] == "done" and m["name"] == "diff_on_off")
+        assert [point["value"] for point in both["points"]] == [-35, 140]  # where both thresholds have a setting
+        assert both["points"][0]["noise_off_hz"] > both["points"][1]["noise_off_hz"]
         text = client.http.post(f"{tuner.address}api/biases/write", json={"biases": biases}).json()["text"]
         read = client.http.post(f"{tuner.address}api/biases/read", json={"text": text}).json()
         assert read["biases"] == biases
@@ -164,6 +174,20 @@ def test_recordings_with_bias_files_beside_them_give_measured_rates(
         assert all(point["ball_on_hz"] > 0 and point["noise_on_hz"] > 0 for point in done["points"])
     finally:
         tuner.stop()
+    (tmp_path / "take10.bias").unlink()
+    (tmp_path / "take60.bias").unlink()
+    assert known_biases(tmp_path / "take10.h5") is None and known_biases(tmp_path / "nothing.h5") is None
+    alone = served(tmp_path / "take10.h5")
+    try:
+        page = alone.open()
+        page.post("bias_curve", biases=page.opening["biases"]["values"], name="diff_on")
+        page.wait("bias_curve", lambda m: m["state"] == "failed")
+        # A .bias file loaded in the page says what the recording was taken with.
+        page.post("bias_curve", biases={"diff_on": 25}, name="diff_on", is_known=True)
+        done = page.wait("bias_curve", lambda m: m["state"] == "done")
+        assert [point["biases"]["diff_on"] for point in done["points"]] == [25]
+    finally:
+        alone.stop()
     client.post("bias_curve", biases={}, name="diff_on")
     failed = client.wait("bias_curve", lambda m: m["state"] == "failed")
     assert "no recording of this folder" in failed["error"]

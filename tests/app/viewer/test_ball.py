@@ -46,9 +46,9 @@ def test_the_ball_turns_as_its_spin_says(flight: Run, logged: dict[str, Rows]) -
 
 
 def test_the_shown_arrow_points_along_the_trusted_spin(flight: Run, logged: dict[str, Rows]) -> None:
-    tick = [tick for tick in flight.ticks if tick.spin.best is not None][-1]
-    assert tick.spin.best is not None
-    estimate = tick.spin.estimates[tick.spin.best]
+    tick = [tick for tick in flight.ticks if tick.best is not None][-1]
+    assert tick.best is not None
+    estimate = tick.estimates[tick.best]
     (arrow,) = logged[entities.SPIN_SHOWN].at("vectors", tick.packet.end_us)
     np.testing.assert_allclose(np.array(arrow) / np.linalg.norm(arrow), estimate.axis, atol=1e-5)
     assert logged[entities.SPIN_SHOWN].at("labels", tick.packet.end_us) == [f"{estimate.magnitude_rps:.1f} rps"]

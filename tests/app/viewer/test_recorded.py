@@ -28,6 +28,7 @@ EVERYWHERE = {
     *(entities.FLOW, entities.FLOW_WHEEL, entities.STILL_LOGO, entities.STATUS, entities.SUMMARY, entities.COACH),
     *(entities.WORLD, entities.PATH, entities.AXES, entities.BALL, entities.MESH),
     *(entities.SPIN_SHOWN, entities.SPIN_RING, entities.RING_TIP),
+    *(entities.UNROLLED, entities.GRATICULE, entities.SCORE_AXES, f"{entities.SCORE_MAGNITUDE}/score"),
 }
 
 
@@ -163,7 +164,7 @@ def test_the_event_rate_is_the_last_ticks(flight: Run, logged: Logged) -> None:
 
 def test_every_methods_spin_is_plotted(flight: Run, logged: Logged) -> None:
     tick = flight.ticks[-2]
-    for method, estimate in tick.spin.estimates.items():
+    for method, estimate in tick.estimates.items():
         (value,) = logged[f"{entities.SPIN_MAGNITUDE}/{method}"].at("values", tick.packet.end_us)
         np.testing.assert_allclose(value, np.nan if estimate.magnitude_rps is None else estimate.magnitude_rps)
 

@@ -100,8 +100,9 @@ def test_biases(cache: Path) -> None:
         for polarity in ("on_hz", "off_hz"):
             falling = rates(what, "diff_on = diff_off", polarity)
             assert falling == sorted(falling, reverse=True)
-            rising = rates(what, "refr", polarity)
-            assert rising == sorted(rising)
+            for sweep in ("refr", "fo"):
+                rising = rates(what, sweep, polarity)
+                assert rising == sorted(rising)
     picture = picture_of(where(rows, what="picture")[-1])
     assert picture.max() > 0.5 and picture.min() < -0.5 and np.count_nonzero(picture) > 100
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import resource
+import signal
+import subprocess
 import sys
 import types
 from collections.abc import Iterator
@@ -96,6 +99,30 @@ def test_local_processes_do_the_work(tmp_path: Path) -> None:
     assert not CALLS  # not in this process
 
 
+def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
+    """Also when it is killed and cannot stop them."""
+    script = (
+        "import os, signal\n"
+        "from pipeline.evaluation.work import executor\n"
+        "if __name__ == '__main__':\n"
+        "    with executor(1) as by:\n"
+        "        print(by.submit(os.getpid).result(), flush=True)\n"
+        "        os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    (tmp_path / "run.py").write_text(script)
+    here = str(Path(__file__).parents[3])
+    # The worker holds the other end of the pipe: reading to its end waits for the worker, too.
+    ended = subprocess.run(
+        [sys.executable, str(tmp_path / "run.py")],
+        stdout=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": here},
+        timeout=120,
+        check=False,
+    )
+    assert ended.returncode == -signal.SIGKILL
+    assert int(ended.stdout) > 0
+
+
 def test_no_workers_means_this_process() -> None:
     with executor(0) as by:
         assert by is None
@@ -137,6 +164,25 @@ def test_place_that_cannot_be_written_gets_one_line(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="cannot be written") as caught:
         write_whole(tmp_path / "file" / "below.json", "text")
     assert "\n" not in str(caught.value)
+
+
+def test_a_full_disk_leaves_no_half_result(tmp_path: Path) -> None:
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, before[1]))
+    try:
+        with pytest.raises(RecordingError, match=r"cannot be written.*free space"):
+            write_whole(tmp_path / "result.json", "text" * 1000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not list(tmp_path.iterdir())
+
+
+def test_results_that_need_only_a_part_do_not_care_for_parameters(tmp_path: Path) -> None:
+    task = Task(square, {"number": 3}, needs=("simulator", "biases.py"))
+    run([task], Bench(tmp_path), None)
+    run([task], Bench(tmp_path, Parameters().with_assignments(["logo.pad_px=3"])), None)
+    run([Task(square, {"number": 3}, needs=("simulator",))], Bench(tmp_path), None)
+    assert CALLS == [3, 3]
 
 
 def test_cache_keeps_to_its_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

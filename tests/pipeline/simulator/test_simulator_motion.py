@@ -153,6 +153,16 @@ def test_mounted_logos_read_along_the_turn(ball):
     assert abs(motion @ frame[:, 0]) == pytest.approx(math.cos(math.radians(in_plane)), abs=1e-6)
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_a_second_ball_crosses_the_image_too(seed):
+    """Also where the one drawn first is so slow that it would fall before it has crossed (seeds 6 and 7)."""
+    scene = flight(kind="top", speed_m_s=8.0, second_ball=True, seed=seed)
+    first, second = scene.balls
+    assert len(second.motions) == 1
+    assert second.motions[0].end_s > 0.25 * first.motions[0].end_s
+    assert second.motions[0].start_s < 0.75 * first.motions[0].end_s
+
+
 def test_bouncing_flights_meet_the_table():
     scene = flight(bounce=True, speed_m_s=7.0, seed=2)
     way = path(scene.balls[0].motions[0], scene.balls[0], scene)

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.biases import FACTORY, PAPER, BiasParameters
+from pipeline.biases import FACTORY
 from pipeline.camera import Camera, CameraParameters
 from pipeline.errors import ParameterError
 from pipeline.simulator import (
@@ -241,51 +241,6 @@ def test_a_moving_edge_is_seen_the_same_however_it_is_stepped(monkeypatch):
     assert len(once.events) == pytest.approx(len(fine.events), rel=0.02)
     for label in (1, 2):
         assert (once.truth.label == label).sum() == pytest.approx((fine.truth.label == label).sum(), rel=0.06)
-
-
-def test_noise_falls_with_the_thresholds_and_on_parts_from_off():
-    counts, share = {}, {}
-    scene = shot(seed=6)
-    for value in (0, 40, 90, 140):
-        biases = BiasParameters(diff_on=value, diff_off=value)
-        recording = simulate(scene, camera=SMALL, sensor=biases, seed=1)
-        counts[value] = np.isin(recording.truth.label, (0, 4)).sum()
-        share[value] = abs(recording.events.on[recording.truth.label == 1].mean() - 0.5)
-    noise = {v: Sensor.of(BiasParameters(diff_on=v, diff_off=v)).noise_hz for v in (0, 40, 60, 90, 140)}
-    assert list(noise.values()) == sorted(noise.values(), reverse=True)
-    assert noise[0] > 5 * noise[40]
-    assert counts[0] > counts[140]
-    assert share[140] > share[40]
-
-
-def test_the_supplements_biases():
-    scene = shot(seed=6)
-    events = {}
-    for name, biases in {
-        "paper": PAPER,
-        "long dead time": BiasParameters(refr=-20),
-        "short dead time": BiasParameters(refr=120),
-        "slow": BiasParameters(fo=-35),
-        "factory fo": BiasParameters(fo=0),
-        "high-pass": BiasParameters(hpf=120),
-    }.items():
-        sensor = replace(Sensor.of(biases), noise_hz=0.0, hot_share=0.0)
-        events[name] = simulate(scene, camera=SMALL, sensor=sensor, seed=1)
-    count = {name: len(recording.events) for name, recording in events.items()}
-    assert count["long dead time"] < 0.7 * count["paper"] < count["short dead time"]
-    assert count["factory fo"] == pytest.approx(count["paper"], rel=0.1)
-    assert count["slow"] < count["paper"]
-    assert count["high-pass"] < count["paper"]
-    start = {name: np.percentile(recording.events.t_us, 5) for name, recording in events.items()}
-    assert start["slow"] > start["paper"]  # events come late
-
-
-def test_the_high_pass_takes_slow_motion_away():
-    slow = turning((1.5, 0.0, 0.0), ms=60.0, ball=1)
-    seen = len(simulate(slow, camera=SMALL, sensor=replace(QUIET)).events)
-    passed = replace(Sensor.of(BiasParameters(hpf=120)), noise_hz=0.0, hot_share=0.0)
-    assert seen > 50
-    assert len(simulate(slow, camera=SMALL, sensor=passed).events) < 0.7 * seen
 
 
 def test_thin_lines_give_few_events_in_flight():

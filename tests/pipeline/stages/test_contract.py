@@ -72,11 +72,24 @@ def test_every_stage_says_something_in_the_end(ticks: list[Tick]) -> None:
     assert any(len(tick.logo.events) for tick in ticks)
     assert any(len(tick.flow.t_us) for tick in ticks)
     assert any(estimate.status == "ok" for tick in ticks for estimate in tick.spin.estimates.values())
+    contrasts = [tick.contrast for tick in ticks if tick.contrast is not None]
+    assert len(contrasts) == len(ticks)
+    assert any(one.full and len(one.magnitudes_rps) for one in contrasts), "a full estimate, whether or not trusted"
+    assert any(not one.full and one.contrast for one in contrasts), "and one that follows it"
 
 
 def test_a_second_run_is_equal_bit_for_bit(case: tuple[EventSource, Parameters], ticks: list[Tick]) -> None:
     source, parameters = case
     for one, other in zip(ticks, Chain(source).run(parameters), strict=True):
+        assert_same(one, other)
+
+
+def test_several_ticks_together_give_the_same(case: tuple[EventSource, Parameters], ticks: list[Tick]) -> None:
+    source, parameters = case
+    chain = Chain(source)
+    for _ in zip(range(3), chain.run(parameters, together=7), strict=False):
+        pass  # abandoned within the first seven
+    for one, other in zip(ticks, chain.run(parameters, together=4), strict=True):
         assert_same(one, other)
 
 

@@ -1,44 +1,98 @@
-"""Contrast against the samples' truth, fed by the chain's logo and spin stages (it is not yet a stage of the chain)."""
+"""Contrast against the samples' truth, fed by the chain's track, logo and spin stages."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from app.session import Choices, Session
-from pipeline.results import SpinEstimate
 from pipeline.stages import contrast
+from pipeline.stages.contrast import ContrastResult
+from pipeline.stages.logo import LogoResult
 
 BALLS = {"spinner_ball2_side": (528.43, 426.87, 16.49), "spinner_ball5_back_no_logo": (606.67, 302.79, 16.47)}
 
 
-def answer(samples: Path, name: str) -> tuple[SpinEstimate, np.ndarray]:
-    """The last estimate with a ball in view, and the true spin in rps."""
+def results(
+    samples: Path, name: str, logo_of: Callable[[LogoResult], LogoResult] = lambda logo: logo
+) -> tuple[list[ContrastResult], np.ndarray]:
+    """The results of the ticks with a ball in view, and the true spin in rps."""
     session = Session.open(samples / f"{name}.h5", Choices(fixed_ball=BALLS.get(name)))
     parameters = contrast.ContrastParameters()
     state = contrast.start(parameters, session.chain.setting(session.parameters))
-    estimates = []
+    found = []
     for tick in session.ticks(forget=("surface",)):
-        result = contrast.step(parameters, state, tick.packet, tick.track, tick.logo, tick.spin)
+        result = contrast.step(parameters, state, tick.packet, tick.track, logo_of(tick.logo), tick.spin)
         if tick.track.has_ball:
-            estimates.append(result.estimate)
+            found.append(result)
     assert session.truth is not None
-    return estimates[-1], session.truth.spin_rps[0]
+    return found, session.truth.spin_rps[0]
+
+
+def some_of(rows: Callable[[int], np.ndarray]) -> Callable[[LogoResult], LogoResult]:
+    """The logo's normals (and what else says where an event is) in another order, or fewer of the events."""
+
+    def changed(logo: LogoResult) -> LogoResult:
+        pick = rows(len(logo.events))
+        columns = ("centre_x_px", "centre_y_px", "x_px", "y_px", "points_m", "normals", "of_outline")
+        places = {name: getattr(logo, name)[pick] for name in columns}
+        return replace(logo, events=logo.events[np.sort(pick)], **places)
+
+    return changed
 
 
 @pytest.mark.parametrize("name", ["spinner_ball2_side", "flight_fast_top", "flight_back"])
 def test_a_visible_logo_gives_the_spin(samples: Path, name: str) -> None:
-    estimate, truth = answer(samples, name)
+    found, truth = results(samples, name)
+    estimate = found[-1].estimate
     assert estimate.vector_rps is not None
     assert estimate.magnitude_rps == pytest.approx(np.linalg.norm(truth), abs=0.3)
     assert np.linalg.norm(np.cross(estimate.vector_rps, truth)) < np.sin(np.radians(5)) * truth @ truth
     assert estimate.vector_rps @ truth > 0
 
 
+def test_the_error_is_stated_and_shrinks_while_the_ball_flies(samples: Path) -> None:
+    found, truth = results(samples, "flight_back")
+    answers = [result.estimate for result in found if result.estimate.status == "ok"]
+    first, last = answers[0], answers[-1]
+    assert last.magnitude_std_rps < 0.5 * first.magnitude_std_rps
+    for answer in answers:
+        assert abs(answer.magnitude_rps - np.linalg.norm(truth)) < 5 * answer.magnitude_std_rps
+    full = [result.full for result in found]
+    assert 1 <= sum(full) < len(full) / 2
+
+
+def test_earlier_results_do_not_change_and_runs_repeat(samples: Path) -> None:
+    (one, _), (two, _) = results(samples, "flight_back"), results(samples, "flight_back")
+    for a, b in zip(one, two, strict=True):
+        for name in ContrastResult.__dataclass_fields__:
+            value = getattr(a, name)
+            if isinstance(value, np.ndarray):
+                assert not value.flags.writeable
+                np.testing.assert_array_equal(value, getattr(b, name))
+    spins = [result.best_rps for result in one if np.isfinite(result.best_rps).all()]
+    assert len({tuple(spin) for spin in spins}) > 2  # they are not all the last one's memory
+
+
 @pytest.mark.parametrize("name", ["flight_side", "spinner_ball5_back_no_logo"])
 def test_a_hidden_logo_is_refused(samples: Path, name: str) -> None:
-    estimate, _ = answer(samples, name)
-    assert estimate.status == "refused"
-    assert "logo was not seen" in str(estimate.reason)
+    found, _ = results(samples, name)
+    assert all(result.estimate.status == "refused" for result in found)
+    assert "logo was not seen" in str(found[-1].estimate.reason)
+
+
+def test_noise_is_refused(samples: Path) -> None:
+    """The flight's own events, each at the place of another of its tick."""
+    random = np.random.default_rng(0)
+    found, _ = results(samples, "flight_back", some_of(random.permutation))
+    assert all(result.estimate.status == "refused" for result in found)
+
+
+def test_too_few_events_are_refused(samples: Path) -> None:
+    found, _ = results(samples, "flight_back", some_of(lambda count: np.arange(0, count, 20)))
+    assert all(result.estimate.status == "refused" for result in found)
+    assert "are needed" in str(found[-1].estimate.reason)

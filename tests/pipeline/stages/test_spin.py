@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 
 from pipeline.events import EventBatch
 from pipeline.kernels.sphere import image_velocity
+from pipeline.methods import best_of
 from pipeline.results import SpinEstimate
 from pipeline.stages.flow import FlowResult
 from pipeline.stages.rate import RateResult
@@ -69,7 +70,7 @@ def test_normal_flow_finds_the_spin(case: str) -> None:
     off_rps, off_deg = errors(estimate, np.array(CASES[case][0]))
     assert abs(off_rps) < 2.0 and off_deg < (5.0 if case == "back, flying" else 1.5)
     assert off_deg < 3 * estimate.axis_std_deg
-    assert results[-1].best == "normal_flow"
+    assert best_of(results[-1].estimates) == "normal_flow"
 
 
 @pytest.mark.parametrize("case", ["top, in place", "side, logo at 45 degrees", "top, flying"])
@@ -222,13 +223,13 @@ def test_no_ball_and_no_logo_are_refusals_with_reasons() -> None:
     events = events_of("top, in place")
     ticks = [(packet, no_track(packet.end_us)) for packet in packets(events)]
     for _, _, _, result in after_track(ticks):
-        assert result.best is None
+        assert best_of(result.estimates) is None
         assert {e.reason for e in result.estimates.values()} == {"no ball"}
     empty = [
         (dataclasses.replace(packet, events=EventBatch.empty()), known_track(packet.end_us)) for packet, _ in ticks
     ]
     result = after_track(empty)[-1][3]
-    assert result.best is None
+    assert best_of(result.estimates) is None
     assert result.estimates["triplet"].reason == "no flow"
     assert "hardly seen" in (result.estimates["normal_flow"].reason or "")
 
@@ -247,7 +248,7 @@ def test_an_outline_that_bleeds_into_the_mask_is_no_logo() -> None:
     events = EventBatch.checked(t, x, y, on, width_px=1280, height_px=720)
     results = spins(events, FLIGHT)
     assert all(result.estimates["normal_flow"].status == "refused" for result in results)
-    assert all(result.best is None for result in results)
+    assert all(best_of(result.estimates) is None for result in results)
 
 
 def test_events_without_order_are_no_spin() -> None:
@@ -255,7 +256,7 @@ def test_events_without_order_are_no_spin() -> None:
     t = np.sort(rng.integers(0, 50_000, 3000))
     x, y = rng.integers(628, 652, 3000), rng.integers(348, 372, 3000)
     events = EventBatch.checked(t, x, y, rng.random(3000) < 0.5, width_px=1280, height_px=720)
-    assert all(result.best is None for result in spins(events, STILL))
+    assert all(best_of(result.estimates) is None for result in spins(events, STILL))
 
 
 def test_a_new_shot_knows_nothing_of_the_last() -> None:

@@ -1,0 +1,115 @@
+"""How good the answers are beside what they state of themselves, and beside what is asked of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .tables import Cell, Row, Table, share, where
+
+GROSS_RPS, GROSS_DEG = 10.0, 20.0  # an error beyond one of these is no estimate but a mistake
+PAIRS = (("magnitude_error_rps", "magnitude_std_rps"), ("axis_error_deg", "axis_std_deg"))
+
+
+def is_answer(row: Row) -> bool:
+    """Whether there is an estimate in the row."""
+    return row["axis_error_deg"] is not None
+
+
+def is_gross(row: Row) -> bool:
+    """Whether an answer is far off."""
+    magnitude, axis = row["magnitude_error_rps"], row["axis_error_deg"]
+    return isinstance(magnitude, float) and isinstance(axis, float) and (magnitude > GROSS_RPS or axis > GROSS_DEG)
+
+
+def honesty(groups: Sequence[tuple[str, Sequence[Row]]], methods: Sequence[str]) -> Table:
+    """Errors over the stated ones, by group of recordings and method."""
+    lines: list[tuple[Cell, ...]] = []
+    for label, rows in groups:
+        for method in methods:
+            answers = [row for row in where(rows, method=method) if is_answer(row)]
+            if not answers:
+                continue
+            cells: list[Cell] = [label, method, len(answers), share(answers, is_gross)]
+            for error, std in PAIRS:
+                ratio = ratios(answers, error, std)
+                cells += [float(np.mean(ratio <= limit)) if ratio.size else None for limit in (1, 2)]
+                cells.append(float(np.median(ratio)) if ratio.size else None)
+            lines.append(tuple(cells))
+    quantities = [
+        f"{name}{what}" for name in ("magnitude", "axis") for what in (" within 1 sigma", ", 2 sigma", ", median")
+    ]
+    return Table(
+        "Errors over the stated error (1 sigma)",
+        ("recordings", "method", "answers", "gross", *quantities),
+        lines,
+        "Shares of the answers; the median is of the error over the stated one. Calibrated: 0.68 within 1 sigma, 0.95 "
+        "within 2, median 0.67. The stated error of the axis is that of both its directions together (root of the "
+        "trace): equal both ways it gives 0.63, 0.98 and 0.83. Gross: more than "
+        f"{GROSS_RPS:g} rps or {GROSS_DEG:g} degrees off.",
+    )
+
+
+def ratios(rows: Sequence[Row], error: str, std: str) -> NDArray[np.float64]:
+    """(k,) error over stated error of the rows that have both."""
+    pairs = [(row[error], row[std]) for row in rows]
+    both = [(float(e), float(s)) for e, s in pairs if isinstance(e, float) and isinstance(s, float)]
+    return np.array([e / max(s, 1e-9) for e, s in both])
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What is asked of the answers to these recordings; None = not asked.
+
+    answered : least share of answers (most, where `refuse`: the logo is never seen)
+    rps, deg : largest mean absolute errors; gross : largest share of gross errors among the answers
+    """
+
+    what: str
+    rows: Sequence[Row]
+    answered: float | None = None
+    rps: float | None = None
+    deg: float | None = None
+    gross: float | None = None
+    refuse: bool = False
+
+
+def goals(title: str, asked: Sequence[Goal], note: str) -> Table:
+    """Each quantity beside its goal, and whether all of them are met."""
+    lines: list[tuple[Cell, ...]] = []
+    for goal in asked:
+        if not goal.rows:
+            continue
+        answers = [row for row in goal.rows if is_answer(row)]
+        found = (
+            (len(answers) / len(goal.rows), goal.answered, not goal.refuse),
+            (_mean(answers, "magnitude_error_rps"), goal.rps, False),
+            (_mean(answers, "axis_error_deg"), goal.deg, False),
+            (share(answers, is_gross), goal.gross, False),
+        )
+        cells: list[Cell] = [goal.what, len(goal.rows)]
+        met = True
+        for value, limit, at_least in found:
+            cells += [value, None if limit is None else f"{'>=' if at_least else '<='} {limit:g}"]
+            if limit is not None and value is not None:
+                met = met and (value >= limit if at_least else value <= limit)
+        lines.append((*cells, "yes" if met else "no"))
+    quantities = ("answered", "magnitude error [rps]", "axis error [deg]", "gross")
+    return Table(title, ("recordings", "n", *(c for q in quantities for c in (q, "goal")), "met"), lines, note)
+
+
+def _mean(rows: Sequence[Row], name: str) -> float | None:
+    values = [value for row in rows if isinstance(value := row[name], float)]
+    return float(np.mean(values)) if values else None
+
+
+def by_coverage(rows: Sequence[Row], error: str, std: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(coverage 0..1, mean error) when only the answers with the smallest stated errors are given."""
+    pairs = [(row[std], row[error]) for row in rows]
+    both = sorted((float(s), float(e)) for s, e in pairs if isinstance(s, float) and isinstance(e, float))
+    errors = np.array([e for _, e in both])
+    count = np.arange(1, errors.size + 1)
+    return count / max(len(rows), 1), np.cumsum(errors) / count

@@ -1,0 +1,69 @@
+"""Errors beside what is stated of them and asked of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.evaluation.honesty import Goal, by_coverage, goals, honesty, is_gross, ratios
+from pipeline.evaluation.tables import Row
+
+
+def row(magnitude: float | None, axis: float | None, std: tuple[float, float] = (1.0, 1.0), method: str = "m") -> Row:
+    answered = magnitude is not None
+    return {
+        "method": method,
+        "magnitude_error_rps": magnitude,
+        "axis_error_deg": axis,
+        "magnitude_std_rps": std[0] if answered else None,
+        "axis_std_deg": std[1] if answered else None,
+    }
+
+
+def test_honest_errors_are_found_calibrated_and_boasting_ones_not() -> None:
+    random = np.random.default_rng(3)
+    rows: list[Row] = []
+    for _ in range(4000):
+        rows_std = float(random.uniform(0.1, 3.0))
+        magnitude, axis = float(abs(random.normal(0, rows_std))), float(np.hypot(*random.normal(0, rows_std, 2)))
+        rows.append(row(magnitude, axis, (rows_std, rows_std * np.sqrt(2)), "honest"))
+        rows.append(row(magnitude, axis, (rows_std / 3, rows_std / 3), "boasting"))
+    honest, boasting = honesty([("all", rows)], ["honest", "boasting"]).rows
+    assert honest[:3] == ("all", "honest", 4000)
+    assert np.array(honest[4:], float) == pytest.approx([0.683, 0.954, 0.674, 0.632, 0.982, 0.833], abs=0.03)
+    assert float(str(boasting[4])) < 0.3
+    assert ratios([row(None, None), row(2.0, 1.0)], "magnitude_error_rps", "magnitude_std_rps").tolist() == [2.0]
+
+
+def test_gross_errors() -> None:
+    assert [is_gross(row(*errors)) for errors in ((11.0, 1.0), (1.0, 21.0), (9.0, 19.0), (None, None))] == [
+        True,
+        True,
+        False,
+        False,
+    ]
+
+
+def test_goals_met_and_missed() -> None:
+    rows = [row(1.0, 2.0), row(3.0, 4.0), row(None, None), row(2.0, 30.0)]
+    asked = [
+        Goal("met", rows, answered=0.75, rps=2.0, deg=12.0, gross=0.4),
+        Goal("too few", rows, answered=0.8),
+        Goal("too far", rows, deg=11.0),
+        Goal("too gross", rows, gross=0.1),
+        Goal("should refuse", rows, answered=0.0, refuse=True),
+        Goal("refuses", [row(None, None)], answered=0.0, refuse=True),
+        Goal("nothing there", []),
+    ]
+    table = goals("t", asked, "")
+    assert [line[0] for line in table.rows] == ["met", "too few", "too far", "too gross", "should refuse", "refuses"]
+    assert [line[-1] for line in table.rows] == ["yes", "no", "no", "no", "no", "yes"]
+    assert table.rows[0][1:-1] == (4, 0.75, ">= 0.75", 2.0, "<= 2", 12.0, "<= 12", pytest.approx(1 / 3), "<= 0.4")
+    assert all(len(line) == len(table.columns) for line in table.rows)
+
+
+def test_error_against_coverage_takes_the_surest_first() -> None:
+    rows = [row(3.0, 0.0, (0.3, 1.0)), row(1.0, 0.0, (0.1, 1.0)), row(None, None), row(2.0, 0.0, (0.2, 1.0))]
+    coverage, error = by_coverage(rows, "magnitude_error_rps", "magnitude_std_rps")
+    assert coverage.tolist() == [0.25, 0.5, 0.75]
+    assert error.tolist() == [1.0, 1.5, 2.0]

@@ -1,0 +1,224 @@
+"""The contrast score against its twin, its search against truth, and its laws."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pipeline.kernels.contrast import score
+from pipeline.kernels.contrast_estimate import estimate_spin, follow_spin
+from pipeline.kernels.contrast_events import Answer, LogoEvents, Place, Settings
+from pipeline.kernels.contrast_place import moved_normals, place_slopes
+from pipeline.kernels.contrast_refine import solved
+from pipeline.kernels.contrast_search import distinct
+from pipeline.kernels.contrast_window import segment_starts, segmented, whole
+from tests.naive_contrast import dotted_ball, naive_score, turned
+
+PLACE = Place(centre_std_px=0.2, radius_std_px=0.2)
+SPIN = np.array([40.0, -25.0, 20.0])
+MIRROR = np.array([1.0, -1.0, -1.0])  # of an axial vector, for x -> -x
+
+
+def answer_of(events: LogoEvents, place: Place = PLACE) -> Answer:
+    return estimate_spin(events, place, Settings())
+
+
+def assert_same(spin: np.ndarray | None, expected: np.ndarray, part: float = 0.02) -> None:
+    assert spin is not None
+    assert np.linalg.norm(spin - expected) < part * np.linalg.norm(expected)
+
+
+@settings(max_examples=25)
+@given(
+    seed=st.integers(0, 10_000),
+    count=st.integers(1, 30),
+    speed=st.floats(0.0, 900.0),
+    spread=st.floats(0.02, 2.0),
+    segment_s=st.sampled_from([1.0, 0.004]),
+    times_each=st.integers(1, 3),
+    cell=st.sampled_from([0.03, 0.1, 0.2]),
+    floor=st.floats(0.1, 5.0),
+)
+def test_the_score_is_its_twins(seed, count, speed, spread, segment_s, times_each, cell, floor) -> None:
+    random = np.random.default_rng(seed)
+    normals = np.array([[0.0], [0.2], [-1.0]]) + spread * random.standard_normal((3, count))
+    normals /= np.linalg.norm(normals, axis=0)
+    t_s, layers = np.sort(random.uniform(-0.01, 0.01, count)), random.integers(0, 2, count)
+    direction = random.standard_normal(3)
+    spin = speed * direction / np.linalg.norm(direction)
+    if segment_s == 1.0:
+        part, _ = whole(t_s, normals, layers, times_each)
+    else:
+        part, _ = segmented(t_s, normals, layers, segment_s, 10_000, 10_000)
+        times_each = 1
+    ratios = np.empty(count)
+    total = score(ratios, spin, *part, cell, floor)
+    expected, shares = naive_score(spin, t_s, normals, layers, part.starts, times_each, cell, floor)
+    np.testing.assert_allclose(ratios, shares, atol=2e-4)
+    assert total == pytest.approx(expected, abs=2e-4 * count)
+
+
+@settings(max_examples=50)
+@given(st.lists(st.floats(0, 0.1), min_size=1, max_size=50), st.floats(1e-3, 0.05))
+def test_segments_hold_each_event_once_and_are_short(times, segment_s) -> None:
+    t_s = np.sort(np.array(times))
+    starts = segment_starts(t_s, segment_s)
+    assert starts[0] == 0
+    assert starts[-1] == t_s.size
+    assert np.all(np.diff(starts) > 0)
+    assert all(np.ptp(t_s[a:b]) <= segment_s * (1 + 1e-9) for a, b in itertools.pairwise(starts))
+
+
+@settings(max_examples=50)
+@given(st.integers(1, 6), st.integers(0, 1000))
+def test_cholesky_solves(count, seed) -> None:
+    random = np.random.default_rng(seed)
+    root, right = random.standard_normal((count, count)), random.standard_normal(count)
+    matrix = root @ root.T + np.eye(count)
+    np.testing.assert_allclose(solved(matrix, right), np.linalg.solve(matrix, right), atol=1e-9)
+
+
+def test_distinct_spins_are_apart() -> None:
+    spins = np.array([[10.0, 0, 0], [10.2, 0, 0], [0, 10, 0], [12, 0, 0], [0, 0, 9]])
+    assert list(distinct(spins, 0.1, 9, 0)) == [0, 2, 3, 4]
+    assert list(distinct(spins, 0.1, 2, 0)) == [0, 2]
+    assert list(distinct(spins, 0.1, 9, 1)) == [0, 2, 4]  # 12 crowds 10
+
+
+@pytest.mark.parametrize("offsets", [(0.4, 0.0, 0.0), (0.0, -0.4, 0.0), (0.0, 0.0, 0.4), (0.2, 0.2, -0.3)])
+def test_offsets_move_the_normals_as_a_shifted_disc_does(offsets) -> None:
+    """A ball far away on the optical axis: (x, y) on the disc over the radius is the normal's x, y."""
+    radius, rng = 17.0, np.random.default_rng(0)
+    disc = rng.uniform(-10, 10, (2, 30))
+    x, y, wider = offsets
+
+    def normals_of(px: np.ndarray, of_radius: float) -> np.ndarray:
+        across = px / of_radius
+        return np.stack([*across, -np.sqrt(1 - (across**2).sum(axis=0))])
+
+    facing = np.repeat([[0.0], [0.0], [1.0]], 30, axis=1)
+    before = normals_of(disc, radius)
+    moved = moved_normals(before, place_slopes(before, facing, np.full(30, radius)), np.array(offsets))
+    after = normals_of(disc - np.array([[x], [y]]), radius + wider)
+    assert np.abs(moved - after).max() < 0.1 * np.abs(before - after).max() + 1e-4
+    np.testing.assert_allclose(np.linalg.norm(moved, axis=0), 1.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("spin", [SPIN, [-8.0, 2.0, 3.0], [0.0, 0.0, 90.0], [10.0, 110.0, -40.0]])
+def test_the_spin_is_found_from_nothing(spin) -> None:
+    answer = answer_of(dotted_ball(np.array(spin)))
+    assert_same(answer.spin_rps, np.array(spin))
+    assert answer.contrast > 1.0
+
+
+def test_a_start_with_the_wrong_number_of_turns_is_put_right() -> None:
+    events = dotted_ball(SPIN, duration_s=0.06)
+    answer = estimate_spin(events, PLACE, Settings(), starts_rps=0.6 * SPIN[None], searching=False)
+    assert_same(answer.spin_rps, SPIN)
+
+
+def test_following_goes_on_from_an_answer() -> None:
+    events = dotted_ball(SPIN, duration_s=0.04, events=900)
+    first = answer_of(events.at(events.t_s < 0.012))
+    answer = follow_spin(events, PLACE, Settings(), first)
+    assert_same(answer.spin_rps, SPIN, 0.01)
+    assert answer.span_s > first.span_s
+
+
+def test_a_turned_scene_turns_the_spin() -> None:
+    events = dotted_ball(SPIN)
+    turn = turned(np.eye(3), np.array([0.4, -0.9, 1.3]), np.ones(3)).T
+    scene = replace(events, normals=turn @ events.normals, facing=turn @ events.facing)
+    assert_same(answer_of(scene).spin_rps, turn @ answer_of(events).spin_rps, 0.01)
+
+
+def test_reversed_time_reverses_the_spin() -> None:
+    events = dotted_ball(SPIN)
+    back = replace(events.at(np.arange(len(events))[::-1]), t_s=-events.t_s[::-1].copy())
+    assert_same(answer_of(back).spin_rps, -answer_of(events).spin_rps, 0.01)
+
+
+def test_a_mirrored_image_mirrors_the_spin() -> None:
+    events = dotted_ball(SPIN)
+    flip = np.array([[-1.0], [1.0], [1.0]])
+    mirrored = replace(events, normals=events.normals * flip, facing=events.facing * flip)
+    assert_same(answer_of(mirrored).spin_rps, MIRROR * answer_of(events).spin_rps, 0.01)
+
+
+def test_a_larger_ball_turns_the_same() -> None:
+    events = dotted_ball(SPIN)
+    larger = replace(events, radius_px=2 * events.radius_px)
+    answer = answer_of(larger, Place(centre_std_px=0.4, radius_std_px=0.4))
+    assert_same(answer.spin_rps, answer_of(events).spin_rps, 0.01)
+
+
+def test_the_same_events_give_the_same_answer() -> None:
+    one, two = answer_of(dotted_ball(SPIN)), answer_of(dotted_ball(SPIN))
+    assert np.array_equal(one.spin_rps, two.spin_rps)
+    assert np.array_equal(one.covariance_rps2, two.covariance_rps2)
+
+
+def test_the_stated_error_grows_with_what_is_not_known() -> None:
+    events = dotted_ball(SPIN, duration_s=0.01, events=300)
+    spreads = []
+    for some, px in ((events, 0.1), (events, 1.0), (events.thinned(100), 0.1)):
+        answer = answer_of(some, Place(centre_std_px=px, radius_std_px=px))
+        covariance = answer.covariance_rps2
+        assert covariance is not None
+        assert np.linalg.eigvalsh(covariance).min() > 0
+        spreads.append(float(np.trace(covariance)))
+    assert spreads[1] > spreads[0]
+    assert spreads[2] > spreads[0]
+
+
+def test_noise_has_no_contrast() -> None:
+    events = dotted_ball(SPIN)
+    noise = replace(events, t_s=np.sort(np.random.default_rng(1).permutation(events.t_s)))
+    noise = replace(noise, normals=np.ascontiguousarray(noise.normals[:, np.random.default_rng(2).permutation(600)]))
+    assert answer_of(noise).contrast < 0.25
+
+
+def test_too_few_events_give_nothing() -> None:
+    assert answer_of(dotted_ball(SPIN, events=39)).spin_rps is None
+
+
+TINY = """
+import json
+import numpy as np
+from pipeline.kernels.contrast_place import place_slopes
+from pipeline.kernels.contrast_refine import Hill, climb
+from pipeline.kernels.contrast_search import search, distinct
+from pipeline.kernels.contrast_window import whole
+from tests.naive_contrast import dotted_ball
+
+events = dotted_ball(np.array([20.0, 5.0, 5.0]), duration_s=0.01, events=30)
+part, others = whole(events.t_s, events.normals, events.layers, 2)
+slopes = place_slopes(events.normals, events.facing, events.radius_px)
+spin = 2 * np.pi * np.array([19.0, 5.0, 6.0])
+hill = Hill(part, others, slopes, 0.08, 1.5, np.full(3, 0.3), 0.1)
+spin, offsets, value, seen = climb(hill, spin, np.zeros(3), 1)
+grid, values = search(events.t_s, events.normals, events.layers, 4.0, 1.5, 30)
+print(json.dumps([*spin, *offsets, value, *seen.bend.ravel(), *grid[0], values[0]]))
+"""
+
+
+def test_without_compilation_the_kernels_say_the_same() -> None:
+    def numbers(**environment: str) -> list[float]:
+        ran = subprocess.run(
+            [sys.executable, "-c", TINY],
+            env={**os.environ, **environment, "PYTHONPATH": "."},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return [float(value) for value in ran.stdout.strip("[]\n").split(",")]
+
+    np.testing.assert_allclose(numbers(NUMBA_DISABLE_JIT="1"), numbers(), rtol=1e-4, atol=1e-4)

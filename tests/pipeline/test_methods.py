@@ -1,0 +1,43 @@
+"""Which method is trusted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.methods import best_of
+from pipeline.results import SpinEstimate
+
+
+def estimate(method: str, std_rps: float | None) -> SpinEstimate:
+    """50 rps around x with this uncertainty in all directions; refused for None."""
+    if std_rps is None:
+        return SpinEstimate.refused(method, "no logo")
+    return SpinEstimate(method, np.array([50.0, 0.0, 0.0]), np.eye(3) * std_rps**2, None)
+
+
+@pytest.mark.parametrize(
+    ("contrast_rps", "normal_flow_rps", "best"),
+    [
+        (1.0, 1.0, "contrast"),
+        (8.0, 1.0, "contrast"),  # it has refused by itself what it does not stand for
+        (None, 1.0, "normal_flow"),
+        (None, 6.0, None),  # 10 degrees across, 6 rps along: unsure
+        (None, None, None),
+    ],
+)
+def test_contrast_comes_first_then_normal_flow_where_it_is_sure(
+    contrast_rps: float | None, normal_flow_rps: float | None, best: str | None
+) -> None:
+    estimates = {
+        "triplet": estimate("triplet", 0.1),
+        "normal_flow": estimate("normal_flow", normal_flow_rps),
+        "contrast": estimate("contrast", contrast_rps),
+    }
+    assert best_of(estimates) == best
+
+
+def test_methods_that_were_not_run_are_not_missed() -> None:
+    assert best_of({"normal_flow": estimate("normal_flow", 1.0)}) == "normal_flow"
+    assert best_of({"triplet": estimate("triplet", 0.1)}) is None
+    assert best_of({}) is None
