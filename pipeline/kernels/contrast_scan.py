@@ -83,7 +83,8 @@ def scanned(events: LogoEvents, spins_rad_s: Floats, settings: Settings) -> Floa
     hill = hill_of(some, settings, 1.5 * settings.sigma)
     tops, values, _ = climb_all(hill, candidates, 3)
     order = np.argsort(-values, kind="stable")
-    spins = tops[order[values[order] >= RIVAL * values.max()]]
+    best = float(values.max())  # negative where nothing turns with any of them: then the best alone stays
+    spins = tops[order[values[order] >= min(RIVAL * best, best)]]
     rivals: Floats = spins[distinct(spins, SAME, 6, 2)]
     return rivals
 

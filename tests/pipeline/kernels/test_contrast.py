@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pipeline.kernels import contrast_scan
 from pipeline.kernels.contrast import score
 from pipeline.kernels.contrast_estimate import estimate_spin, follow_spin
 from pipeline.kernels.contrast_events import Answer, LogoEvents, Place, Settings
@@ -123,6 +124,19 @@ def test_a_start_with_the_wrong_number_of_turns_is_put_right() -> None:
     events = dotted_ball(SPIN, duration_s=0.06)
     answer = estimate_spin(events, PLACE, Settings(), starts_rps=0.6 * SPIN[None], searching=False)
     assert_same(answer.spin_rps, SPIN)
+
+
+def test_a_scan_where_nothing_turns_still_names_its_best(monkeypatch) -> None:
+    """Exchanged times can beat every spin: all scores are negative then."""
+    usual = contrast_scan.climb_all
+
+    def lowered(hill, spins, iterations):
+        tops, values, shares = usual(hill, spins, iterations)
+        return tops, values - values.max() - 1.0, shares
+
+    monkeypatch.setattr(contrast_scan, "climb_all", lowered)
+    spins = contrast_scan.scanned(dotted_ball(SPIN), 2 * np.pi * SPIN[None], Settings())
+    assert_same(spins[0] / (2 * np.pi), SPIN)
 
 
 def test_following_goes_on_from_an_answer() -> None:
