@@ -34,6 +34,7 @@ STAGES: dict[str, ModuleType] = {
     "contrast": contrast,
 }
 CACHE_BYTES = 2 << 30
+COLUMNS_MOST = 10_000
 TICKS_MAX = 4_000_000  # 5.5 hours at 200 Hz; more is a damaged clock, not a recording
 
 
@@ -141,16 +142,22 @@ class _Column:
 class Chain:
     """Runs the stages over one source and keeps every stage's column.
 
-    budget_bytes : the columns that were not used for longest are dropped when all together hold more than this
+    budget_bytes, most_columns : the columns that were not used for longest are dropped when all together hold more
+        bytes than this, or are more
     clock : reads seconds; when given, `seconds` adds up what each stage took
     """
 
     def __init__(
-        self, source: Source, *, budget_bytes: int = CACHE_BYTES, clock: Callable[[], float] | None = None
+        self,
+        source: Source,
+        *,
+        budget_bytes: int = CACHE_BYTES,
+        most_columns: int = COLUMNS_MOST,
+        clock: Callable[[], float] | None = None,
     ) -> None:
         self.source = source
         self.seconds = dict.fromkeys(STAGES, 0.0)
-        self._budget_bytes = budget_bytes
+        self._budget_bytes, self._most_columns = budget_bytes, most_columns
         self._clock = clock
         self._columns: dict[Hashable, _Column] = {}
         self._uses = 0
@@ -258,7 +265,9 @@ class Chain:
 
     def _keep_budget(self, in_use: set[Hashable]) -> None:
         total = sum(column.bytes for column in self._columns.values())
+        if total <= self._budget_bytes and len(self._columns) <= self._most_columns:
+            return  # comparing the keys of all columns would take longer than a quick tick
         for key in sorted(self._columns.keys() - in_use, key=lambda k: self._columns[k].last_use):
-            if total <= self._budget_bytes:
+            if total <= self._budget_bytes and len(self._columns) <= self._most_columns:
                 break
             total -= self._columns.pop(key).bytes

@@ -17,11 +17,12 @@ def best_of(estimates: Mapping[str, SpinEstimate]) -> str | None:
     """The method that is trusted; None where none is.
 
     Contrast where it answers, for it refuses by itself what it cannot stand for; else normal flow where it is sure of
-    itself. Triplet never: the paper's method has no doubts of its own.
+    itself and contrast does not speak against it. Triplet never: the paper's method has no doubts of its own.
     """
     if "contrast" in estimates and estimates["contrast"].status == "ok":
         return "contrast"
-    if "normal_flow" in estimates and _sure(estimates["normal_flow"]):
+    contradicted = any(estimate.against == "normal_flow" for estimate in estimates.values())
+    if "normal_flow" in estimates and not contradicted and _sure(estimates["normal_flow"]):
         return "normal_flow"
     return None
 

@@ -43,6 +43,7 @@ class SpinEstimate:
     covariance_rps2 : (3, 3) float64, 1-sigma covariance of the vector, rps^2; None when refused
     reason : why it is refused, in words for people; None when it is ok
     events : number of events (or constraints) behind the answer
+    against : the method whose answer excludes this one, which is refused for that; neither is then to be trusted
     """
 
     method: str
@@ -50,10 +51,11 @@ class SpinEstimate:
     covariance_rps2: NDArray[np.float64] | None
     reason: str | None
     events: int = 0
+    against: str | None = None
 
     @classmethod
-    def refused(cls, method: str, reason: str, events: int = 0) -> SpinEstimate:
-        return cls(method, None, None, reason, events)
+    def refused(cls, method: str, reason: str, events: int = 0, against: str | None = None) -> SpinEstimate:
+        return cls(method, None, None, reason, events, against)
 
     @property
     def status(self) -> Literal["ok", "refused"]:

@@ -25,7 +25,6 @@ Figure = Any  # matplotlib's; it has no business here before it is needed
 WIDTH_IN, HEIGHT_IN, DPI = 5.0, 3.4, 120  # of one panel
 BIN_RPS = 20.0  # errors against the spin are averaged over so much of it
 LEAST = 1e-3  # errors below are drawn there, for the logarithm
-STYLES = ("-", "--", "-.", ":")
 BEST = "best"  # nearly always `contrast`: its curve would hide that one
 ERRORS = (("magnitude_error_rps", "magnitude error [rps]"), ("axis_error_deg", "axis error [deg]"))
 
@@ -62,8 +61,17 @@ def _panels(rows: int, columns: int) -> tuple[Figure, Any]:
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
-def _curve(axes: Any, rows: Sequence[Row], x: str, y: str, label: str, style: str = "-", color: int = 0) -> None:
-    """Mean of y at each x with a band up to one standard deviation above it, as in the paper's figures."""
+def _curve(
+    axes: Any,
+    rows: Sequence[Row],
+    x: str,
+    y: str,
+    label: str,
+    style: str = "-",
+    color: int = 0,
+    band: bool = True,
+) -> None:
+    """Mean of y at each x, with a band up to one standard deviation above it as in the paper's figures."""
     points = [(value, summary(where(rows, **{x: value}), y)) for value in sorted(distinct(rows, x))]
     points = [(value, errors) for value, errors in points if errors.mean is not None]
     if not points:
@@ -72,6 +80,8 @@ def _curve(axes: Any, rows: Sequence[Row], x: str, y: str, label: str, style: st
     mean = np.array([errors.mean for _, errors in points])
     sd = np.array([errors.sd or 0.0 for _, errors in points])
     axes.plot(place, mean, style, color=f"C{color}", marker="o", markersize=3, label=label)
+    if not band:
+        return
     # As far down as up on a logarithmic axis: a standard deviation may be larger than the mean.
     below = mean**2 / np.maximum(mean + sd, LEAST)
     axes.fill_between(place, below, mean + sd, color=f"C{color}", alpha=0.12)
@@ -213,9 +223,10 @@ def _filters(rows: Sequence[Row]) -> dict[str, Figure]:
             label = f"{mode}, {name.removeprefix('kept_')}"
             _curve(axes[0, 0], where(kept, mode=mode), "threshold_us", name, label, style, color)
         for column, (name, _) in enumerate(ERRORS, start=1):
-            for method, style in zip(distinct(spin, "method"), STYLES, strict=False):
+            for method, style in (("contrast", "-"), ("triplet", "--")):
                 part = where(spin, mode=mode, method=method)
-                _curve(axes[0, column], part, "threshold_us", name, f"{mode}, {method}", style, color)
+                _curve(axes[0, column], part, "threshold_us", name, f"{mode}, {method}", style, color, band=False)
+            axes[0, column].set_yscale("log")
     for column, label in enumerate(("share of events kept", *(label for _, label in ERRORS))):
         axes[0, column].set_xscale("log")
         _finish(axes[0, column], "flying ball", "threshold [us]", label)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -99,6 +100,21 @@ def goals(title: str, asked: Sequence[Goal], note: str) -> Table:
         lines.append((*cells, "yes" if met else "no"))
     quantities = ("answered", "magnitude error [rps]", "axis error [deg]", "gross")
     return Table(title, ("recordings", "n", *(c for q in quantities for c in (q, "goal")), "met"), lines, note)
+
+
+def refusals(groups: Sequence[tuple[str, Sequence[Row]]], method: str) -> Table:
+    """How often a method gave no answer where the logo is visible, by the reason it names."""
+    lines: list[tuple[Cell, ...]] = []
+    for label, rows in groups:
+        visible = where(rows, method=method, visible=True)
+        reasons = Counter(str(row["reason"]).split(":")[0] for row in visible if not is_answer(row))
+        lines += [(label, reason, count, count / len(visible)) for reason, count in reasons.most_common()]
+        if not reasons:
+            lines.append((label, "it never does", 0, None))
+    note = "The logo's events may all lie so near the outline that the pipeline takes them for the outline's."
+    return Table(
+        f"Why `{method}` refuses where the logo is visible", ("recordings", "reason", "n", "share"), lines, note
+    )
 
 
 def _mean(rows: Sequence[Row], name: str) -> float | None:

@@ -9,7 +9,7 @@ import numpy as np
 from ..simulator import spinner
 from . import paper
 from .estimating import COLUMNS, estimate_rows, logo_events, method_line, shots_of
-from .honesty import Goal, goals, honesty
+from .honesty import Goal, goals, honesty, refusals
 from .rendering import Rendered, rendered
 from .tables import Cell, Row, Table, distinct, summary, where
 from .work import Bench, Task
@@ -78,6 +78,7 @@ def known_circle(recording: Rendered, seed: int) -> dict[str, str | float]:
 def tables(rows: Sequence[Row]) -> list[Table]:
     """Table 1 by quantity, the methods over all balls, how honest their uncertainties are, and the goals."""
     methods = distinct(rows, "method")
+    windows = [(f"{ms} ms", where(rows, window_ms=ms)) for ms in sorted(distinct(rows, "window_ms"))]
     return [
         _table_1(rows, "magnitude_error_rps", "Table 1: error of the spin magnitude [rps]", 0),
         _table_1(rows, "axis_error_deg", "Table 1: error of the spin axis [degrees]", 1),
@@ -94,8 +95,9 @@ def tables(rows: Sequence[Row]) -> list[Table]:
             "Success counts answers over recordings; 'of those with logo' leaves out windows with fewer than 1,000 "
             "(100 ms) or 100 (10 ms) logo events.",
         ),
-        honesty([(f"{ms} ms", where(rows, window_ms=ms)) for ms in sorted(distinct(rows, "window_ms"))], methods),
+        honesty(windows, methods),
         _goals(rows),
+        refusals(windows, "contrast"),
     ]
 
 

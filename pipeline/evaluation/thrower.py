@@ -15,7 +15,7 @@ from ..simulator import human_shot, thrown
 from ..simulator.thrower import THROWER_BACKTOP_RPS, THROWER_SIDE_RPS, THROWER_SPEED_M_S
 from . import paper
 from .estimating import COLUMNS, estimate_rows, logo_events, longest, method_line, shots_of
-from .honesty import Goal, goals, honesty
+from .honesty import Goal, goals, honesty, refusals
 from .rendering import Rendered, rendered
 from .tables import Cell, Row, Table, distinct, where
 from .work import Bench, Task
@@ -110,6 +110,7 @@ def tables(rows: Sequence[Row]) -> list[Table]:
     """Table 2, the same by velocity and by kind of spin, people's shots, and how honest the uncertainties are."""
     methods = distinct(rows, "method")
     human, both, rows = where(rows, by=HUMAN), rows, where(rows, by=THROWER)
+    players = [(who, part) for who in (THROWER, HUMAN) if (part := where(both, by=who))]
     lines: list[tuple[Cell, ...]] = []
     for name, (success, magnitude, axis) in paper.TABLE_2.items():
         lines.append((f"paper, {name}", None, success, None, magnitude, axis))
@@ -125,8 +126,9 @@ def tables(rows: Sequence[Row]) -> list[Table]:
             "Log-normal speeds and spins with the published quantiles: spin median 46, 95 % below 120 rps; speed "
             "median 9, 95 % below 20 m/s; top, back and mixed.",
         ),
-        honesty([(who, part) for who in (THROWER, HUMAN) if (part := where(both, by=who))], methods),
+        honesty(players, methods),
         _goals(where(both, method="contrast")),
+        refusals(players, "contrast"),
     ]
 
 

@@ -26,7 +26,7 @@ from .spin import SpinResult
 from .track import TrackResult
 
 INPUTS = ("packet", "track", "logo", "spin")
-METHOD = "contrast"
+METHOD, FLOW_METHOD = "contrast", "normal_flow"
 
 Floats = NDArray[np.float64]
 
@@ -60,6 +60,10 @@ class ContrastParameters(ParameterGroup):
         0.25, 0.0, 5.0, 0.05, "", "contrast an event must gain over exchanged times (natural log), on average"
     )
     rival_sigmas: float = tunable(1.6, 0.0, 20.0, 0.1, "sigma", "lead that the best spin must have over any other")
+    # On 49 simulated flights that both methods answer rightly the largest distance is 3.9; 14 where contrast is wrong.
+    flow_sigmas: float = tunable(
+        6.0, 0.0, 100.0, 0.5, "sigma", "distance from the normal flow's spin beyond which it is in doubt"
+    )
     smallest_patch_rad: float = tunable(
         0.18, 0.0, 1.5, 0.01, "rad", "spread of the logo's events over the ball (rms) below which it is not seen"
     )
@@ -171,7 +175,7 @@ def step(
     elif state.answer is not None and state.reason is None:
         state.answer = follow_spin(events, _place(state), settings, state.answer)
         state.reason = _doubt(parameters, state.answer)
-    return _result(state, count, full)
+    return _result(parameters, state, count, full, spin.estimates[FLOW_METHOD])
 
 
 def _take(parameters: ContrastParameters, state: State, packet: Packet, track: TrackResult, logo: LogoResult) -> None:
@@ -231,7 +235,7 @@ def _estimate(
     starts = []
     if state.answer is not None and state.answer.spin_rps is not None:
         starts += [state.answer.spin_rps, *state.answer.rivals_rps]
-    normal_flow = spin.estimates["normal_flow"].vector_rps
+    normal_flow = spin.estimates[FLOW_METHOD].vector_rps
     if normal_flow is not None and np.any(normal_flow):
         starts.append(normal_flow)
     answer = None
@@ -284,19 +288,30 @@ def _doubt(parameters: ContrastParameters, answer: Answer) -> str | None:
     return None
 
 
-def _words(spin_rps: Floats) -> str:
-    return f"({', '.join(f'{value:.0f}' for value in spin_rps)}) rps"
+def _apart(one: SpinEstimate, other: SpinEstimate) -> float:
+    """By how many standard deviations two estimates differ; 0 where one says nothing."""
+    if one.vector_rps is None or one.covariance_rps2 is None:
+        return 0.0
+    if other.vector_rps is None or other.covariance_rps2 is None:
+        return 0.0
+    off = one.vector_rps - other.vector_rps
+    return math.sqrt(max(float(off @ np.linalg.solve(one.covariance_rps2 + other.covariance_rps2, off)), 0.0))
 
 
-def _result(state: State, count: int, full: bool) -> ContrastResult:
+def _words(spin_rps: Floats | None) -> str:
+    return "nothing" if spin_rps is None else f"({', '.join(f'{value:.0f}' for value in spin_rps)}) rps"
+
+
+def _result(parameters: ContrastParameters, state: State, count: int, full: bool, flow: SpinEstimate) -> ContrastResult:
     answer = state.answer
     if answer is None or answer.spin_rps is None or answer.covariance_rps2 is None:
         return _nothing(SpinEstimate.refused(METHOD, state.reason or "no estimate yet", count))
-    estimate = (
-        SpinEstimate(METHOD, frozen(answer.spin_rps.copy()), frozen(answer.covariance_rps2.copy()), None, count)
-        if state.reason is None
-        else SpinEstimate.refused(METHOD, state.reason, count)
-    )
+    estimate = SpinEstimate(METHOD, frozen(answer.spin_rps.copy()), frozen(answer.covariance_rps2.copy()), None, count)
+    if state.reason is not None:
+        estimate = SpinEstimate.refused(METHOD, state.reason, count)
+    elif (sigmas := _apart(estimate, flow)) > parameters.flow_sigmas:
+        reason = f"the normal flow says {_words(flow.vector_rps)}, {sigmas:.0f} sigma from {_words(answer.spin_rps)}"
+        estimate = SpinEstimate.refused(METHOD, reason, count, against=FLOW_METHOD)
     half_us = 0.5e6 * answer.span_s
     return ContrastResult(
         estimate,

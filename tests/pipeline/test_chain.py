@@ -170,9 +170,12 @@ def test_a_stage_that_raises_leaves_no_half_column(calls: dict[str, int]) -> Non
     assert [tick.contrast for tick in chain.run(DEFAULT)] == [tick.contrast for tick in Chain(source()).run(DEFAULT)]
 
 
-def test_the_budget_drops_what_was_not_used_for_longest(calls: dict[str, int], monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("limit", [{"budget_bytes": 8 * 20 * 1000 + 5 * 20 * 1000}, {"most_columns": 8 + 5}])
+def test_the_budget_drops_what_was_not_used_for_longest(
+    calls: dict[str, int], monkeypatch: pytest.MonkeyPatch, limit: dict[str, int]
+) -> None:
     monkeypatch.setattr(chain_module, "nbytes", lambda result: 1000)
-    chain = Chain(source(), budget_bytes=8 * 20 * 1000 + 5 * 20 * 1000)  # one whole run and one from logo on
+    chain = Chain(source(), **limit)  # one whole run and one from logo on
     for pad in (1, 2, 3):
         list(chain.run(DEFAULT.with_assignments([f"logo.pad_px={pad}"])))
     before = dict(calls)

@@ -37,6 +37,11 @@ def test_contrast_comes_first_then_normal_flow_where_it_is_sure(
     assert best_of(estimates) == best
 
 
+def test_what_contrast_speaks_against_is_not_trusted() -> None:
+    against = SpinEstimate.refused("contrast", "the normal flow says otherwise", against="normal_flow")
+    assert best_of({"normal_flow": estimate("normal_flow", 1.0), "contrast": against}) is None
+
+
 def test_methods_that_were_not_run_are_not_missed() -> None:
     assert best_of({"normal_flow": estimate("normal_flow", 1.0)}) == "normal_flow"
     assert best_of({"triplet": estimate("triplet", 0.1)}) is None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.evaluation.honesty import Goal, by_coverage, goals, honesty, is_gross, ratios
+from pipeline.evaluation.honesty import Goal, by_coverage, goals, honesty, is_gross, ratios, refusals
 from pipeline.evaluation.tables import Row
 
 
@@ -67,3 +67,10 @@ def test_error_against_coverage_takes_the_surest_first() -> None:
     coverage, error = by_coverage(rows, "magnitude_error_rps", "magnitude_std_rps")
     assert coverage.tolist() == [0.25, 0.5, 0.75]
     assert error.tolist() == [1.0, 1.5, 2.0]
+
+
+def test_refusals_are_counted_by_reason_where_the_logo_is_visible() -> None:
+    rows = [row(1.0, 1.0) | {"visible": True, "reason": None}]
+    for reason, visible in (("rival: a", True), ("rival: b", True), ("no logo: 3 events", True), ("no logo", False)):
+        rows.append(row(None, None) | {"visible": visible, "reason": reason})
+    assert refusals([("all", rows)], "m").rows == [("all", "rival", 2, 0.5), ("all", "no logo", 1, 0.25)]

