@@ -113,7 +113,8 @@ class Session:
         """Run a throw-away chain until every stage has had work, so that compiled kernels are in memory; seconds."""
         begin, worked, without = time.perf_counter(), 0, not_needed(method)
         contrasted = bool(without)
-        for index, tick in enumerate(Chain(self.source).run(self.parameters, forget=("surface",), without=without)):
+        ticks = Chain(self.source).run(self.parameters, forget=("surface",), without=without, together=TOGETHER)
+        for index, tick in enumerate(ticks):
             worked += len(tick.flow.t_us) > 0
             contrasted |= tick.contrast is not None and tick.contrast.full
             if (worked >= WARM_TICKS and contrasted) or index == 20 * WARM_TICKS:
