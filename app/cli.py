@@ -237,7 +237,7 @@ def tune(recording: Path, port: int | None, no_browser: bool, choices: Choices) 
 
 
 @cli.command()
-@click.argument("kind", type=click.Choice(KINDS))
+@click.argument("kind", type=click.Choice((*KINDS, "again")))
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
@@ -265,22 +265,39 @@ def tune(recording: Path, port: int | None, no_browser: bool, choices: Choices) 
     metavar="FILE.bias",
     help="Biases of the sensor; the paper's by default.",
 )
+@click.option(
+    "--scene",
+    type=RECORDING,
+    metavar="FILE.h5",
+    help="With `again`: the recording whose scene is simulated once more, with other --biases.",
+)
 @_tunables
 def simulate(
     kind: str,
     out: Path,
+    scene: Path | None,
     spin_rps: tuple[float, float, float] | None,
     logo: str,
     biases: Path | None,
     **options: Any,
 ) -> None:
-    """Simulate a ball spinner, a flight or a rally, with exact truth: same seed and options, same events."""
-    from .simulate import simulate_to_file
+    """Simulate a ball spinner, a flight or a rally, with exact truth: same seed and options, same events.
 
+    `spinscope simulate again --scene FILE.h5 --biases FILE.bias --out OUT` takes a simulated scene once more.
+    """
+    from .simulate import simulate_again_to_file, simulate_to_file
+
+    if (kind == "again") != (scene is not None):
+        raise ParameterError("`simulate again` and --scene FILE.h5 go together: give both or neither")
     with ProgressBar() as bar:
-        written = simulate_to_file(
-            kind, out, spin_rps=spin_rps, logo=logo, biases_path=biases, on_progress=bar, **options
-        )
+        if scene is not None:
+            if given := sorted(name for name, value in options.items() if value not in (None, False)):
+                raise ParameterError(f"{given[0]} does not belong to `simulate again`: the scene stays as it is")
+            written = simulate_again_to_file(scene, out, biases_path=biases, on_progress=bar)
+        else:
+            written = simulate_to_file(
+                kind, out, spin_rps=spin_rps, logo=logo, biases_path=biases, on_progress=bar, **options
+            )
     for warning in written.warnings:
         note(f"warning: {warning}")
     note(

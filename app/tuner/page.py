@@ -149,19 +149,30 @@ class Page:
         clip = self.bench.clip(*wanted.window_us)
         a = None
         if wanted.pinned is not None:
-            a = self._finish(clip, wanted.pinned, wanted, report, is_alone=False)
-        b = self._finish(clip, wanted.parameters, wanted, report, is_alone=a is None)
+            a = self._finish(clip, wanted.pinned, wanted, report, is_shown=False)
+        b = self._finish(clip, wanted.parameters, wanted, report, a)
         self.finished = b
         self._show(wanted, clip, b, a, report)
 
     def _finish(
-        self, clip: Clip, parameters: Parameters, wanted: Wanted, report: _Report, *, is_alone: bool
+        self,
+        clip: Clip,
+        parameters: Parameters,
+        wanted: Wanted,
+        report: _Report,
+        a: Finished | None = None,
+        *,
+        is_shown: bool = True,
     ) -> Finished:
-        """Run a clip to its end, the late stages last; of a run alone show before what is there, where that pays."""
+        """Run a clip to its end, the late stages last.
+
+        Where that takes long it shows, beside A if there is one, first what is there at the playhead, and for a
+        dragged slider all but the late stages.
+        """
         session = clip.with_parameters(parameters)
         ticks: list[Tick] = []
         count = clip.session.chain.tick_count(parameters)
-        began, playhead_us = time.perf_counter(), wanted.playhead_us if is_alone else None
+        began, playhead_us = time.perf_counter(), wanted.playhead_us if is_shown else None
         for tick in self._steps(clip, parameters, wanted, report, LATE):
             ticks.append(tick)
             report.tell("computing", len(ticks) / count)
@@ -169,16 +180,16 @@ class Page:
                 playhead_us = None
                 rest_s = (time.perf_counter() - began) / len(ticks) * (count - len(ticks))
                 if rest_s > REST_WORTH_WAITING_S:
-                    self._show(wanted, clip, Finished.of(session, ticks), None, report, partial=True)
+                    self._show(wanted, clip, Finished.of(session, ticks), a, report, partial=True)
         early, ticks = Finished.of(session, ticks), []
         self._drawings.begin(early.run, clip.keys(parameters))
-        began, is_waiting = time.perf_counter(), is_alone and wanted.hasty
+        began, is_waiting = time.perf_counter(), is_shown and wanted.hasty
         for tick in self._steps(clip, parameters, wanted, report, ()):
             ticks.append(tick)
             report.tell("computing", len(ticks) / count)
             if is_waiting and time.perf_counter() - began > LATE_WORTH_WAITING_S:
                 is_waiting = False
-                self._show(wanted, clip, early, None, report, partial=True)
+                self._show(wanted, clip, early, a, report, partial=True)
         return Finished.of(session, ticks)
 
     def _steps(

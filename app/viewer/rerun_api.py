@@ -134,10 +134,15 @@ def bars(
 
     A row of no bars would leave the last one's standing: it gets a bar without height.
     """
-    batches = []
+    batches: list[Any] = []
+    before: object = None
     for (places, heights), width in zip(rows, widths, strict=True):
         if not places.size:
             places = heights = np.zeros(1)
+        same, before = before, (width, places.tobytes(), heights.tobytes())
+        if same == before:
+            batches.append(batches[-1])  # most rows are as the one before, and making one takes 0.5 ms
+            continue
         bar = rr.BarChart(heights, abscissa=places, widths=np.full(places.size, width), color=colour)
         batches.append(bar.as_component_batches())
     columns = []

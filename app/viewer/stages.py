@@ -25,7 +25,9 @@ from .run import Run
 Floats = NDArray[np.float64]
 
 EVENTS_SHOWN = 1_500_000  # of more, every second, third ... is shown: 15 MB of points is what a flight may take
-PNG_QUICK = [cv2.IMWRITE_PNG_COMPRESSION, 1]  # 3 times as fast as the default and 10 % larger on EROS surfaces
+# A fifth faster than the default on EROS surfaces and 3 times on flat pictures; with the filters, made for
+# photographs, which quick compression brings along, it would take 3 times as long.
+PNG_QUICK = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE]
 WHEEL_PX = 128
 DASHES = 12
 

@@ -32,7 +32,7 @@ Drawer = Callable[[Run], list[Chunk]]
 A = "/A"
 COMPARED = "/compare"
 COMPARE_NAME = "Compare"
-KEPT_BYTES = 120_000_000  # some forty surfaces' worth of pictures
+KEPT_BYTES = 90_000_000  # some thirty settings of a flight of 100 ms
 # Series of A are drawn in the colour of the same series of B, mixed with this.
 PALE, PALENESS = (235, 235, 235), 0.55
 

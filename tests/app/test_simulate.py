@@ -13,7 +13,9 @@ import cv2
 import h5py
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from app.cli import cli
 from app.simulate import BIASES, DESCRIPTION, simulate_again_to_file, simulate_to_file
 from pipeline.biases import PAPER, BiasParameters, write_biases
 from pipeline.errors import ParameterError, RecordingError, SpinscopeError
@@ -75,6 +77,32 @@ def test_scene_again_with_other_biases(tmp_path: Path) -> None:
     assert len(other.read()) > len(one.read())
     assert json.loads(str(one.attributes[BIASES])) == PAPER.as_dict()
     assert json.loads(str(other.attributes[BIASES])) == SENSITIVE.as_dict()
+
+
+def test_scene_again_on_the_command_line(tmp_path: Path) -> None:
+    first, again = tmp_path / "first.h5", tmp_path / "again.h5"
+    simulate_to_file("spinner", first, duration_ms=10.0, **SMALL)
+    write_biases(SENSITIVE, tmp_path / "sensitive.bias")
+    call = [
+        "simulate",
+        "again",
+        "--scene",
+        str(first),
+        "--biases",
+        str(tmp_path / "sensitive.bias"),
+        "--out",
+        str(again),
+    ]
+    done = CliRunner().invoke(cli, call)
+    assert done.exit_code == 0, done.output
+    assert json.loads(str(open_recording(again).attributes[BIASES])) == SENSITIVE.as_dict()
+    for wrong, words in (
+        (["simulate", "again", "--out", str(again)], "go together"),
+        (["simulate", "flight", "--scene", str(first), "--out", str(again)], "go together"),
+        ([*call, "--speed-m-s", "5"], "speed_m_s does not belong"),
+    ):
+        refused = CliRunner().invoke(cli, wrong)
+        assert isinstance(refused.exception, ParameterError) and words in str(refused.exception)
 
 
 def test_picture_as_logo_travels_with_the_recording(tmp_path: Path) -> None:

@@ -135,6 +135,7 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"start_us": 1.5}, "integer"),
     ({"serial": -1}, "greater than or equal to 0"),
     ({"unknown": 1}, "Extra inputs"),
+    ({"hasty": "yes"}, "valid boolean"),
 ]
 
 
