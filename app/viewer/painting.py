@@ -32,8 +32,8 @@ Floats = NDArray[np.float64]
 
 PICTURE_US = 5000  # the logo is painted this often, and every tick of 200 Hz
 EVENTS_PAINTED = 60_000  # the latest of the shot; more add nothing but time
-PAINT = np.array([32, 42, 80])
-WHITE = np.array([238, 236, 228])
+PAINT = np.array([32, 42, 80], np.float32)
+WHITE = np.array([238, 236, 228], np.float32)
 DISC = np.array([38, 43, 51])
 
 
@@ -125,10 +125,13 @@ def _densest(run: Run, shot: int) -> Floats:
     return direction if np.linalg.norm(direction) > 0 else np.array([0.0, 0.0, -1.0])
 
 
-def _full(counts: Floats) -> float:
+def _full(counts: NDArray[np.float32]) -> float:
     """The count that is shown in full colour: what a twentieth of the marked places exceed."""
     marked = counts[counts > 0]
-    return float(np.quantile(marked, 0.95)) if marked.size else 0.0
+    if not marked.size:
+        return 0.0
+    rank = int(0.95 * (marked.size - 1))
+    return float(np.partition(marked, rank)[rank])
 
 
 def _texture(painted: _Painted) -> NDArray[np.uint8]:
@@ -149,16 +152,21 @@ class _Flat:
     sampler: Sampler
     mask: NDArray[np.bool_]
 
+    @cached_property
+    def ground(self) -> NDArray[np.float32]:
+        """(n, 3) the colour of an empty ball behind these pixels."""
+        return np.tile(DISC.astype(np.float32), (int(self.mask.sum()), 1))
+
     def picture(self, *densities: NDArray[np.float32]) -> bytes:
         """PNG with ON's and OFF's densities in their colours."""
-        colours = np.tile(DISC.astype(np.float32), (int(self.mask.sum()), 1))
+        colours = self.ground.copy()
         for density_of, colour in zip(densities, (at.ON, at.OFF), strict=False):
             counts = self.sampler(density_of)
             seen = np.flatnonzero(counts)
             strength = tone(counts[seen], _full(counts))[:, None]
             colours[seen] += strength * (np.array(colour) - DISC).astype(np.float32)
         picture = np.full((*self.mask.shape, 3), at.BACKGROUND, np.uint8)
-        picture[self.mask] = colours.clip(0, 255)
+        picture[self.mask] = np.clip(colours, 0, 255, out=colours)
         return bytes(cv2.imencode(".png", picture[..., ::-1], PNG_QUICK)[1])
 
 

@@ -6,7 +6,7 @@ pictures are of the last full estimate.
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 
 import cv2
 import numpy as np
@@ -107,8 +107,7 @@ def _on_map(spins_rps: Floats) -> NDArray[np.float32]:
 
 def _heat(directions: Floats, scores: Floats) -> bytes:
     """PNG: at every axis the mean of the scores around it, dark = none, light = the highest."""
-    weights = np.exp((_axes() @ directions.astype(np.float32).T - 1) / np.float32(REACH_RAD**2))
-    mean = (weights @ scores.astype(np.float32)) / weights.sum(axis=-1)
+    mean = _weights(directions.astype(np.float32).tobytes()) @ scores.astype(np.float32)
     grey = np.clip(BRIGHTEST * mean / max(float(scores.max()), 1e-9), 0, BRIGHTEST).astype(np.uint8)
     size = (2 * DISC_RADIUS_PX, 2 * DISC_RADIUS_PX)
     discs = [cv2.applyColorMap(cv2.resize(half, size), cv2.COLORMAP_BONE) for half in grey]
@@ -118,6 +117,14 @@ def _heat(directions: Floats, scores: Floats) -> bytes:
     picture[:, : size[0]][disc > 0] = discs[0][disc > 0]
     picture[:, -size[0] :][disc > 0] = discs[1][disc > 0]
     return bytes(cv2.imencode(".png", picture, PNG_QUICK)[1])
+
+
+@lru_cache(4)  # contrast scores the same directions again and again
+def _weights(directions: bytes) -> NDArray[np.float32]:
+    """(2, COARSE, COARSE, n) how much each of the directions (n, 3) float32 shines on the axes; the sum is 1."""
+    weights = np.exp((_axes() @ np.frombuffer(directions, np.float32).reshape(-1, 3).T - 1) / np.float32(REACH_RAD**2))
+    whole: NDArray[np.float32] = weights / weights.sum(axis=-1, keepdims=True)
+    return whole
 
 
 @cache

@@ -58,7 +58,7 @@ def test_goals_met_and_missed() -> None:
     table = goals("t", asked, "")
     assert [line[0] for line in table.rows] == ["met", "too few", "too far", "too gross", "should refuse", "refuses"]
     assert [line[-1] for line in table.rows] == ["yes", "no", "no", "no", "no", "yes"]
-    assert table.rows[0][1:-1] == (4, 0.75, ">= 0.75", 2.0, "<= 2", 12.0, "<= 12", pytest.approx(1 / 3), "<= 0.4")
+    assert table.rows[0][1:-1] == (4, "0.750", ">= 0.75", 2.0, "<= 2", 12.0, "<= 12", pytest.approx(1 / 3), "<= 0.4")
     assert all(len(line) == len(table.columns) for line in table.rows)
 
 
@@ -71,6 +71,16 @@ def test_error_against_coverage_takes_the_surest_first() -> None:
 
 def test_refusals_are_counted_by_reason_where_the_logo_is_visible() -> None:
     rows = [row(1.0, 1.0) | {"visible": True, "reason": None}]
-    for reason, visible in (("rival: a", True), ("rival: b", True), ("no logo: 3 events", True), ("no logo", False)):
+    for reason, visible in (
+        ("rival: a", True),
+        ("rival: b", True),
+        ("no logo: 3 events", True),
+        ("flow says (3, 1) rps", True),
+        ("no logo", False),
+    ):
         rows.append(row(None, None) | {"visible": visible, "reason": reason})
-    assert refusals([("all", rows)], "m").rows == [("all", "rival", 2, 0.5), ("all", "no logo", 1, 0.25)]
+    assert refusals([("all", rows)], "m").rows == [
+        ("all", "rival", 2, 0.4),
+        ("all", "no logo", 1, 0.2),
+        ("all", "flow says", 1, 0.2),
+    ]
