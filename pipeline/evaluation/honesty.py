@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -94,7 +95,11 @@ def goals(title: str, asked: Sequence[Goal], note: str) -> Table:
         cells: list[Cell] = [goal.what, len(goal.rows)]
         met = True
         for value, limit, at_least in found:
-            cells += [value, None if limit is None else f"{'>=' if at_least else '<='} {limit:g}"]
+            # Three digits, so that a goal missed by a hair is seen to be missed.
+            cells += [
+                f"{value:.3f}" if at_least and value is not None else value,
+                None if limit is None else f"{'>=' if at_least else '<='} {limit:g}",
+            ]
             if limit is not None and value is not None:
                 met = met and (value >= limit if at_least else value <= limit)
         lines.append((*cells, "yes" if met else "no"))
@@ -107,7 +112,8 @@ def refusals(groups: Sequence[tuple[str, Sequence[Row]]], method: str) -> Table:
     lines: list[tuple[Cell, ...]] = []
     for label, rows in groups:
         visible = where(rows, method=method, visible=True)
-        reasons = Counter(str(row["reason"]).split(":")[0] for row in visible if not is_answer(row))
+        said = (str(row["reason"]) for row in visible if not is_answer(row))
+        reasons = Counter(re.split(r"[:(\d]", reason)[0].strip() for reason in said)  # without the numbers
         lines += [(label, reason, count, count / len(visible)) for reason, count in reasons.most_common()]
         if not reasons:
             lines.append((label, "it never does", 0, None))

@@ -308,7 +308,9 @@ def _result(parameters: ContrastParameters, state: State, count: int, full: bool
         return _nothing(SpinEstimate.refused(METHOD, state.reason or "no estimate yet", count))
     estimate = SpinEstimate(METHOD, frozen(answer.spin_rps.copy()), frozen(answer.covariance_rps2.copy()), None, count)
     if state.reason is not None:
-        estimate = SpinEstimate.refused(METHOD, state.reason, count)
+        # Where nothing turns, the normal flow has seen no pattern either, but noise.
+        against = FLOW_METHOD if answer.contrast < parameters.weakest else None
+        estimate = SpinEstimate.refused(METHOD, state.reason, count, against)
     elif (sigmas := _apart(estimate, flow)) > parameters.flow_sigmas:
         reason = f"the normal flow says {_words(flow.vector_rps)}, {sigmas:.0f} sigma from {_words(answer.spin_rps)}"
         estimate = SpinEstimate.refused(METHOD, reason, count, against=FLOW_METHOD)

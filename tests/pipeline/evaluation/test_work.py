@@ -197,8 +197,10 @@ def test_cache_keeps_to_its_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.filterwarnings("ignore")  # Dask's own
+@pytest.mark.filterwarnings("default")  # Dask warns of slow machines
 def test_two_workers_of_a_dask_cluster(tmp_path: Path) -> None:
-    dask = pytest.importorskip("distributed")
+    import distributed as dask
+
     with (
         dask.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
         executor(cluster=cluster.scheduler_address) as by,

@@ -10,10 +10,13 @@ import numpy as np
 import pytest
 
 from app.session import Choices, Session
+from pipeline.events import EventBatch
+from pipeline.methods import best_of
 from pipeline.results import SpinEstimate
 from pipeline.stages import contrast
 from pipeline.stages.contrast import ContrastResult
 from pipeline.stages.logo import LogoResult
+from tests.spinning_ball import SETTING, after_track, known_track, packets
 
 BALLS = {"spinner_ball2_side": (528.43, 426.87, 16.49), "spinner_ball5_back_no_logo": (606.67, 302.79, 16.47)}
 
@@ -110,3 +113,18 @@ def test_a_sure_normal_flow_that_says_otherwise_is_heard(samples: Path) -> None:
         estimate = contrast.step(parameters, state, tick.packet, tick.track, tick.logo, spin).estimate
     assert estimate.status == "refused" and estimate.against == "normal_flow"
     assert "normal flow says (0, 0, 70) rps" in str(estimate.reason)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_noise_on_a_ball_is_no_spin_for_any_trusted_method(seed: int) -> None:
+    """Normal flow alone is sure of a slow spin in some ticks of one such scene out of five."""
+    random = np.random.default_rng(seed)
+    t = np.sort(random.integers(0, 50_000, 3000))
+    x, y = random.integers(628, 652, 3000), random.integers(348, 372, 3000)
+    events = EventBatch.checked(t, x, y, random.random(3000) < 0.5, width_px=1280, height_px=720)
+    ticks = [(packet, known_track(packet.end_us)) for packet in packets(events)]
+    parameters = contrast.ContrastParameters()
+    state = contrast.start(parameters, SETTING)
+    for (packet, track), (logo, _, _, spin) in zip(ticks, after_track(ticks), strict=True):
+        estimate = contrast.step(parameters, state, packet, track, logo, spin).estimate
+        assert best_of({**spin.estimates, "contrast": estimate}) is None
