@@ -199,7 +199,7 @@ class Chain:
         which no other stage may read, are not run: their results are None, and what was known of them stays.
 
         together : how many ticks a stage works through before the next stage has them. One by one each tick comes as
-            soon as it can; in tens every stage finds its code and memory in the processor's caches.
+            soon as it can; several at a time every stage finds its code and memory in the processor's caches.
         """
         setting = self.setting(parameters)
         keys = self.keys(parameters)

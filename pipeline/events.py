@@ -29,7 +29,7 @@ class EventBatch:
     on: NDArray[np.bool_]
 
     def __post_init__(self) -> None:
-        for column in (self.t_us, self.x_px, self.y_px, self.on):
+        for column in self.columns:
             column.flags.writeable = False
 
     @classmethod
@@ -84,6 +84,11 @@ class EventBatch:
             np.concatenate([b.y_px for b in parts]),
             np.concatenate([b.on for b in parts]),
         )
+
+    @property
+    def columns(self) -> tuple[NDArray[np.int64], NDArray[np.uint16], NDArray[np.uint16], NDArray[np.bool_]]:
+        """t_us, x_px, y_px and on, in this order."""
+        return self.t_us, self.x_px, self.y_px, self.on
 
     def __len__(self) -> int:
         return self.t_us.size

@@ -161,7 +161,6 @@ def step(
         reason = f"the logo was not seen: {count} logo events, {parameters.fewest_events} are needed"
         return _nothing(SpinEstimate.refused(METHOD, reason, count))
     full = _due(state, packet.end_us - state.start_us, count)
-    events = _joined(state)
     settings = Settings(
         fastest_rps=state.setting.max_spin_rps,
         sigma=parameters.kernel_rad,
@@ -169,11 +168,12 @@ def step(
         fewest=parameters.fewest_events,
     )
     if full:
+        events = _joined(state)
         _estimate(parameters, state, events, settings, spin)
         state.tried = count
         state.picture = picture(events, state.answer, settings) if parameters.curves else Picture.empty()
     elif state.answer is not None and state.reason is None:
-        state.answer = follow_spin(events, _place(state), settings, state.answer)
+        state.answer = follow_spin(_joined(state), _place(state), settings, state.answer)
         state.reason = _doubt(parameters, state.answer)
     return _result(parameters, state, count, full, spin.estimates[FLOW_METHOD])
 

@@ -61,14 +61,9 @@ def step(parameters: FilterParameters, state: FilterState, packet: Packet) -> Fi
     logo = (MODES.index(parameters.logo_mode), parameters.logo_threshold_us)
     if surface[0] == logo[0] == kernels.OFF:
         return FilterResult(events, events)
-    rows, logo_rows = kernels.passing(
-        state.last, state.width_px, events.t_us, events.x_px, events.y_px, events.on, *surface, *logo
-    )
-    surface_events = events if surface[0] == kernels.OFF else _taken(rows, events)
+    rows, logo_rows = kernels.passing(state.last, state.width_px, *events.columns, *surface, *logo)
+    surface_events = events if surface[0] == kernels.OFF else EventBatch(*taken(rows, *events.columns))
     if logo == surface:
         return FilterResult(surface_events, surface_events)
-    return FilterResult(surface_events, events if logo[0] == kernels.OFF else _taken(logo_rows, events))
-
-
-def _taken(rows: NDArray[np.int64], events: EventBatch) -> EventBatch:
-    return EventBatch(*taken(rows, events.t_us, events.x_px, events.y_px, events.on))
+    logo_events = events if logo[0] == kernels.OFF else EventBatch(*taken(logo_rows, *events.columns))
+    return FilterResult(surface_events, logo_events)

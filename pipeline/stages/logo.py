@@ -123,9 +123,9 @@ def step(
 def _inside(events: EventBatch, track: TrackResult, mask_radius_px: float) -> EventBatch:
     """The events inside the mask."""
     x, y, vx, vy, _ = track.mean.tolist()
-    columns = events.t_us, events.x_px, events.y_px
-    rows = rows_inside(*columns, track.t_us + track.latency_us, (x, y), (vx, vy), mask_radius_px)
-    return EventBatch(*taken(rows, *columns, events.on))
+    reference_us = track.t_us + track.latency_us
+    rows = rows_inside(events.t_us, events.x_px, events.y_px, reference_us, (x, y), (vx, vy), mask_radius_px)
+    return EventBatch(*taken(rows, *events.columns))
 
 
 def _of_outline(x_px: Floats, y_px: Floats, on: NDArray[np.bool_], track: TrackResult) -> NDArray[np.bool_]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..camera import Camera
 from ..events import EventBatch
-from ..kernels import contour as kernels
+from ..kernels import outline as kernels
 from ..results import Circle
 
 Floats = NDArray[np.float64]
@@ -146,10 +146,7 @@ def measure(
         expected,
         prior_std,
         oval_of(camera, expected[0], expected[1]),
-        events.t_us,
-        events.x_px,
-        events.y_px,
-        events.on,
+        *events.columns,
         end_us,
         gate_px,
         camera.width_px,
@@ -181,10 +178,7 @@ def sight(events: EventBatch, end_us: int, camera: Camera, circle: Circle, limit
         circle.x_px,
         circle.y_px,
         radius,
-        recent.t_us,
-        recent.x_px,
-        recent.y_px,
-        recent.on,
+        *recent.columns,
         end_us,
         VOTE_US * 1e-6,
         fastest,

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.kernels import circle, contour
+from pipeline.kernels import circle, contour, outline
 from pipeline.stages import filter, surface, track
 from pipeline.stages.filter import FilterParameters
 from pipeline.stages.surface import SurfaceParameters
@@ -74,7 +74,7 @@ def test_fit_of_an_outline(benchmark: Any) -> None:
     ring = tracked(NAME)[TICK].mean.copy()
     events = filtered.logo_events
     columns = events.t_us, events.x_px, events.y_px
-    chosen = contour.near_outline(ring, *columns, packet.end_us, 3.0, contour.MOST_EVENTS, True)
+    chosen = contour.near_outline(ring, *columns, packet.end_us, 3.0, outline.MOST_EVENTS, True)
     columns = (
         (events.t_us[chosen] - packet.end_us) * 1e-6,
         events.x_px[chosen].astype(np.float64),

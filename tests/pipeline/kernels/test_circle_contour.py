@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pipeline.kernels import contour
+from pipeline.kernels import contour, outline
 from tests import naive_circle
 
 ROUND = np.zeros(2)
@@ -63,7 +63,7 @@ def test_measures_equal_the_twins(seed: int, oval: tuple[float, float]) -> None:
     args = (ring, bent, tau, x, y, on, 60, 40, 1.2, 3.0, 32)
     assert np.allclose(contour.support(*args), naive_circle.support(*args))
     votes = np.zeros((9, 9))
-    contour.vote_velocity(votes, ring, tau, x, y, on, 700.0, 2.5)
+    outline.vote_velocity(votes, ring, tau, x, y, on, 700.0, 2.5)
     assert np.allclose(votes, naive_circle.vote_velocity(4, ring, tau, x, y, on, 700.0, 2.5))
 
 
@@ -143,7 +143,7 @@ def test_velocity_votes_peak_at_the_velocity(bright: bool, seed: int) -> None:
     tau, x, y, on = on_ring(ring, 200, rng)
     votes = np.zeros((2 * m + 1, 2 * m + 1))
     at_rest = ring * np.array([1, 1, 0, 0, 1])
-    contour.vote_velocity(votes, at_rest, tau, x, y, on if bright else ~on, step, 2.0)
+    outline.vote_velocity(votes, at_rest, tau, x, y, on if bright else ~on, step, 2.0)
     best = np.unravel_index(int(np.argmax(np.abs(votes))), votes.shape)
     assert best == (m + j, m + i)
     assert (votes[best] > 0) == bright
@@ -161,7 +161,7 @@ def test_an_oval_outline_is_known() -> None:
 
 def test_squares_hold_their_border() -> None:
     x, y = np.array([0, 5, 10, 11, 5], np.uint16), np.array([5, 5, 10, 5, 11], np.uint16)
-    assert contour.in_square(x, y, 5.0, 5.0, 5.0).tolist() == [0, 1, 2]
+    assert outline.in_square(x, y, 5.0, 5.0, 5.0).tolist() == [0, 1, 2]
 
 
 @pytest.mark.parametrize("bright", [True, False])
@@ -172,12 +172,12 @@ def test_a_moving_ring_is_measured_from_a_place_alone(bright: bool) -> None:
     columns = np.round(tau * 1e6).astype(np.int64), np.round(x).astype(np.uint16), np.round(y).astype(np.uint16)
     recent = tau > -1.5e-3
     events = (*(column[recent] for column in columns), (on if bright else ~on)[recent])
-    start, gate = contour.moving(60.8, 49.0, 15.5, *events, 0, 1.5e-3, 12_000.0)
+    start, gate = outline.moving(60.8, 49.0, 15.5, *events, 0, 1.5e-3, 12_000.0)
     assert np.hypot(*(start - ring)[2:4]) < 1500
-    fitted, covariance, scatter, found = contour.measured(start, FREE, ROUND, *events, 0, 1.5 * gate, 1280, 720)
+    fitted, covariance, scatter, found = outline.measured(start, FREE, ROUND, *events, 0, 1.5 * gate, 1280, 720)
     assert np.allclose(fitted[:2], ring[:2], atol=0.3) and abs(fitted[4] - 16) < 0.2
     assert np.hypot(*(fitted - ring)[2:4]) < 300 and scatter < 0.6 and np.all(np.diag(covariance) > 0)
     assert min(found[3], found[4]) > 0.8 and np.allclose(found[1:3], [bright, not bright], atol=0.03)
     nothing = tuple(column[:5] for column in events)
-    assert np.isnan(contour.moving(60.8, 49.0, 15.5, *nothing, 0, 1.5e-3, 12_000.0)[0][0])
-    assert np.isnan(contour.measured(start, FREE, ROUND, *nothing, 0, 3.0, 1280, 720)[0][0])
+    assert np.isnan(outline.moving(60.8, 49.0, 15.5, *nothing, 0, 1.5e-3, 12_000.0)[0][0])
+    assert np.isnan(outline.measured(start, FREE, ROUND, *nothing, 0, 3.0, 1280, 720)[0][0])
