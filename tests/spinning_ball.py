@@ -130,7 +130,8 @@ def after_track(
 ) -> list[tuple[logo.LogoResult, rate.RateResult, flow.FlowResult, spin.SpinResult]]:
     """What the stages after the track make of these packets and tracks."""
     groups = (
-        logo.LogoParameters(fixed_pad_px=2.5),  # that of a ball that flies, though these may stay
+        # The pad of a ball that flies, though these may stay; the tracks given know the logo's own latency.
+        logo.LogoParameters(fixed_pad_px=2.5, delay_us=0.0),
         rate.RateParameters(),
         flow_parameters or flow.FlowParameters(),
         parameters or spin.SpinParameters(),

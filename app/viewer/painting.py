@@ -107,12 +107,11 @@ def _painted(run: Run) -> Iterator[tuple[int, _Painted]]:
 
 
 def _turned_back(run: Run, parts: list[int], start_us: int, spin_rps: Floats) -> _Painted:
-    """The events of these ticks but those of the outline, which does not turn."""
-    logos = [run.ticks[i].logo for i in parts]
-    inside = ~np.concatenate([logo.of_outline for logo in logos])
-    normals = np.concatenate([logo.normals for logo in logos])[inside][-EVENTS_PAINTED:]
-    t_us = np.concatenate([logo.events.t_us for logo in logos])[inside][-EVENTS_PAINTED:]
-    on = np.concatenate([logo.events.on for logo in logos])[inside][-EVENTS_PAINTED:]
+    """The events of these ticks that turn with the ball."""
+    events = [run.ticks[i].logo.turning for i in parts]
+    normals = np.concatenate([part.normals for part in events])[-EVENTS_PAINTED:]
+    t_us = np.concatenate([part.t_us for part in events])[-EVENTS_PAINTED:]
+    on = np.concatenate([part.on for part in events])[-EVENTS_PAINTED:]
     return _Painted(turned(normals, spin_rps, (start_us - t_us) * 1e-6), on, spin_rps)
 
 

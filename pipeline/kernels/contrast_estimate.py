@@ -23,6 +23,10 @@ FINE = 0.625
 # lessen, as parts of the kernel: of the axis, and of the turn over the stretch's spread in time. From the errors of
 # two simulators' balls with exact tracks.
 AXIS_FLOOR, TURN_FLOOR = 0.35, 0.04
+# Where the camera looks at the surface at less than this cosine (60 degrees, 2.2 px inside a 16.5 px ball's outline) a
+# blurred edge is that much farther off on the ball. The refinement does without such events where so many of all are
+# left; else the axis is stated as less certain, at most by MOST_OBLIQUE.
+RIM, DEEP_SHARE, MOST_OBLIQUE = 0.5, 0.5, 5.0
 TRACK_MEMORY_S = 0.01  # over which a track's errors hang together: two steps of the Kalman filter
 # Longer stretches may hold steady shading for the search to be rid of, and bursts to tell it by.
 BURSTS_FROM_S = 0.015
@@ -60,7 +64,7 @@ def estimate_spin(
     if scanning and (not searching or seen_again):
         spins = scanned(lively, spins, settings)
     spins, margins = ranked(events, spins, settings)
-    some = events.thinned(settings.most)
+    some = _deep(events, settings).thinned(settings.most)
     spins[0], _, _, _ = climb(hill_of(some, settings, settings.sigma), spins[0], NO_OFFSETS, 1)
     stretch = (len(events), reference_s, span_s)
     return _refined(some, spins, margins, place, settings, stretch, np.zeros(3), 4)
@@ -73,7 +77,7 @@ def follow_spin(events: LogoEvents, place: Place, settings: Settings, before: An
     """
     assert before.spin_rps is not None
     events, reference_s, span_s = _centred(events)
-    some = events.thinned(settings.quick_most)
+    some = _deep(events, settings).thinned(settings.quick_most)
     spins = np.concatenate([before.spin_rps[None], before.rivals_rps]) * TURN
     margins = np.concatenate([[0.0], before.margins])
     stretch = (len(events), reference_s, span_s)
@@ -84,6 +88,18 @@ def _centred(events: LogoEvents) -> tuple[LogoEvents, float, float]:
     """The events with times from the middle of the stretch; that middle, and the stretch's length."""
     reference_s = 0.5 * float(events.t_s[0] + events.t_s[-1])
     return replace(events, t_s=events.t_s - reference_s), reference_s, float(events.t_s[-1] - events.t_s[0])
+
+
+def _deep(events: LogoEvents, settings: Settings) -> LogoEvents:
+    """The events away from the rim where these are enough; a pixel there is several on the ball."""
+    rows = np.flatnonzero(_faced(events) > RIM)
+    return events.at(rows) if rows.size >= max(DEEP_SHARE * len(events), settings.fewest) else events
+
+
+def _faced(events: LogoEvents) -> Floats:
+    """(n,) cosine of the angle at which the camera looks at the surface: 1 in the middle of the disc, 0 at its rim."""
+    faced: Floats = -np.sum(events.normals * events.facing, axis=0)
+    return faced
 
 
 def _lively(events: LogoEvents, span_s: float, settings: Settings) -> LogoEvents:
@@ -115,7 +131,8 @@ def _refined(
     covariance = spread_of_estimate(hill, seen, settings.repeats * len(events) / given)
     covariance += _drift(events, place, span_s)
     along = np.outer(spin, spin) / (spin @ spin)
-    covariance += (AXIS_FLOOR * settings.sigma) ** 2 * (spin @ spin) * (np.eye(3) - along)
+    oblique = max(1.0, RIM / max(float(_faced(events).mean()), RIM / MOST_OBLIQUE))
+    covariance += (AXIS_FLOOR * settings.sigma * oblique) ** 2 * (spin @ spin) * (np.eye(3) - along)
     covariance += (TURN_FLOOR * settings.sigma / max(float(np.std(events.t_s)), 1e-5)) ** 2 * along
     chance = hill._replace(part=hill.part._replace(t_s=np.random.default_rng(0).permutation(hill.part.t_s)))
     by_chance = scores_near(np.empty((1, len(events))), chance, spin, offsets, np.zeros((1, 6)))

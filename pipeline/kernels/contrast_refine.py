@@ -25,8 +25,8 @@ OFFSET_STEP_PX = 0.3
 NO_OFFSETS = np.zeros(0)
 # The curvature of a likelihood is the covariance of its gradient: along an unknown it may differ from what the
 # gradients say by this factor, else it is the finite difference that is wrong.
-BEND_TRUST = 3.0
-LEAST_BEND = 0.5  # usual ones are 1 to 4 times the noise
+BEND_TRUST = 2.0
+LEAST_BEND = 1.0  # usual ones are 1 to 4 times the noise
 # Refining leaves so much of the offsets' error: 0.43, 0.37 and 0.52 of 0.5 px on 87 spinners, less where the spin
 # depends on it.
 REFINED = 0.7

@@ -59,3 +59,33 @@ def outline_like(
         # ahead > speed * cos(60 degrees) * distance from the centre, without a root
         out[i] = ((ahead > 0.0) == on[i]) & (ahead * ahead > quarter * across2) & (across2 > least2)
     return out
+
+
+@numba.njit(cache=True, nogil=True)
+def outline_polarity(
+    t_us: NDArray[np.int64],
+    x_px: NDArray[np.uint16],
+    y_px: NDArray[np.uint16],
+    on: NDArray[np.bool_],
+    reference_us: float,
+    centre_px: tuple[float, float],
+    velocity_px_s: tuple[float, float],
+    ring_px: tuple[float, float],
+) -> tuple[int, int]:
+    """How many events of a ring around the moving centre are ON ahead of it or OFF behind it, and how many are not.
+
+    ring_px : its two radii; reference_us : see `rows_inside`
+    """
+    likes, others = 0, 0
+    inner2, outer2 = ring_px[0] * ring_px[0], ring_px[1] * ring_px[1]
+    vx, vy = velocity_px_s[0] * 1e-6, velocity_px_s[1] * 1e-6
+    for i in range(t_us.size):
+        dt_us = t_us[i] - reference_us
+        dx = x_px[i] - (centre_px[0] + vx * dt_us)
+        dy = y_px[i] - (centre_px[1] + vy * dt_us)
+        across2 = dx * dx + dy * dy
+        within = (across2 > inner2) & (across2 < outer2)
+        like = (dx * vx + dy * vy > 0.0) == on[i]
+        likes += within & like
+        others += within & (not like)
+    return likes, others

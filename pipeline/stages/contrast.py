@@ -59,7 +59,7 @@ class ContrastParameters(ParameterGroup):
     weakest: float = tunable(
         0.25, 0.0, 5.0, 0.05, "", "contrast an event must gain over exchanged times (natural log), on average"
     )
-    rival_sigmas: float = tunable(1.6, 0.0, 20.0, 0.1, "sigma", "lead that the best spin must have over any other")
+    rival_sigmas: float = tunable(1.2, 0.0, 20.0, 0.1, "sigma", "lead that the best spin must have over any other")
     # On 49 simulated flights that both methods answer rightly the largest distance is 3.9; 14 where contrast is wrong.
     flow_sigmas: float = tunable(
         6.0, 0.0, 100.0, 0.5, "sigma", "distance from the normal flow's spin beyond which it is in doubt"
@@ -179,15 +179,15 @@ def step(
 
 
 def _take(parameters: ContrastParameters, state: State, packet: Packet, track: TrackResult, logo: LogoResult) -> None:
-    """Keep the tick's logo events (not the outline's, which do not turn) and what is known of the ball's place."""
-    rows = np.flatnonzero(~logo.of_outline)
-    rays = state.setting.camera.rays(logo.centre_x_px[rows], logo.centre_y_px[rows])
+    """Keep the tick's events that turn with the ball, and what is known of the ball's place."""
+    turning = logo.turning
+    rays = state.setting.camera.rays(turning.centre_x_px, turning.centre_y_px)
     part = LogoEvents(
-        (logo.events.t_us[rows] * 1e-6).astype(np.float64),
-        np.ascontiguousarray(logo.normals[rows].T),
-        logo.events.on[rows].astype(np.int64),
+        (turning.t_us * 1e-6).astype(np.float64),
+        np.ascontiguousarray(turning.normals.T),
+        turning.on.astype(np.int64),
         np.ascontiguousarray((rays / np.linalg.norm(rays, axis=1)[:, None]).T),
-        np.full(rows.size, logo.radius_px),
+        np.full(len(turning), logo.radius_px),
     )
     state.parts.append((packet.end_us, part))
     flown_px = math.hypot(track.mean[2], track.mean[3]) * LATENCY_SPREAD_S

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..camera import Setting
 from ..events import EventBatch
-from ..kernels.logo import outline_like, rows_inside
+from ..kernels.logo import outline_like, outline_polarity, rows_inside
 from ..kernels.rows import taken
 from ..kernels.sphere import meet_ball
 from ..parameters import ParameterGroup, tunable
@@ -25,6 +25,9 @@ Floats = NDArray[np.float64]
 # A centre that moves evenly in the image moves almost evenly in space: taking it as even over 16 px (f = 1646 px) is
 # wrong by less than 0.01 px across the line of sight.
 KNOT_SPACING_PX = 16.0
+# The outline's events lie from so far inside to so far outside the ball. With so many of the polarity that a bright
+# ball's outline has not, for each of the one that it has, the ground is brighter than the ball in places.
+OUTLINE_INSIDE_PX, OUTLINE_OUTSIDE_PX, MIXED_OUTLINE = 1.0, 2.0, 0.25
 # See _of_outline: from where on, and from which speed on: a slower ball, or the wobble of a ball spinner's, leaves
 # no more than an event every 10 ms in a pixel's width of outline.
 OUTLINE_SHARE, OUTLINE_SPEED_PX_S = 0.66, 100.0
@@ -32,12 +35,37 @@ OUTLINE_SHARE, OUTLINE_SPEED_PX_S = 0.66, 100.0
 
 @dataclass(frozen=True, kw_only=True)
 class LogoParameters(ParameterGroup):
-    """How far from the outline an event must be to count as the logo's."""
+    """How far from the outline an event must be to count as the logo's, and how late it comes."""
 
     pad_px: float = tunable(2.5, 0.0, 100.0, 0.1, "px", "distance kept from the outline (pad of the paper)")
     # A ball that stays leaves no outline, only what its logo does: three more of 24 simulated spinners are answered
     # than with 2.5 px, those whose logo keeps to the rim, and the others' axes are a fifth better.
     fixed_pad_px: float = tunable(1.0, 0.0, 100.0, 0.1, "px", "the same of a fixed ball, whose outline stays dark")
+    rim_pad_px: float = tunable(0.5, 0.0, 100.0, 0.1, "px", "the same for events that the outline cannot have made")
+    # A mounted ball's place is known to a third or half of a pixel; a logo at its rim may seem to lie outside.
+    fixed_rim_pad_px: float = tunable(-1.0, -10.0, 100.0, 0.1, "px", "that of a fixed ball, for contrast alone")
+    # The outline is the stronger step and is seen by its first events. On two simulators' flights the axes are best
+    # with 30 to 80 us; without it they lean against the flight by a degree.
+    delay_us: float = tunable(50.0, 0.0, 10_000.0, 5.0, "us", "how much later than the outline the logo is reported")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TurningEvents:
+    """Events that turn with the ball: none that its outline may have made, but also some nearer to it than pad.
+
+    t_us : (m,) int64; on : (m,) bool
+    normals : (m, 3) float64, outward unit normals where they lie on the ball (camera frame)
+    centre_x_px, centre_y_px : (m,) float64, the ball's centre when the event happened
+    """
+
+    t_us: NDArray[np.int64]
+    on: NDArray[np.bool_]
+    normals: Floats
+    centre_x_px: Floats
+    centre_y_px: Floats
+
+    def __len__(self) -> int:
+        return self.t_us.size
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,13 +73,14 @@ class LogoResult:
     """The logo events of the tick, each with the ball at its own time.
 
     events : the n events inside the circle less pad
-    centre_x_px, centre_y_px : (n,) float64, the ball's centre when the event happened
+    centre_x_px, centre_y_px : (n,) float64, the ball's centre when the event happened, by the logo's latency
     x_px, y_px : (n,) float64, the event relative to that centre, the lens's distortion undone
     radius_px : radius of the ball in this tick; NaN without a ball
     pad_px : what the mask leaves out along the outline
     points_m : (n, 3) float64, where the events' camera rays meet the ball (camera frame)
     normals : (n, 3) float64, outward unit normals e_r of the ball's surface there (the visible side has e_r . c < 0)
     of_outline : (n,) bool, the event may well be the moving ball's own outline, see `_of_outline`
+    turning : what is left of them without those, and the rim's that are not the outline's either: `_not_outlines`
     position_std_px : 1 sigma of the centre across one axis, NaN without a ball
     radius_std_px : 1 sigma of the radius, NaN without a ball
     velocity_std_px_s : 1 sigma of the centre's velocity along one axis, NaN without a ball
@@ -67,6 +96,7 @@ class LogoResult:
     points_m: NDArray[np.float64]
     normals: NDArray[np.float64]
     of_outline: NDArray[np.bool_]
+    turning: TurningEvents
     position_std_px: float
     radius_std_px: float
     velocity_std_px_s: float
@@ -82,38 +112,48 @@ def step(
 ) -> LogoResult:
     """The tick's logo events; empty without a ball. A coasting ball counts.
 
-    Deviation from equation ball_pos: the paper carries the ball forward from the previous update to the event; here
+    Deviations from equation ball_pos: the paper carries the ball forward from the previous update to the event; here
     the tick is complete before its events are sorted out, so the ball is carried back from this tick's update, which
-    has seen it. Both ends carry the pixels' latency.
+    has seen it. Both ends carry the pixels' latency: the outline's for the mask, which keeps the outline out, and
+    `delay_us` more for the place on the ball.
     """
     if not track.has_ball:
-        none = frozen(np.empty(0))
-        empty, no = frozen(np.empty((0, 3))), frozen(np.empty(0, np.bool_))
-        return LogoResult(
-            EventBatch.empty(), none, none, none, none, math.nan, parameters.pad_px, empty, empty, no, *(math.nan,) * 3
-        )
-    radius_px = float(track.mean[4])
-    pad_px = parameters.pad_px if track.mean[2:4].any() else parameters.fixed_pad_px
-    events = _inside(filtered.logo_events, track, radius_px - pad_px)
-    centre_x, centre_y = track.centre_px(events.t_us)
+        none, nowhere = frozen(np.empty(0)), frozen(np.empty((0, 3)))
+        no = frozen(np.empty(0, np.bool_))
+        turning = TurningEvents(frozen(np.empty(0, np.int64)), no, nowhere, none, none)
+        empty = (EventBatch.empty(), none, none, none, none)
+        return LogoResult(*empty, math.nan, parameters.pad_px, nowhere, nowhere, no, turning, *(math.nan,) * 3)
+    radius_px, moving = float(track.mean[4]), bool(track.mean[2:4].any())
+    pad_px = parameters.pad_px if moving else parameters.fixed_pad_px
+    rim_pad_px = parameters.rim_pad_px if moving else parameters.fixed_rim_pad_px
+    events = _inside(filtered.logo_events, track, radius_px - min(pad_px, rim_pad_px))
+    outline_x, outline_y = track.centre_px(events.t_us)
+    inner = np.hypot(events.x_px - outline_x, events.y_px - outline_y) < radius_px - pad_px
+    centre_x, centre_y = track.centre_px(events.t_us.astype(np.float64) - parameters.delay_us)
     camera = state.camera
     rays = camera.rays(events.x_px, events.y_px)
     middles = camera.rays(centre_x, centre_y)
     x, y = (rays[:, 0] - middles[:, 0]) * camera.focal_px, (rays[:, 1] - middles[:, 1]) * camera.focal_px
-    points, normals = meet_ball(
-        rays, events.t_us, packet.start_us, packet.end_us, _knots_m(packet, track, state), state.ball_radius_m
-    )
+    knots_m = _knots_m(packet, track, parameters.delay_us, state)
+    points, normals = meet_ball(rays, events.t_us, packet.start_us, packet.end_us, knots_m, state.ball_radius_m)
+    of_outline = _of_outline(x, y, events.on, track)
+    mixed = moving and _mixed_outline(filtered.logo_events, track)
+    own = np.flatnonzero(~of_outline & (inner | (not mixed and _not_outlines(x, y, events.on, track))))
+    rows = np.flatnonzero(inner)
     return LogoResult(
-        events=events,
-        centre_x_px=frozen(centre_x),
-        centre_y_px=frozen(centre_y),
-        x_px=frozen(x),
-        y_px=frozen(y),
+        events=EventBatch(*(frozen(column[rows]) for column in events.columns)),
+        centre_x_px=frozen(centre_x[rows]),
+        centre_y_px=frozen(centre_y[rows]),
+        x_px=frozen(x[rows]),
+        y_px=frozen(y[rows]),
         radius_px=radius_px,
         pad_px=pad_px,
-        points_m=frozen(points),
-        normals=frozen(normals),
-        of_outline=frozen(_of_outline(x, y, events.on, track)),
+        points_m=frozen(points[rows]),
+        normals=frozen(normals[rows]),
+        of_outline=frozen(of_outline[rows]),
+        turning=TurningEvents(
+            *(frozen(column[own]) for column in (events.t_us, events.on, normals, centre_x, centre_y))
+        ),
         position_std_px=math.sqrt(0.5 * (track.covariance[0, 0] + track.covariance[1, 1])),
         radius_std_px=math.sqrt(track.covariance[4, 4]),
         velocity_std_px_s=math.sqrt(0.5 * (track.covariance[2, 2] + track.covariance[3, 3])),
@@ -142,11 +182,31 @@ def _of_outline(x_px: Floats, y_px: Floats, on: NDArray[np.bool_], track: TrackR
     return outline_like(x_px, y_px, on, (vx, vy), OUTLINE_SHARE * radius_px)
 
 
-def _knots_m(packet: Packet, track: TrackResult, setting: Setting) -> NDArray[np.float64]:
-    """(k, 3) the ball's centre at k times spread evenly over the packet."""
+def _not_outlines(x_px: Floats, y_px: Floats, on: NDArray[np.bool_], track: TrackResult) -> NDArray[np.bool_]:
+    """(n,) whether events are of the polarity that the outline has not, so that they turn with the ball.
+
+    A bright ball over a darker ground turns pixels ON ahead and OFF behind, whatever its logo does: on simulated
+    flights 3 in 100,000 of its events are of the other polarity, and nearly all OFF events ahead and ON events behind
+    are the logo's, up to the outline itself. A fixed ball's outline is silent.
+    """
+    vx, vy = track.mean[2:4].tolist()
+    return np.ones(on.size, np.bool_) if vx == vy == 0.0 else (x_px * vx + y_px * vy > 0.0) != on
+
+
+def _mixed_outline(events: EventBatch, track: TrackResult) -> bool:
+    """Whether the outline has both polarities on one side: the ground is not darker than the ball everywhere."""
+    x, y, vx, vy, radius_px = track.mean.tolist()
+    ring_px = (radius_px - OUTLINE_INSIDE_PX, radius_px + OUTLINE_OUTSIDE_PX)
+    reference_us = track.t_us + track.latency_us
+    likes, others = outline_polarity(*events.columns, reference_us, (x, y), (vx, vy), ring_px)
+    return others > MIXED_OUTLINE * likes
+
+
+def _knots_m(packet: Packet, track: TrackResult, delay_us: float, setting: Setting) -> NDArray[np.float64]:
+    """(k, 3) the ball's centre at k times spread evenly over the packet, as the logo's events tell it."""
     _, _, vx, vy, radius_px = track.mean.tolist()
     span_us = packet.end_us - packet.start_us
     count = 1 + math.ceil(math.hypot(vx, vy) * span_us * 1e-6 / KNOT_SPACING_PX)
     times_us = packet.start_us + np.arange(count, dtype=np.float64) * (span_us / max(count - 1, 1))
-    x_px, y_px = track.centre_px(times_us)
+    x_px, y_px = track.centre_px(times_us - delay_us)
     return setting.camera.ball_centre_m(x_px, y_px, np.full(count, radius_px), setting.ball_radius_m)

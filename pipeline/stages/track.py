@@ -102,9 +102,10 @@ MOST_SURPRISE = 25.0
 # Scatter of an outline's centre and radius from tick to tick beyond the statistical one, on the samples.
 OUTLINE_STD_PX = 0.05
 OUTLINE_COVARIANCE = OUTLINE_STD_PX**2 * np.eye(3)
-# What no filtering takes away: the calibration of latency, place and radius, which differs from shot to shot.
+# What no filtering takes away: the calibration of latency, place and radius. The first two differ from shot to shot;
+# how far outside the outline is seen, from sensor to sensor: two simulators with the same biases are 0.3 px apart.
 LATENCY_STD_US = 12.0
-PLACE_STD_PX, RADIUS_STD_PX = 0.06, 0.1
+PLACE_STD_PX, RADIUS_STD_PX = 0.06, 0.3
 COMMON_COVARIANCE = np.diag([PLACE_STD_PX**2, PLACE_STD_PX**2, 0.0, 0.0, RADIUS_STD_PX**2])
 # A second ball takes the track over only when this much faster (a slower one rolls back), or while the first
 # is out of sight and when not much slower (a ball that was hit).

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.kernels.logo import outline_like, rows_inside
+from pipeline.kernels.logo import outline_like, outline_polarity, rows_inside
 from tests.naive_spin import naive_rows_inside
 
 
@@ -39,3 +39,17 @@ def test_the_rims_polarity_is_told_by_the_angle_to_the_motion(seed: int, speed: 
     expected = np.where(on, off < np.pi / 3, off > 2 * np.pi / 3) & (np.hypot(x, y) > 10)
     found = outline_like(x, y, on, (speed * np.cos(heading), speed * np.sin(heading)), 10.0)
     assert np.array_equal(found, expected)
+
+
+@given(seed=st.integers(0, 100_000), velocity=st.tuples(*[st.floats(-9000, 9000)] * 2))
+def test_the_outlines_polarities_are_counted(seed: int, velocity: tuple[float, float]) -> None:
+    rng = np.random.default_rng(seed)
+    t = np.sort(rng.integers(0, 5000, 300))
+    x, y = (rng.integers(0, 90, 300).astype(np.uint16) for _ in range(2))
+    on = rng.random(300) < 0.5
+    likes, others = outline_polarity(t, x, y, on, 4900.0, (45.3, 44.6), velocity, (15.0, 30.0))
+    dx = x - (45.3 + velocity[0] * 1e-6 * (t - 4900.0))
+    dy = y - (44.6 + velocity[1] * 1e-6 * (t - 4900.0))
+    ring = (np.hypot(dx, dy) > 15.0) & (np.hypot(dx, dy) < 30.0)
+    ahead = dx * velocity[0] + dy * velocity[1] > 0.0
+    assert likes == np.sum(ring & (ahead == on)) and others == np.sum(ring & (ahead != on))

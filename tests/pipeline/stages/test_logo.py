@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from app.session import Choices, Session
 from pipeline.camera import Camera, CameraParameters, Setting
 from pipeline.events import EventBatch
 from pipeline.results import Packet
 from pipeline.stages import logo as stage
 from pipeline.stages.filter import FilterResult
-from pipeline.stages.logo import LogoParameters, LogoResult
+from pipeline.stages.logo import LogoParameters, LogoResult, TurningEvents
 from pipeline.stages.track import TrackResult
 from tests.spinning_ball import SETTING, known_track, no_track
 
+LOGO_LABEL = 2  # of the truth
 FLIGHT = {"centre_m": (0.1, -0.35, 1.8), "velocity_m_s": (1.0, 8.0, -0.7)}
 DISTORTED = Setting(Camera.of(CameraParameters(distortion=(-0.2, 0.05, 0.001, 0.0, 0.0)), 1280, 720), 0.02, 150.0)
 
@@ -30,8 +33,10 @@ def around(track: TrackResult, start_us: int, end_us: int, count: int = 3000) ->
     return Packet(1, start_us, end_us, events)
 
 
-def logo_of(packet: Packet, track: TrackResult, *, pad_px: float = 2.5, setting: Setting = SETTING) -> LogoResult:
-    parameters = LogoParameters(pad_px=pad_px)
+def logo_of(
+    packet: Packet, track: TrackResult, *, setting: Setting = SETTING, delay_us: float = 0.0, **pads_px: float
+) -> LogoResult:
+    parameters = LogoParameters(delay_us=delay_us, **pads_px)
     state = stage.start(parameters, setting)
     return stage.step(parameters, state, packet, FilterResult(packet.events, packet.events), track)
 
@@ -55,6 +60,21 @@ def test_a_late_pixel_sees_where_the_ball_was() -> None:
     late = dataclasses.replace(track, t_us=track.t_us - 300.0, latency_us=300.0)
     packet = around(track, 5000, 10_000)
     np.testing.assert_array_equal(logo_of(packet, late).events.t_us, logo_of(packet, track).events.t_us)
+
+
+def test_the_logo_is_later_than_the_outline() -> None:
+    """The mask stays with the outline; the place on the ball is that of the ball so much earlier."""
+    track = known_track(10_000, **FLIGHT)
+    packet = around(track, 5000, 10_000)
+    late, sharp = logo_of(packet, track, delay_us=200.0), logo_of(packet, track)
+    np.testing.assert_array_equal(late.events.t_us, sharp.events.t_us)
+    x, y = track.centre_px(late.events.t_us - 200.0)
+    np.testing.assert_array_equal(late.centre_x_px, x)
+    np.testing.assert_array_equal(late.centre_y_px, y)
+    moved_m = 200e-6 * np.array(FLIGHT["velocity_m_s"])
+    inwards = np.hypot(late.x_px, late.y_px) < 0.8 * track.mean[4]
+    shift = np.median((late.normals - sharp.normals)[inwards], axis=0) * SETTING.ball_radius_m
+    np.testing.assert_allclose(shift[:2], moved_m[:2], atol=1e-4)
 
 
 @pytest.mark.parametrize("setting", [SETTING, DISTORTED])
@@ -99,3 +119,71 @@ def test_the_outline_is_on_before_the_ball_and_off_behind_it_and_only_at_the_rim
     assert np.hypot(result.x_px, result.y_px)[result.of_outline].min() > 0.6 * track.mean[4]
     still = known_track(10_000)
     assert not logo_of(around(still, 5000, 10_000), still).of_outline.any()
+
+
+def test_at_the_rim_only_the_polarity_turns_that_the_outline_has_not() -> None:
+    track = known_track(10_000, **FLIGHT)
+    packet = around(track, 5000, 10_000)
+    vx, vy = track.mean[2:4]
+    x, y = track.centre_px(packet.events.t_us)
+    dx, dy = packet.events.x_px - x, packet.events.y_px - y
+    radius_px, distance_px = track.mean[4], np.hypot(dx, dy)
+    of_bright_ball = (dx * vx + dy * vy > 0) == packet.events.on
+    outline = distance_px > radius_px - 1.0
+    packet = Packet(1, 5000, 10_000, packet.events[of_bright_ball | ~outline])
+    kept = (of_bright_ball | ~outline).nonzero()[0]
+    result = logo_of(packet, track, pad_px=4.0, rim_pad_px=1.5)
+    inner = distance_px[kept] < radius_px - 4.0
+    rim = ~inner & (distance_px[kept] < radius_px - 1.5)
+    sure = np.zeros(len(kept), np.bool_)
+    sure[inner] = ~result.of_outline
+    expected = packet.events.t_us[sure | (rim & ~of_bright_ball[kept])]
+    np.testing.assert_array_equal(result.turning.t_us, expected)
+    assert np.sum(rim & ~of_bright_ball[kept]) > 50
+    np.testing.assert_allclose(np.linalg.norm(result.turning.normals, axis=1), 1.0)
+
+
+def test_over_a_ground_brighter_than_the_ball_nothing_at_the_rim_is_sure() -> None:
+    track = known_track(10_000, **FLIGHT)
+    result = logo_of(around(track, 5000, 10_000), track)  # half of the events at the outline are of either polarity
+    np.testing.assert_array_equal(result.turning.t_us, result.events.t_us[~result.of_outline])
+
+
+def test_a_fixed_balls_outline_is_silent() -> None:
+    track = known_track(10_000)
+    packet = around(track, 5000, 10_000)
+    result = logo_of(packet, track, fixed_rim_pad_px=-2.0)
+    x, y = track.centre_px(packet.events.t_us)
+    near = np.hypot(packet.events.x_px - x, packet.events.y_px - y) < track.mean[4] + 2.0
+    np.testing.assert_array_equal(result.turning.t_us, packet.events.t_us[near])
+    np.testing.assert_allclose(np.linalg.norm(result.turning.normals, axis=1), 1.0)
+    assert len(result.turning) > len(result.events)
+
+
+@pytest.mark.parametrize("name", ["flight_back", "flight_two_balls", "own/shot_slow_top"])
+def test_what_is_taken_at_the_rim_is_the_logos(samples: Path, name: str) -> None:
+    """By the labels of two simulators."""
+    session = Session.open(samples / f"{name}.h5", Choices())
+    assert session.truth is not None
+    every, label = session.source.events, session.truth.label
+    logo_at = {
+        (int(every.t_us[k]), int(every.x_px[k]), int(every.y_px[k])) for k in np.flatnonzero(label == LOGO_LABEL)
+    }
+    taken, right = 0, 0
+    for tick in session.ticks(forget=("surface",), without=("contrast",)):
+        deep = set(tick.logo.events.t_us.tolist())
+        turning = tick.logo.turning
+        rim = np.array([t not in deep for t in turning.t_us.tolist()], np.bool_)
+        # The pixel of an event is where its point on the ball is seen.
+        points = _points_m(session, tick.track, turning)[rim]
+        seen = np.round(session.camera.project(points)).astype(int) if len(points) else np.empty((0, 2), int)
+        taken += len(seen)
+        right += sum((int(t), int(x), int(y)) in logo_at for t, (x, y) in zip(turning.t_us[rim], seen, strict=True))
+    assert taken > 80 and right >= 0.98 * taken
+
+
+def _points_m(session: Session, track: TrackResult, turning: TurningEvents) -> np.ndarray:
+    centre = session.camera.ball_centre_m(
+        turning.centre_x_px, turning.centre_y_px, np.full(len(turning), track.mean[4]), session.ball_radius_m
+    )
+    return centre + session.ball_radius_m * turning.normals
