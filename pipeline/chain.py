@@ -246,6 +246,11 @@ class Chain:
         del keys["packet"]
         return keys
 
+    def knows(self, parameters: Parameters, name: str) -> bool:
+        """Whether a stage's results of every tick so far are kept."""
+        column = self._columns.get(self.keys(parameters)[name])
+        return column is not None and len(column.results) >= self.tick_count(parameters)
+
     def _column(self, key: Hashable, name: str, parameters: Parameters, setting: Setting) -> _Column:
         column = self._columns.get(key)
         if column is None or column.length > len(column.results):  # the latter: a run that forgot left it

@@ -23,7 +23,7 @@ from pipeline.chain import STAGES, Chain, EventSource, Parameters, Source, Tick
 from pipeline.errors import ParameterError
 from pipeline.results import Packet, Truth
 
-SUFFIXES = (".h5", ".hdf5", ".raw", ".npz", ".aedat4", ".db3", ".bag")  # of recordings
+SUFFIXES = (".h5", ".hdf5", ".raw", ".dat", ".npz")  # of recordings that are read
 # Takes longest, and no other stage reads it: computed last, or not at all where nobody asks for spins.
 LATE = ("contrast",)
 CHAIN_BYTES = 160_000_000  # a clip's columns: eight surfaces of a flight of 100 ms
@@ -107,6 +107,11 @@ class Clip:
     def keys(self, parameters: Parameters) -> dict[str, Hashable]:
         """What each stage's results are made from, compared by value."""
         return self.session.chain.keys(parameters)
+
+    def knows(self, parameters: Parameters, stages: Collection[str]) -> bool:
+        """Whether these stages' results are all there."""
+        with self.lock:
+            return all(self.session.chain.knows(parameters, stage) for stage in stages)
 
     def cost_of(self, parameters: Parameters) -> dict[str, float]:
         """Seconds each stage took with these parameters when it was computed; absent where it never was."""

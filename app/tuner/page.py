@@ -24,8 +24,6 @@ REPORT_S = 0.05  # a page learns of a run's progress this often
 # The rest of a clip is worth waiting for when it takes no longer than an eye needs to see a change.
 REST_WORTH_WAITING_S = 0.25
 PICTURES_KEPT = 3
-# A dragged slider waits so long for the late stages: they are there, or take half a second.
-LATE_WORTH_WAITING_S = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,14 +180,13 @@ class Page:
                 if rest_s > REST_WORTH_WAITING_S:
                     self._show(wanted, clip, Finished.of(session, ticks), a, report, partial=True)
         early, ticks = Finished.of(session, ticks), []
-        self._drawings.begin(early.run, clip.keys(parameters))
-        began, is_waiting = time.perf_counter(), is_shown and wanted.hasty
+        if is_shown and wanted.hasty and not clip.knows(parameters, LATE):
+            self._show(wanted, clip, early, a, report, partial=True)
+        else:
+            self._drawings.begin(early.run, clip.keys(parameters))
         for tick in self._steps(clip, parameters, wanted, report, ()):
             ticks.append(tick)
             report.tell("computing", len(ticks) / count)
-            if is_waiting and time.perf_counter() - began > LATE_WORTH_WAITING_S:
-                is_waiting = False
-                self._show(wanted, clip, early, a, report, partial=True)
         return Finished.of(session, ticks)
 
     def _steps(
@@ -246,6 +243,7 @@ class Page:
             pinned_measures=None if a is None else _measured(clip, a),
             differs=[] if a is None else differences(a.session.parameters, b.session.parameters),
         )
+        self._drawings.keep_budget()
 
     def _is_old(self, wanted: Wanted) -> bool:
         return self._closed or wanted.serial != self._newest

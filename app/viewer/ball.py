@@ -50,7 +50,7 @@ def _mesh(run: Run) -> Chunk:
 
 def _motion(run: Run) -> list[Chunk]:
     """Place and attitude of the ball between the ticks: carried on from the last tick, as a robot would have it."""
-    times, places, axes, angles = [], [], [], []
+    times, places, quaternions = [], [], []
     for index, (tick, start_us) in enumerate(zip(run.ticks, shot_starts(run), strict=True)):
         if start_us is None:
             continue
@@ -60,23 +60,24 @@ def _motion(run: Run) -> list[Chunk]:
         ahead[:, :2] = tick.track.mean[2:4] * ((t_us - tick.packet.end_us) * 1e-6)[:, None]
         times.append(t_us)
         places.append(run.centre_m(tick.track.mean + ahead))
-        spin = vector_of(shown_estimate(tick)[0])
-        magnitude = float(np.linalg.norm(spin))
-        axes.append(np.tile(spin / magnitude if magnitude else (0.0, 0.0, 1.0), (t_us.size, 1)))
-        angles.append(2 * np.pi * magnitude * (t_us - start_us) * 1e-6)
+        quaternions.append(_turned_by(vector_of(shown_estimate(tick)[0]), (t_us - start_us) * 1e-6))
     if not times:
         return [columns_at(at.BALL, run.times_us[:1], rr.Transform3D.columns(translation=[[0.0, 0.0, 1.0]]))]
     t_us = np.concatenate([*([run.times_us[:1]] if times[0][0] > run.start_us else []), *times])
     rows = np.maximum(np.arange(t_us.size) - (t_us.size - sum(map(len, times))), 0)
-    place = np.concatenate(places)[rows]
-    turns = [
-        rr.RotationAxisAngle(axis=axis, radians=angle)
-        for axis, angle in zip(np.concatenate(axes)[rows], np.concatenate(angles)[rows], strict=True)
-    ]
+    place, quaternion = np.concatenate(places)[rows], np.concatenate(quaternions)[rows]
     return [
         columns_at(at.BALL, t_us, rr.Transform3D.columns(translation=place)),
-        columns_at(at.BODY, t_us, rr.Transform3D.columns(rotation_axis_angle=turns)),
+        columns_at(at.BODY, t_us, rr.Transform3D.columns(quaternion=quaternion)),
     ]
+
+
+def _turned_by(spin_rps: Floats, seconds: Floats) -> Floats:
+    """(n, 4) the attitude after these times (n,) as quaternions x, y, z, w."""
+    magnitude = float(np.linalg.norm(spin_rps))
+    half = np.pi * magnitude * seconds
+    axis = spin_rps / magnitude if magnitude else np.array([0.0, 0.0, 1.0])
+    return np.column_stack([np.sin(half)[:, None] * axis, np.cos(half)])
 
 
 def _arrows(run: Run) -> list[Chunk]:

@@ -109,14 +109,21 @@ def _heat(directions: Floats, scores: Floats) -> bytes:
     """PNG: at every axis the mean of the scores around it, dark = none, light = the highest."""
     mean = _weights(directions.astype(np.float32).tobytes()) @ scores.astype(np.float32)
     grey = np.clip(BRIGHTEST * mean / max(float(scores.max()), 1e-9), 0, BRIGHTEST).astype(np.uint8)
-    size = (2 * DISC_RADIUS_PX, 2 * DISC_RADIUS_PX)
-    discs = [cv2.applyColorMap(cv2.resize(half, size), cv2.COLORMAP_BONE) for half in grey]
-    disc = np.zeros(size, np.uint8)
-    cv2.circle(disc, (DISC_RADIUS_PX, DISC_RADIUS_PX), DISC_RADIUS_PX, 1, cv2.FILLED)
-    picture = np.full((size[1], AXES_WIDTH_PX, 3), at.BACKGROUND, np.uint8)
-    picture[:, : size[0]][disc > 0] = discs[0][disc > 0]
-    picture[:, -size[0] :][disc > 0] = discs[1][disc > 0]
+    side = 2 * DISC_RADIUS_PX
+    values = np.zeros((side, AXES_WIDTH_PX), np.uint8)
+    values[:, :side], values[:, -side:] = (cv2.resize(half, (side, side)) for half in grey)
+    picture = np.full((side, AXES_WIDTH_PX, 3), at.BACKGROUND[0], np.uint8)
+    cv2.copyTo(cv2.applyColorMap(values, cv2.COLORMAP_BONE), _discs(), picture)
     return bytes(cv2.imencode(".png", picture, PNG_QUICK)[1])
+
+
+@cache
+def _discs() -> NDArray[np.uint8]:
+    """Where the two discs are in the picture: 1, else 0."""
+    mask = np.zeros((2 * DISC_RADIUS_PX, AXES_WIDTH_PX), np.uint8)
+    for x in (DISC_RADIUS_PX, AXES_WIDTH_PX - DISC_RADIUS_PX):
+        cv2.circle(mask, (x, DISC_RADIUS_PX), DISC_RADIUS_PX, 1, cv2.FILLED)
+    return mask
 
 
 @lru_cache(4)  # contrast scores the same directions again and again

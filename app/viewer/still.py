@@ -21,60 +21,6 @@ MAP_PX = (180, 90)  # 2 degrees a pixel
 GAP_PX = 10
 
 
-def turned(vectors: Floats, spin_rps: Floats, seconds: Floats) -> Floats:
-    """(n, 3) vectors, each turned by the spin (3,) for its own time (n,) (Rodrigues' formula)."""
-    magnitude = float(np.linalg.norm(spin_rps))
-    if magnitude == 0:
-        return vectors
-    axis = spin_rps / magnitude
-    angle = (2 * np.pi * magnitude) * seconds[:, None]
-    along = (vectors @ axis)[:, None] * axis
-    turned_vectors: Floats = along + np.cos(angle) * (vectors - along) + np.sin(angle) * np.cross(axis, vectors)
-    return turned_vectors
-
-
-def density(normals: Floats) -> NDArray[np.float32]:
-    """How often the unit vectors (n, 3) fall in each cell of the cube, smoothed: (CELLS**3,) float32."""
-    cells = (_place(normals) + 0.5).astype(np.int64)
-    flat = (cells[:, 0] * CELLS + cells[:, 1]) * CELLS + cells[:, 2]
-    counts = np.bincount(flat, minlength=CELLS**3).astype(np.float32)
-    for stride in (1, CELLS, CELLS * CELLS):  # weights 1 2 1 along each side; the cube's sides are empty
-        smooth = 2 * counts
-        smooth[stride:] += counts[:-stride]
-        smooth[:-stride] += counts[stride:]
-        counts = smooth
-    whole: NDArray[np.float32] = counts / np.float32(64)
-    return whole
-
-
-def _place(directions: Floats) -> Floats:
-    """Where unit vectors lie among the centres of the cells, two cells away from the cube's sides."""
-    return directions * (0.5 * CELLS - 3) + (0.5 * CELLS - 0.5)
-
-
-class Sampler:
-    """Reads densities in given directions, linear between the centres of the cells."""
-
-    def __init__(self, directions: Floats) -> None:
-        """directions : (..., 3) unit vectors."""
-        place = _place(directions.reshape(-1, 3))
-        cell = np.floor(place).astype(np.int64)
-        part = place - cell
-        corners, weights = [], []
-        for corner in np.ndindex(2, 2, 2):
-            at = cell + corner
-            corners.append((at[:, 0] * CELLS + at[:, 1]) * CELLS + at[:, 2])
-            weights.append(np.prod(np.where(np.array(corner), part, 1 - part), axis=-1))
-        self._shape = directions.shape[:-1]
-        self._corners = np.array(corners)
-        self._weights = np.array(weights, np.float32)
-
-    def __call__(self, smooth: NDArray[np.float32]) -> NDArray[np.float32]:
-        """(...) the density in every direction."""
-        found: NDArray[np.float32] = np.einsum("kn,kn->n", self._weights, smooth.take(self._corners))
-        return found.reshape(self._shape)
-
-
 def texture_directions() -> Floats:
     """(height, width, 3) unit vectors in the body frame behind the texels of the ball's texture.
 
@@ -142,11 +88,3 @@ def disc_directions(middle: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     gap[..., 2] = 1
     mask = np.hstack([on_disc, np.zeros((DISC_PX, GAP_PX), np.bool_), on_disc])
     return np.hstack([front, gap, back]), mask
-
-
-def tone(counts: NDArray[np.float32], full: float) -> NDArray[np.float32]:
-    """Counts as 0..1: nothing below a tenth of `full`, which is noise, and all of the colour from `full` on."""
-    if full <= 0:
-        return np.zeros_like(counts)
-    shades: NDArray[np.float32] = (counts * np.float32(1 / full) - np.float32(0.1)) * np.float32(1 / 0.9)
-    return shades.clip(0, 1)

@@ -80,29 +80,31 @@ class Drawings:
         last_first = [self._drawn(drawer, run, key) for drawer, _, key in reversed(_wanted(run, keys))]
         return [chunk for drawn in reversed(last_first) for chunk in drawn.result()]
 
-    def _drawn(self, drawer: Drawer, run: Run, key: Hashable) -> Future[list[Chunk]]:
+    def keep_budget(self) -> None:
+        """Forget what was not asked for longest. For when nobody waits: the sizes take a tenth of the drawing."""
         with self._lock:
-            if key not in self._made:
-                self._made[key] = self._threads.submit(self._draw, drawer, run, key)
-            self._made.move_to_end(key)
-            return self._made[key]
-
-    def _draw(self, drawer: Drawer, run: Run, key: Hashable) -> list[Chunk]:
-        try:
-            drawn = drawer(run)
-        except BaseException:
-            with self._lock:
-                self._made.pop(key, None)
-            raise
+            new = [(key, drawn) for key, drawn in self._made.items() if key not in self._sizes and _is_there(drawn)]
+        sizes = {key: sum(chunk.to_record_batch().nbytes for chunk in drawn.result()) for key, drawn in new}
         with self._lock:
-            self._sizes[key] = sum(chunk.to_record_batch().nbytes for chunk in drawn)
+            self._sizes |= {key: size for key, size in sizes.items() if key in self._made}
             total = sum(self._sizes.values())
-            for old in [old for old in self._made if old in self._sizes and old != key]:
+            for old in [key for key in self._made if key in self._sizes][:-1]:
                 if total <= self._budget_bytes:
                     break
                 total -= self._sizes.pop(old)
                 del self._made[old]
-        return drawn
+
+    def _drawn(self, drawer: Drawer, run: Run, key: Hashable) -> Future[list[Chunk]]:
+        with self._lock:
+            drawn = self._made.get(key)
+            if drawn is None or (drawn.done() and not _is_there(drawn)):
+                drawn = self._made[key] = self._threads.submit(drawer, run)
+            self._made.move_to_end(key)
+            return drawn
+
+
+def _is_there(drawn: Future[list[Chunk]]) -> bool:
+    return drawn.done() and not drawn.cancelled() and drawn.exception() is None
 
 
 def _wanted(run: Run, keys: Mapping[str, Hashable]) -> list[tuple[Drawer, str, Hashable]]:

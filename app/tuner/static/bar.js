@@ -38,6 +38,7 @@ export class Bar {
       done: `${milliseconds(total)}${bytes ? `, ${(bytes / 1e6).toFixed(1)} MB` : ""}`,
       failed: error,
     }[state];
+    this.status.title = this.status.textContent;
   }
 
   say(text) {
@@ -46,4 +47,4 @@ export class Bar {
   }
 }
 
-export const milliseconds = (ms) => (ms < 9.95 ? `${ms.toFixed(1)} ms` : ms < 9950 ? `${ms.toFixed(0)} ms` : `${(ms / 1000).toFixed(1)} s`);
+export const milliseconds = (ms) => (ms < 9.95 ? `${ms.toFixed(1)} ms` : ms < 999.5 ? `${ms.toFixed(0)} ms` : `${(ms / 1000).toFixed(1)} s`);

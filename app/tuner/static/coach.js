@@ -28,7 +28,7 @@ export class Coach {
     this.end.hidden = this.words.hidden = false;
     this.#say();
     await byId("middle").requestFullscreen?.().catch(() => {});
-    this.#playhead = await this.viewer.playhead_us();
+    this.#playhead = this.viewer.playhead_us;
     // The page's own words are larger than the card among the pictures.
     this.#before = await this.viewer.alone("Coach", "/coach");
     await this.viewer.play("playing");

@@ -9,7 +9,7 @@ export async function linkOf({ connection, settings, viewer, opening, biases }, 
     for (const text of assignments(settings.pinned, opening.presets.opened)) words.append("a", text);
   }
   if (String(settings.clip) !== String(opening.recording.clip_us)) words.set("clip", settings.clip.join("-"));
-  const time = await viewer.playhead_us();
+  const time = viewer.playhead_us;
   if (time !== null) words.set("t", Math.round(time));
   const changed = Object.entries(biases.values).filter(([name, value]) => value !== opening.biases.values[name]);
   for (const [name, value] of changed) words.append("bias", `${name}:${value}`);

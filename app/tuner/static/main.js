@@ -54,7 +54,7 @@ async function start() {
   app.coach = new Coach(app);
   new Saving(app);
   new Controls(byId("controls"), opening.sections, settings);
-  app.runner = new Runner(connection, settings, () => viewer.playhead_us());
+  app.runner = new Runner(connection, settings, () => viewer.playhead_us);
   listen(link);
   viewer.start(opening.viewer, byId("viewer")).catch((error) => {
     app.runner.isBlind = true; // the numbers are still there
@@ -158,7 +158,7 @@ function listen(link) {
   app.overview.addEventListener("choose", ({ detail }) => chooseClip(...detail));
   app.overview.addEventListener("shot", ({ detail }) => chooseClip(detail[0] - MARGIN_US, detail[1] + MARGIN_US));
   document.addEventListener("keydown", shortcuts);
-  setInterval(async () => app.overview.move(await viewer.playhead_us()), 200);
+  viewer.addEventListener("moved", ({ detail }) => app.overview.move(detail));
   buttons();
 }
 

@@ -58,7 +58,7 @@ export class Runner extends EventTarget {
     this.#last = JSON.stringify(this.#what());
     const wish = { serial: ++this.#serial, ...JSON.parse(this.#last), hasty };
     try {
-      await post(connection.path("run"), { ...wish, playhead_us: await this.playhead() });
+      await post(connection.path("run"), { ...wish, playhead_us: this.playhead() });
     } catch (error) {
       this.#running = false;
       this.#last = null;

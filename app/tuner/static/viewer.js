@@ -15,13 +15,18 @@ function stayAtHome() {
   };
 }
 
+const storeOf = (id) => `Recording:${APPLICATION}:${id}`;
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
 export class Viewer extends EventTarget {
   #viewer = null;
   #channel = null;
   #queue = Promise.resolve();
-  #playhead = null;
+  #sent = new Set(); // ids of the recordings in the viewer
+  #shown = null; // the one that is seen
+  // Where that stands, as the viewer tells of every move: asking it would have it paint, which takes long in software.
+  #time_ns = null;
+  #play = "paused";
 
   // Loads the viewer; whatever else is asked of it meanwhile waits.
   start(version, parent) {
@@ -40,6 +45,7 @@ export class Viewer extends EventTarget {
     await ready;
     this.#viewer = viewer;
     this.#channel = viewer.open_channel("spinscope");
+    this.#follow();
     for (const panel of ["top", "blueprint", "selection"]) viewer.override_panel_state(panel, "hidden");
   }
 
@@ -54,52 +60,73 @@ export class Viewer extends EventTarget {
     return this.#next(() => this.#channel.send_rrd(bytes));
   }
 
-  // Where the viewer stands: {store, time in ns or null, playing}; null when nothing is shown.
-  async where() {
-    const state = await this.#viewer.get_state();
-    const recording = state.recordings.find(({ store_id }) => store_id === state.active_store_id);
-    if (!recording) return null;
-    const time = recording.current_time?.timeline === TIMELINE ? recording.current_time.time : undefined;
-    const value = typeof time === "object" ? time?.value : time;
-    return {
-      store: recording.store_id,
-      time: value === undefined ? null : BigInt(value),
-      play: recording.play_state,
-      speed: recording.playback_speed,
-      state,
-    };
+  #follow() {
+    const told = (kind, note) => this.#viewer.on(kind, (event) => event.recording_id === this.#shown && note(event));
+    told("time_update", ({ time }) => this.#moved(time));
+    told("play", () => (this.#play = "playing"));
+    told("pause", () => (this.#play = "paused"));
   }
 
-  async playhead_us() {
-    try {
-      const where = this.#viewer && (await this.where());
-      if (where?.time !== null && where?.time !== undefined) this.#playhead = Number(where.time) / 1000;
-    } catch {
-      // Busy painting: the last known place is near enough.
-    }
-    return this.#playhead;
+  #moved(time_ns) {
+    this.#time_ns = time_ns;
+    this.dispatchEvent(new CustomEvent("moved", { detail: this.playhead_us }));
+  }
+
+  // Where the playhead is; null while nothing is shown.
+  get playhead_us() {
+    return this.#time_ns === null ? null : this.#time_ns / 1000;
   }
 
   // Show a recording in place of the present one, at the same playhead; at `time_us` when there is none.
-  show(bytes, recordingId, time_us) {
+  show(bytes, id, time_us) {
     return this.#next(async () => {
-      const before = await this.where();
+      const taken = this.#taken_in(id);
+      this.#sent.add(id);
       this.#channel.send_rrd(bytes);
-      const duration_nanos = before?.time ?? BigInt(Math.round(time_us * 1000));
-      const recording = `Recording:${APPLICATION}:${recordingId}`;
-      await this.#once_there({ recording, timeline: TIMELINE, duration_nanos, play_state: before?.play ?? "paused" });
-      const old = before?.state.recordings.map(({ store_id }) => store_id).filter((id) => id !== recording) ?? [];
-      if (old.length) await this.#viewer.close({ store_ids: old });
-      this.dispatchEvent(new CustomEvent("shown", { detail: recordingId }));
+      await this.#awake(taken);
+      const time_ns = Math.round(this.#time_ns ?? time_us * 1000);
+      const time = { timeline: TIMELINE, duration_nanos: BigInt(time_ns), play_state: this.#play };
+      const old = [...this.#sent].filter((other) => other !== id);
+      // Both at once: each for itself would have it paint once more.
+      const closing = old.length ? this.#viewer.close({ store_ids: old.map(storeOf) }) : null;
+      await Promise.all([this.#viewer.set_time({ recording: storeOf(id), ...time }), closing]);
+      this.#sent = new Set([id]);
+      this.#shown = id;
+      this.#moved(time_ns);
+      await new Promise(requestAnimationFrame); // what was set is drawn now
+    });
+  }
+
+  // Has the viewer paint until something happened: data alone does not always wake it.
+  async #awake(happened) {
+    let waiting = true;
+    const over = () => (waiting = false);
+    happened.then(over, over);
+    while (waiting) {
+      await this.#viewer.get_state().catch(() => {}); // busy painting
+      await pause(POLL_MS);
+    }
+    return happened;
+  }
+
+  // The viewer takes a recording in with its next picture, and knows nothing of it until then.
+  #taken_in(id) {
+    return new Promise((resolve, reject) => {
+      const late = setTimeout(() => reject(new Error("the viewer does not take the recording in")), PATIENCE_MS);
+      const stop = this.#viewer.on("recording_open", ({ recording_id }) => {
+        if (recording_id !== id) return;
+        clearTimeout(late);
+        stop();
+        resolve();
+      });
     });
   }
 
   seek(time_us, play_state = "paused") {
     return this.#next(async () => {
-      const where = await this.where();
-      if (!where) return;
+      if (this.#shown === null) return;
       const duration_nanos = BigInt(Math.round(time_us * 1000));
-      await this.#viewer.set_time({ recording: where.store, timeline: TIMELINE, duration_nanos, play_state });
+      await this.#viewer.set_time({ recording: storeOf(this.#shown), timeline: TIMELINE, duration_nanos, play_state });
     });
   }
 
@@ -111,11 +138,11 @@ export class Viewer extends EventTarget {
   // `together` takes to undo it.
   alone(name, left_out) {
     return this.#next(async () => {
-      const where = await this.where();
+      if (this.#shown === null) return null;
       const blueprint = await this.#layout();
       const tab = tabs(blueprint).find(({ title }) => title === name);
-      if (!where || !tab) return null;
-      await this.#take(only(blueprint, tab.id, left_out), where);
+      if (!tab) return null;
+      await this.#take(only(blueprint, tab.id, left_out));
       this.#viewer.override_panel_state("time", "hidden");
       return blueprint;
     });
@@ -124,13 +151,12 @@ export class Viewer extends EventTarget {
   together(blueprint) {
     return this.#next(async () => {
       this.#viewer.override_panel_state("time", null);
-      const where = await this.where();
-      if (blueprint && where) await this.#take(blueprint, where);
+      if (blueprint) await this.#take(blueprint);
     });
   }
 
-  #take(blueprint, { store }) {
-    return this.#viewer.set_blueprint(blueprint, { kind: "recording", recording: store });
+  #take(blueprint) {
+    return this.#viewer.set_blueprint(blueprint, { kind: "recording", recording: storeOf(this.#shown) });
   }
 
   // The layout; right after its recording the viewer may still show one of its own making, without our tabs.
@@ -143,21 +169,10 @@ export class Viewer extends EventTarget {
     }
   }
 
-  // The name of the tab in front, and bringing another one there.
+  // The name of the tab in front.
   async tab() {
     const blueprint = await this.#layout();
     return tabs(blueprint).find(({ front }) => front)?.title ?? null;
-  }
-
-  takeTab(name) {
-    return this.#next(async () => {
-      const where = await this.where();
-      const blueprint = await this.#layout();
-      const found = tabs(blueprint).find(({ title }) => title === name);
-      if (!where || !found) return;
-      rootOf(blueprint).active_tab = `container/${found.id}`;
-      await this.#take(blueprint, where);
-    });
   }
 
   // PNG of what is seen. The canvas keeps its picture until the browser has shown it: it is copied right after it
@@ -176,23 +191,6 @@ export class Viewer extends EventTarget {
       }
       throw new Error("the browser does not give the picture: take a screenshot instead");
     });
-  }
-
-  // The viewer takes a recording in with its next picture: until then it knows nothing of it.
-  async #once_there(time) {
-    const until = performance.now() + PATIENCE_MS;
-    for (;;) {
-      try {
-        return await this.#viewer.set_time(time);
-      } catch (error) {
-        if (performance.now() > until) throw error;
-        await pause(POLL_MS);
-      }
-    }
-  }
-
-  async state() {
-    return this.#viewer.get_state();
   }
 
   get api() {

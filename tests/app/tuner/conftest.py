@@ -52,9 +52,9 @@ class Served:
         client.http.close()
 
 
-def served(path: Path, port: int = 0) -> Served:
+def served(path: Path, port: int = 0, choices: Choices | None = None) -> Served:
     """Start serving a recording."""
-    workshop = Workshop(path, Choices())
+    workshop = Workshop(path, choices or Choices())
     listening = _listening_socket(port)
     config = uvicorn.Config(application(workshop), log_level="error", timeout_graceful_shutdown=2)
     server = uvicorn.Server(config)

@@ -73,6 +73,13 @@ class Tab:
         slider = self.page.locator(f"[data-name='{name}'] input[type=range]")
         self.after(lambda: slider.press(key), what)
 
+    def until(self, holds: str) -> None:
+        """Wait until an expression holds in the page."""
+        end = time.monotonic() + 30
+        while not self.page.evaluate(holds):
+            assert time.monotonic() < end, holds
+            self.page.wait_for_timeout(30)
+
     def value(self, name: str) -> Any:
         return self.page.evaluate(f"window.spinscope.settings.get('{name}')")
 
@@ -84,7 +91,11 @@ class Tab:
     def where(self) -> dict[str, Any]:
         """Playhead (us) and play state of the viewer."""
         found: dict[str, Any] = self.page.evaluate(
-            "window.spinscope.viewer.where().then((w) => ({time: Number(w.time) / 1000, play: w.play}))"
+            """window.spinscope.viewer.api.get_state().then((state) => {
+                const found = state.recordings.find(({ store_id }) => store_id === state.active_store_id);
+                const { time } = found.current_time;
+                return { time: Number(typeof time === "object" ? time.value : time) / 1000, play: found.play_state };
+            })"""
         )
         return found
 
@@ -182,9 +193,46 @@ def test_the_playhead_stays_where_it_is_paused_and_playing(tab: Tab) -> None:
     assert tab.where()["play"] == "playing"
     assert tab.where()["time"] != 6345
     tab.page.evaluate("window.spinscope.viewer.play('paused')")
-    state = tab.page.evaluate("window.spinscope.viewer.state().then((s) => s.recordings.length)")
-    assert state == 1  # the old recordings are closed
+    count = tab.page.evaluate("window.spinscope.viewer.api.get_state().then((state) => state.recordings.length)")
+    assert count == 1  # the old recordings are closed
     assert tab.page.evaluate("window.spinscope.viewer.tab()") == "Tracker"
+
+
+def test_the_page_knows_the_playhead_without_asking_the_viewer(tab: Tab) -> None:
+    """Each question would have it painted anew; it follows a click in the strip and what the viewer plays."""
+    tab.page.evaluate("window.spinscope.viewer.seek(40000)")
+    tab.until("window.spinscope.viewer.playhead_us === 40000")
+    asked = """(() => {
+        const api = window.spinscope.viewer.api, ask = api.get_state.bind(api);
+        window.asked = 0;
+        api.get_state = () => (window.asked++, ask());
+    })()"""
+    tab.page.evaluate(asked)
+    box = tab.page.locator("#overview svg").bounding_box()
+    tab.page.mouse.click(box["x"] + 0.7 * box["width"], box["y"] + 20)
+    tab.until("window.spinscope.viewer.playhead_us > 60000")
+    tab.slide("logo.pad_px")
+    assert tab.page.evaluate("window.asked") <= 1  # at most for the picture that has come by now
+    tab.settled("shown")
+    assert tab.where()["time"] == tab.page.evaluate("window.spinscope.viewer.playhead_us")
+
+
+def test_a_changed_playback_speed_survives_a_change(tab: Tab) -> None:
+    change = """(async () => {
+        const { viewer } = window.spinscope, { api } = viewer;
+        const { blueprint } = await api.get_blueprint(), { active_store_id } = await api.get_state();
+        blueprint["/time_panel"].TimePanelBlueprint.playback_speed = 0.05;
+        await api.set_blueprint(blueprint, { kind: "recording", recording: active_store_id });
+    })()"""
+    speed = (
+        "window.spinscope.viewer.api.get_blueprint()"
+        '.then(({ blueprint }) => blueprint["/time_panel"].TimePanelBlueprint.playback_speed)'
+    )
+    assert tab.page.evaluate(speed) == pytest.approx(0.01)
+    tab.page.evaluate(change)
+    assert tab.page.evaluate(speed) == pytest.approx(0.05)
+    tab.slide("logo.pad_px", what="shown")
+    assert tab.page.evaluate(speed) == pytest.approx(0.05)
 
 
 def test_typing_reset_undo_and_redo(tab: Tab) -> None:

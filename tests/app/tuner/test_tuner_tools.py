@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from app.session import Choices
 from app.simulate import simulate_to_file
 from app.tuner.biases import known_biases
 from app.tuner.controls import scale_of, sections
@@ -191,3 +192,19 @@ def test_recordings_with_bias_files_beside_them_give_measured_rates(
     client.post("bias_curve", biases={}, name="diff_on")
     failed = client.wait("bias_curve", lambda m: m["state"] == "failed")
     assert "no recording of this folder" in failed["error"]
+
+
+def test_the_window_of_the_opened_recording_is_not_asked_of_the_folders_others(samples: Path, tmp_path: Path) -> None:
+    for name in ("flight_back", "flight_fast_top"):  # 113 and 96 ms long
+        (tmp_path / f"{name}.h5").symlink_to(samples / f"{name}.h5")
+        (tmp_path / f"{name}.bias").write_text("10 % bias_diff_on\n", encoding="utf-8")
+    (tmp_path / "take.bag").write_bytes(b"#ROSBAG V2.0\n")
+    tuner = served(tmp_path / "flight_back.h5", choices=Choices(window_us=(97_000, 113_000)))
+    try:
+        page = tuner.open()
+        assert page.opening["recordings"] == ["flight_back.h5", "flight_fast_top.h5"]
+        page.post("bias_curve", biases={}, name="diff_on")
+        done = page.wait("bias_curve", lambda m: m["state"] == "done")
+        assert [point.get("error") for point in done["points"]] == [None, None]
+    finally:
+        tuner.stop()

@@ -8,8 +8,9 @@ import pytest
 from app.viewer import entities
 from app.viewer.recorded import write_rrd
 from app.viewer.run import Run, shown_estimate
-from app.viewer.still import TEXTURE_PX, turned
+from app.viewer.still import TEXTURE_PX
 from tests.app.viewer.reading import Rows, read_back
+from tests.naive_still import turned
 
 
 @pytest.fixture(scope="module")
@@ -37,9 +38,9 @@ def test_the_ball_turns_as_its_spin_says(flight: Run, logged: dict[str, Rows]) -
     points = np.eye(3)
 
     def attitude(t_us: int) -> np.ndarray:
-        (rotation,) = logged[entities.BODY].at("rotation_axis_angle", t_us)
-        axis, angle = np.array(rotation["axis"]), rotation["angle"]
-        return turned(points, axis, np.full(3, angle / (2 * np.pi)))
+        (quaternion,) = logged[entities.BODY].at("quaternion", t_us)
+        axis, sine = np.array(quaternion[:3]), np.linalg.norm(quaternion[:3])
+        return turned(points, axis / sine, np.full(3, np.arctan2(sine, quaternion[3]) / np.pi))
 
     before, after = attitude(tick.packet.end_us), attitude(tick.packet.end_us + 1000)
     np.testing.assert_allclose(after, turned(before, estimate.vector_rps, np.full(3, 1e-3)), atol=1e-4)

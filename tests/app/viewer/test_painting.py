@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from app.viewer import entities
 from app.viewer.recorded import write_rrd
 from app.viewer.run import Run
-from app.viewer.still import MAP_PX, map_directions, map_frame, turned
+from app.viewer.still import MAP_PX, map_directions, map_frame
 from tests.app.viewer.reading import read_back
+from tests.naive_still import turned
 
 numbers = st.floats(-1, 1, allow_nan=False)
 vectors = st.tuples(numbers, numbers, numbers).map(np.array).filter(lambda v: np.linalg.norm(v) > 0.1)

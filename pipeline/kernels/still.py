@@ -1,0 +1,136 @@
+"""The logo with the spin taken out: events turned back to one moment, counted around the ball, read and coloured.
+
+Directions are unit vectors from the ball's centre. They are counted in the cells of a cube around the unit sphere, of
+`side` cells along an edge. A density is a float32 array (side, side, side, 3): how often OFF and ON events fall in each
+cell, smoothed with weights 1/4 1/2 1/4 along each axis (integers over 64, which float32 holds exactly), and 1 where a
+direction between this cell's centre and the next ones' has any density, else 0.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
+Bytes = NDArray[np.uint8]
+
+NOISE_SHARE = 0.1  # of the full count: below it there is no colour
+FULL_RANK = 0.95  # of the marked places: what a twentieth of them exceed has full colour
+
+
+@njit(cache=True, nogil=True)
+def _place(direction: float, side: int) -> float:
+    """Where a coordinate of a unit vector lies among the centres of the cells, two cells away from the cube's sides."""
+    return direction * (0.5 * side - 3.0) + (0.5 * side - 0.5)
+
+
+@njit(cache=True, nogil=True)
+def turn_back_and_count(
+    density: Singles, normals: Floats, on: NDArray[np.bool_], seconds: Floats, spin_rps: Floats
+) -> None:
+    """Fill density with events whose normals (n, 3) are turned by the spin (3,), each for its own seconds (n,).
+
+    Negative seconds turn back. Counts first, then spreads the few cells that have any: 3 x as fast as turning the
+    events and smoothing the whole cube with numpy.
+    """
+    side = density.shape[0]
+    density[:] = 0.0
+    counts = np.zeros((side, side, side, 2), np.int32)
+    touched = np.empty((normals.shape[0], 4), np.int16)
+    marked = 0
+    magnitude = math.sqrt(spin_rps[0] ** 2 + spin_rps[1] ** 2 + spin_rps[2] ** 2)
+    ax, ay, az = 0.0, 0.0, 1.0
+    if magnitude > 0.0:
+        ax, ay, az = spin_rps[0] / magnitude, spin_rps[1] / magnitude, spin_rps[2] / magnitude
+    for e in range(normals.shape[0]):
+        angle = 2.0 * math.pi * magnitude * seconds[e]
+        cosine, sine = math.cos(angle), math.sin(angle)
+        nx, ny, nz = normals[e, 0], normals[e, 1], normals[e, 2]
+        along = (nx * ax + ny * ay + nz * az) * (1.0 - cosine)  # Rodrigues' formula
+        x = nx * cosine + (ay * nz - az * ny) * sine + ax * along
+        y = ny * cosine + (az * nx - ax * nz) * sine + ay * along
+        z = nz * cosine + (ax * ny - ay * nx) * sine + az * along
+        i, j, k = int(_place(x, side) + 0.5), int(_place(y, side) + 0.5), int(_place(z, side) + 0.5)
+        p = 1 if on[e] else 0
+        if counts[i, j, k, p] == 0:
+            touched[marked, 0], touched[marked, 1], touched[marked, 2], touched[marked, 3] = i, j, k, p
+            marked += 1
+        counts[i, j, k, p] += 1
+    for m in range(marked):
+        i, j, k, p = touched[m, 0], touched[m, 1], touched[m, 2], touched[m, 3]
+        share = np.float32(counts[i, j, k, p] / 64.0)
+        for di in range(-1, 2):
+            for dj in range(-1, 2):
+                for dk in range(-1, 2):
+                    weight = np.float32((2 - abs(di)) * (2 - abs(dj)) * (2 - abs(dk)))
+                    density[i + di, j + dj, k + dk, p] += weight * share
+        density[i - 2 : i + 2, j - 2 : j + 2, k - 2 : k + 2, 2] = 1.0
+
+
+@njit(cache=True, nogil=True)
+def read_density(found: Singles, density: Singles, directions: Floats, frame: Floats) -> None:
+    """Fill found (2, n): the densities of OFF and ON in every direction, linear between the centres of the cells.
+
+    directions : (n, 3) in the frame whose axes, in that of the density, are the rows of frame (3, 3)
+    """
+    side = density.shape[0]
+    for n in range(directions.shape[0]):
+        a, b, c = directions[n, 0], directions[n, 1], directions[n, 2]
+        x = _place(a * frame[0, 0] + b * frame[1, 0] + c * frame[2, 0], side)
+        y = _place(a * frame[0, 1] + b * frame[1, 1] + c * frame[2, 1], side)
+        z = _place(a * frame[0, 2] + b * frame[1, 2] + c * frame[2, 2], side)
+        i, j, k = int(x), int(y), int(z)
+        off, on = 0.0, 0.0
+        if density[i, j, k, 2] == 0.0:
+            found[0, n], found[1, n] = off, on
+            continue
+        fx, fy, fz = x - i, y - j, z - k
+        for di in range(2):
+            wx = fx if di else 1.0 - fx
+            for dj in range(2):
+                wy = wx * (fy if dj else 1.0 - fy)
+                for dk in range(2):
+                    weight = wy * (fz if dk else 1.0 - fz)
+                    off += weight * density[i + di, j + dj, k + dk, 0]
+                    on += weight * density[i + di, j + dj, k + dk, 1]
+        found[0, n], found[1, n] = off, on
+
+
+@njit(cache=True, nogil=True)
+def full_count(counts: Singles) -> float:
+    """The count (n,) that is shown in full colour: what a twentieth of the marked places exceed; 0 for none."""
+    marked = counts[counts > 0]
+    if marked.size == 0:
+        return 0.0
+    rank = int(FULL_RANK * (marked.size - 1))
+    return float(np.partition(marked, rank)[rank])
+
+
+@njit(cache=True, nogil=True)
+def colour_counts(
+    picture: Bytes, places: NDArray[np.int64], counts: Singles, colours: Singles, ground: Singles
+) -> None:
+    """Write into places (n,) of picture (m, 3) the ground's colour (3,), shifted to colours (k, 3) by counts (k, n).
+
+    Noise below a tenth of the full count has no colour, and from the full count on there is all of it.
+    """
+    scale = np.zeros(counts.shape[0])
+    for k in range(counts.shape[0]):
+        full = full_count(counts[k])
+        scale[k] = 1.0 / full if full > 0.0 else 0.0
+    for n in range(places.size):
+        red, green, blue = ground[0], ground[1], ground[2]
+        for k in range(counts.shape[0]):
+            strength = min((counts[k, n] * scale[k] - NOISE_SHARE) / (1.0 - NOISE_SHARE), 1.0)
+            if strength > 0.0:
+                red += strength * (colours[k, 0] - ground[0])
+                green += strength * (colours[k, 1] - ground[1])
+                blue += strength * (colours[k, 2] - ground[2])
+        at = places[n]
+        picture[at, 0] = np.uint8(min(max(red, 0.0), 255.0))
+        picture[at, 1] = np.uint8(min(max(green, 0.0), 255.0))
+        picture[at, 2] = np.uint8(min(max(blue, 0.0), 255.0))
