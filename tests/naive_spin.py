@@ -2,29 +2,41 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
 
-def naive_rows_inside(
+def naive_logo_rows(
     t_us: NDArray[np.int64],
     x_px: NDArray[np.uint16],
     y_px: NDArray[np.uint16],
+    on: NDArray[np.bool_],
     reference_us: float,
     centre_px: tuple[float, float],
     velocity_px_s: tuple[float, float],
-    radius_px: float,
-) -> list[int]:
-    rows = []
+    mask_px: float,
+    rim_px: float,
+    ring_px: tuple[float, float],
+) -> tuple[list[int], list[bool], int, int]:
+    rows, inside, likes, others = [], [], 0, 0
     for i in range(len(t_us)):
         dt_s = (float(t_us[i]) - reference_us) * 1e-6
-        x = centre_px[0] + velocity_px_s[0] * dt_s
-        y = centre_px[1] + velocity_px_s[1] * dt_s
-        if (y - float(y_px[i])) ** 2 + (x - float(x_px[i])) ** 2 < max(radius_px, 0.0) ** 2:
+        dx = float(x_px[i]) - (centre_px[0] + velocity_px_s[0] * dt_s)
+        dy = float(y_px[i]) - (centre_px[1] + velocity_px_s[1] * dt_s)
+        ahead = dx * velocity_px_s[0] + dy * velocity_px_s[1] > 0
+        as_a_bright_outline = ahead == bool(on[i])
+        distance = math.sqrt(dx**2 + dy**2)
+        if ring_px[0] < distance < ring_px[1]:
+            likes, others = likes + as_a_bright_outline, others + (not as_a_bright_outline)
+        moves = velocity_px_s != (0.0, 0.0)
+        if distance < mask_px or (distance < rim_px and not (moves and as_a_bright_outline)):
             rows.append(i)
-    return rows
+            inside.append(distance < mask_px)
+    return rows, inside, likes, others
 
 
 def naive_neighbours(

@@ -104,8 +104,10 @@ def _outcome(name: str, case: str, recording: SimulatedRecording, seed: int) -> 
             known = SpinEstimate("normal_flow", frozen(truth.spin_rps[0].copy()), np.eye(3), None)
             spin = SpinResult({**spin.estimates, "normal_flow": known})
         elif case != CASES[0]:
-            track = _true_track(tick, recording, track.latency_us if case == CASES[2] else 0.0)
-            events = logo.step(parameters.logo, logo.start(parameters.logo, setting), tick.packet, tick.filter, track)
+            late = case == CASES[2]
+            track = _true_track(tick, recording, track.latency_us if late else 0.0)
+            mask = parameters.logo if late else replace(parameters.logo, delay_us=0.0)
+            events = logo.step(mask, logo.start(mask, setting), tick.packet, tick.filter, track)
         last = contrast.step(parameters.contrast, state, tick.packet, track, events, spin)
         end_us = tick.packet.end_us
     if last is None:

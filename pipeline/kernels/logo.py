@@ -8,34 +8,45 @@ from numpy.typing import NDArray
 
 
 @numba.njit(cache=True, nogil=True)
-def rows_inside(
+def logo_rows(
     t_us: NDArray[np.int64],
     x_px: NDArray[np.uint16],
     y_px: NDArray[np.uint16],
+    on: NDArray[np.bool_],
     reference_us: float,
     centre_px: tuple[float, float],
     velocity_px_s: tuple[float, float],
-    radius_px: float,
-) -> NDArray[np.int64]:
-    """Rows (m,) int64 of the events strictly inside the circle.
+    mask_px: float,
+    rim_px: float,
+    ring_px: tuple[float, float],
+) -> tuple[NDArray[np.int64], NDArray[np.bool_], int, int]:
+    """Rows (m,) int64 of the logo's events, which of them (m,) are inside the mask, and the outline's two polarities.
 
     reference_us : the time stamp that an event of the scene with the ball at `centre_px` carries
-    radius_px : of the mask, the ball's less pad; nothing is inside if it is not positive
+    mask_px : radius within which every event counts
+    rim_px : radius within which those count that are OFF ahead of the centre or ON behind it, or all if nothing moves
+    ring_px : inner and outer radius of the ring of which the ON events ahead and OFF behind are counted, and the others
     """
-    rows = np.empty(t_us.size, np.int64)
-    count = 0
-    if radius_px <= 0.0:
-        return rows[:0]
-    radius2 = radius_px * radius_px
+    rows, inside = np.empty(t_us.size, np.int64), np.empty(t_us.size, np.bool_)
+    count, likes, others = 0, 0, 0
+    mask2, rim2 = max(mask_px, 0.0) ** 2, max(rim_px, 0.0) ** 2
+    inner2, outer2 = max(ring_px[0], 0.0) ** 2, max(ring_px[1], 0.0) ** 2
     x0, y0 = centre_px
     vx, vy = velocity_px_s[0] * 1e-6, velocity_px_s[1] * 1e-6
+    still = vx == 0.0 and vy == 0.0
     for i in range(t_us.size):
         dt_us = t_us[i] - reference_us
         dx = x_px[i] - (x0 + vx * dt_us)
         dy = y_px[i] - (y0 + vy * dt_us)
-        rows[count] = i  # unconditional store: a branch here mispredicts at the outline
-        count += dx * dx + dy * dy < radius2
-    return rows[:count]
+        across2 = dx * dx + dy * dy
+        other = (dx * vx + dy * vy > 0.0) != on[i]
+        ring = (across2 > inner2) & (across2 < outer2)
+        likes += ring & (not other)
+        others += ring & other
+        rows[count] = i  # unconditional stores: a branch here mispredicts at the outline
+        inside[count] = across2 < mask2
+        count += (across2 < mask2) | ((across2 < rim2) & (other | still))
+    return rows[:count], inside[:count], likes, others
 
 
 @numba.njit(cache=True, nogil=True)
@@ -59,33 +70,3 @@ def outline_like(
         # ahead > speed * cos(60 degrees) * distance from the centre, without a root
         out[i] = ((ahead > 0.0) == on[i]) & (ahead * ahead > quarter * across2) & (across2 > least2)
     return out
-
-
-@numba.njit(cache=True, nogil=True)
-def outline_polarity(
-    t_us: NDArray[np.int64],
-    x_px: NDArray[np.uint16],
-    y_px: NDArray[np.uint16],
-    on: NDArray[np.bool_],
-    reference_us: float,
-    centre_px: tuple[float, float],
-    velocity_px_s: tuple[float, float],
-    ring_px: tuple[float, float],
-) -> tuple[int, int]:
-    """How many events of a ring around the moving centre are ON ahead of it or OFF behind it, and how many are not.
-
-    ring_px : its two radii; reference_us : see `rows_inside`
-    """
-    likes, others = 0, 0
-    inner2, outer2 = ring_px[0] * ring_px[0], ring_px[1] * ring_px[1]
-    vx, vy = velocity_px_s[0] * 1e-6, velocity_px_s[1] * 1e-6
-    for i in range(t_us.size):
-        dt_us = t_us[i] - reference_us
-        dx = x_px[i] - (centre_px[0] + vx * dt_us)
-        dy = y_px[i] - (centre_px[1] + vy * dt_us)
-        across2 = dx * dx + dy * dy
-        within = (across2 > inner2) & (across2 < outer2)
-        like = (dx * vx + dy * vy > 0.0) == on[i]
-        likes += within & like
-        others += within & (not like)
-    return likes, others

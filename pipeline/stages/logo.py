@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..camera import Setting
 from ..events import EventBatch
-from ..kernels.logo import outline_like, outline_polarity, rows_inside
+from ..kernels.logo import logo_rows, outline_like
 from ..kernels.rows import taken
 from ..kernels.sphere import meet_ball
 from ..parameters import ParameterGroup, tunable
@@ -80,7 +80,7 @@ class LogoResult:
     points_m : (n, 3) float64, where the events' camera rays meet the ball (camera frame)
     normals : (n, 3) float64, outward unit normals e_r of the ball's surface there (the visible side has e_r . c < 0)
     of_outline : (n,) bool, the event may well be the moving ball's own outline, see `_of_outline`
-    turning : what is left of them without those, and the rim's that are not the outline's either: `_not_outlines`
+    turning : what is left of them without those, and the rim's that are not the outline's either: `_logo_events`
     position_std_px : 1 sigma of the centre across one axis, NaN without a ball
     radius_std_px : 1 sigma of the radius, NaN without a ball
     velocity_std_px_s : 1 sigma of the centre's velocity along one axis, NaN without a ball
@@ -126,9 +126,7 @@ def step(
     radius_px, moving = float(track.mean[4]), bool(track.mean[2:4].any())
     pad_px = parameters.pad_px if moving else parameters.fixed_pad_px
     rim_pad_px = parameters.rim_pad_px if moving else parameters.fixed_rim_pad_px
-    events = _inside(filtered.logo_events, track, radius_px - min(pad_px, rim_pad_px))
-    outline_x, outline_y = track.centre_px(events.t_us)
-    inner = np.hypot(events.x_px - outline_x, events.y_px - outline_y) < radius_px - pad_px
+    events, inside = _logo_events(filtered.logo_events, track, radius_px - pad_px, radius_px - rim_pad_px)
     centre_x, centre_y = track.centre_px(events.t_us.astype(np.float64) - parameters.delay_us)
     camera = state.camera
     rays = camera.rays(events.x_px, events.y_px)
@@ -137,9 +135,7 @@ def step(
     knots_m = _knots_m(packet, track, parameters.delay_us, state)
     points, normals = meet_ball(rays, events.t_us, packet.start_us, packet.end_us, knots_m, state.ball_radius_m)
     of_outline = _of_outline(x, y, events.on, track)
-    mixed = moving and _mixed_outline(filtered.logo_events, track)
-    own = np.flatnonzero(~of_outline & (inner | (not mixed and _not_outlines(x, y, events.on, track))))
-    rows = np.flatnonzero(inner)
+    rows, own = np.flatnonzero(inside), np.flatnonzero(~of_outline)
     return LogoResult(
         events=EventBatch(*(frozen(column[rows]) for column in events.columns)),
         centre_x_px=frozen(centre_x[rows]),
@@ -160,12 +156,28 @@ def step(
     )
 
 
-def _inside(events: EventBatch, track: TrackResult, mask_radius_px: float) -> EventBatch:
-    """The events inside the mask."""
-    x, y, vx, vy, _ = track.mean.tolist()
-    reference_us = track.t_us + track.latency_us
-    rows = rows_inside(events.t_us, events.x_px, events.y_px, reference_us, (x, y), (vx, vy), mask_radius_px)
-    return EventBatch(*taken(rows, *events.columns))
+def _logo_events(
+    events: EventBatch, track: TrackResult, mask_px: float, rim_px: float
+) -> tuple[EventBatch, NDArray[np.bool_]]:
+    """The events inside the mask and those of the rim that are not the outline's; which (n,) are inside the mask.
+
+    A bright ball over a darker ground turns pixels ON ahead and OFF behind, whatever its logo does: on simulated
+    flights 3 in 100,000 of its events are of the other polarity, and nearly all OFF events ahead and ON events behind
+    are the logo's, up to the outline itself. A fixed ball's outline is silent.
+    """
+    x, y, vx, vy, radius_px = track.mean.tolist()
+    rows, inside, likes, others = logo_rows(
+        *events.columns,
+        track.t_us + track.latency_us,
+        (x, y),
+        (vx, vy),
+        mask_px,
+        rim_px,
+        (radius_px - OUTLINE_INSIDE_PX, radius_px + OUTLINE_OUTSIDE_PX),
+    )
+    if (vx or vy) and others > MIXED_OUTLINE * likes:
+        rows, inside = rows[inside], inside[inside]
+    return EventBatch(*taken(rows, *events.columns)), inside
 
 
 def _of_outline(x_px: Floats, y_px: Floats, on: NDArray[np.bool_], track: TrackResult) -> NDArray[np.bool_]:
@@ -180,26 +192,6 @@ def _of_outline(x_px: Floats, y_px: Floats, on: NDArray[np.bool_], track: TrackR
     if math.hypot(vx, vy) < OUTLINE_SPEED_PX_S:
         return np.zeros(on.size, np.bool_)
     return outline_like(x_px, y_px, on, (vx, vy), OUTLINE_SHARE * radius_px)
-
-
-def _not_outlines(x_px: Floats, y_px: Floats, on: NDArray[np.bool_], track: TrackResult) -> NDArray[np.bool_]:
-    """(n,) whether events are of the polarity that the outline has not, so that they turn with the ball.
-
-    A bright ball over a darker ground turns pixels ON ahead and OFF behind, whatever its logo does: on simulated
-    flights 3 in 100,000 of its events are of the other polarity, and nearly all OFF events ahead and ON events behind
-    are the logo's, up to the outline itself. A fixed ball's outline is silent.
-    """
-    vx, vy = track.mean[2:4].tolist()
-    return np.ones(on.size, np.bool_) if vx == vy == 0.0 else (x_px * vx + y_px * vy > 0.0) != on
-
-
-def _mixed_outline(events: EventBatch, track: TrackResult) -> bool:
-    """Whether the outline has both polarities on one side: the ground is not darker than the ball everywhere."""
-    x, y, vx, vy, radius_px = track.mean.tolist()
-    ring_px = (radius_px - OUTLINE_INSIDE_PX, radius_px + OUTLINE_OUTSIDE_PX)
-    reference_us = track.t_us + track.latency_us
-    likes, others = outline_polarity(*events.columns, reference_us, (x, y), (vx, vy), ring_px)
-    return others > MIXED_OUTLINE * likes
 
 
 def _knots_m(packet: Packet, track: TrackResult, delay_us: float, setting: Setting) -> NDArray[np.float64]:

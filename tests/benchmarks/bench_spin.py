@@ -11,17 +11,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.kernels.logo import rows_inside
+from pipeline.kernels.logo import logo_rows
 from pipeline.kernels.plane_flow import FEWEST, SPREAD_PX, fit_plane
 from pipeline.kernels.rate import low_passed
 from pipeline.kernels.triplet import earlier_neighbours, triplet_flow
 from pipeline.stages import flow, logo, rate, spin
 from pipeline.stages.filter import FilterResult
 from tests.naive_spin import (
+    naive_logo_rows,
     naive_low_pass,
     naive_neighbours,
     naive_plane,
-    naive_rows_inside,
     naive_triplets,
 )
 from tests.pipeline.stages.test_spin_samples import track_of, truth_of
@@ -48,17 +48,22 @@ def test_the_mask(benchmark: Any) -> None:
     n = 200_000
     t = np.sort(rng.integers(0, 5000, n))
     x, y = (rng.integers(600, 680, n).astype(np.uint16) for _ in range(2))
-    circle = (4900.0, (640.0, 640.0), (5000.0, -3000.0), 14.5)
-    benchmark.pedantic(lambda: rows_inside(t, x, y, *circle), rounds=30, warmup_rounds=2)
+    on = rng.random(n) < 0.5
+    circle = (4900.0, (640.0, 640.0), (5000.0, -3000.0), 14.5, 16.5, (16.0, 19.0))
+    benchmark.pedantic(lambda: logo_rows(t, x, y, on, *circle), rounds=30, warmup_rounds=2)
     fast_ns = benchmark.stats.stats.median / n * 1e9
 
     def by_numpy() -> None:
         dt = t - 4900.0
-        np.flatnonzero((x - 640.0 - 5e-3 * dt) ** 2 + (y - 640.0 + 3e-3 * dt) ** 2 < 14.5**2)
+        dx, dy = x - 640.0 - 5e-3 * dt, y - 640.0 + 3e-3 * dt
+        across2, like = dx**2 + dy**2, (5.0 * dx - 3.0 * dy > 0) == on
+        ring = (across2 > 16.0**2) & (across2 < 19.0**2)
+        np.sum(ring & like), np.sum(ring & ~like)
+        np.flatnonzero((across2 < 14.5**2) | (~like & (across2 < 16.5**2)))
 
-    few = (t[:5000], x[:5000], y[:5000])
+    few = (t[:5000], x[:5000], y[:5000], on[:5000])
     numpy_ns = slow_s(by_numpy, 10) / n * 1e9
-    twin_ns = slow_s(lambda: naive_rows_inside(*few, *circle)) / 5000 * 1e9
+    twin_ns = slow_s(lambda: naive_logo_rows(*few, *circle)) / 5000 * 1e9
     say(f"mask: {fast_ns:.1f} ns an event, numpy {numpy_ns / fast_ns:.0f} x, twin {twin_ns / fast_ns:.0f} x")
     assert numpy_ns > 2 * fast_ns
 

@@ -6,28 +6,31 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.kernels.logo import outline_like, outline_polarity, rows_inside
-from tests.naive_spin import naive_rows_inside
+from pipeline.kernels.logo import logo_rows, outline_like
+from tests.naive_spin import naive_logo_rows
 
 
 @given(
     seed=st.integers(0, 100_000),
-    velocity=st.tuples(*[st.floats(-9000, 9000)] * 2),
+    velocity=st.one_of(st.just((0.0, 0.0)), st.tuples(*[st.floats(-9000, 9000)] * 2)),
     radius=st.floats(-3, 40),
+    rim_px=st.floats(-3, 5),
     start_us=st.sampled_from([0, 1_600_000_000_000_000]),
 )
-def test_equals_its_twin(seed: int, velocity: tuple[float, float], radius: float, start_us: int) -> None:
+def test_equals_its_twin(seed: int, velocity: tuple[float, float], radius: float, rim_px: float, start_us: int) -> None:
     rng = np.random.default_rng(seed)
     t = start_us + np.sort(rng.integers(0, 5000, 100))
     x, y = (rng.integers(0, 90, 100).astype(np.uint16) for _ in range(2))
-    given_circle = (t, x, y, float(start_us + 4900), (45.3, 44.6), velocity, radius)
-    assert rows_inside(*given_circle).tolist() == naive_rows_inside(*given_circle)
+    events = (t, x, y, rng.random(100) < 0.5)
+    circle = (float(start_us + 4900), (45.3, 44.6), velocity, radius, radius + rim_px, (radius + 4.0, radius + 9.0))
+    rows, inside, *polarities = logo_rows(*events, *circle)
+    assert (rows.tolist(), inside.tolist(), *polarities) == naive_logo_rows(*events, *circle)
 
 
 def test_the_outline_itself_is_outside() -> None:
     x, y = np.array([13, 10, 12], np.uint16), np.array([14, 15, 14], np.uint16)
-    t = np.zeros(3, np.int64)
-    rows = rows_inside(t, x, y, 0.0, (10.0, 10.0), (0.0, 0.0), 5.0)
+    t, on = np.zeros(3, np.int64), np.ones(3, np.bool_)
+    rows, _, _, _ = logo_rows(t, x, y, on, 0.0, (10.0, 10.0), (0.0, 0.0), 5.0, 0.0, (0.0, 0.0))
     assert rows.tolist() == [2]
 
 
@@ -39,17 +42,3 @@ def test_the_rims_polarity_is_told_by_the_angle_to_the_motion(seed: int, speed: 
     expected = np.where(on, off < np.pi / 3, off > 2 * np.pi / 3) & (np.hypot(x, y) > 10)
     found = outline_like(x, y, on, (speed * np.cos(heading), speed * np.sin(heading)), 10.0)
     assert np.array_equal(found, expected)
-
-
-@given(seed=st.integers(0, 100_000), velocity=st.tuples(*[st.floats(-9000, 9000)] * 2))
-def test_the_outlines_polarities_are_counted(seed: int, velocity: tuple[float, float]) -> None:
-    rng = np.random.default_rng(seed)
-    t = np.sort(rng.integers(0, 5000, 300))
-    x, y = (rng.integers(0, 90, 300).astype(np.uint16) for _ in range(2))
-    on = rng.random(300) < 0.5
-    likes, others = outline_polarity(t, x, y, on, 4900.0, (45.3, 44.6), velocity, (15.0, 30.0))
-    dx = x - (45.3 + velocity[0] * 1e-6 * (t - 4900.0))
-    dy = y - (44.6 + velocity[1] * 1e-6 * (t - 4900.0))
-    ring = (np.hypot(dx, dy) > 15.0) & (np.hypot(dx, dy) < 30.0)
-    ahead = dx * velocity[0] + dy * velocity[1] > 0.0
-    assert likes == np.sum(ring & (ahead == on)) and others == np.sum(ring & (ahead != on))
