@@ -22,7 +22,7 @@ FINE = 0.625
 # What the model lacks (the logo's blurred edges look different from each side) leaves errors that more events do not
 # lessen, as parts of the kernel: of the axis, and of the turn over the stretch's spread in time. From the errors of
 # two simulators' balls with exact tracks.
-AXIS_FLOOR, TURN_FLOOR = 0.35, 0.04
+AXIS_FLOOR, TURN_FLOOR = 0.3, 0.036
 # Where the camera looks at the surface at less than this cosine (60 degrees, 2.2 px inside a 16.5 px ball's outline) a
 # blurred edge is that much farther off on the ball. The refinement does without such events where so many of all are
 # left; else the axis is stated as less certain, at most by MOST_OBLIQUE.

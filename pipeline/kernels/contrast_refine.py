@@ -29,7 +29,7 @@ BEND_TRUST = 2.0
 LEAST_BEND = 1.0  # usual ones are 1 to 4 times the noise
 # Refining leaves so much of the offsets' error: 0.43, 0.37 and 0.52 of 0.5 px on 87 spinners, less where the spin
 # depends on it.
-REFINED = 0.7
+REFINED = 0.65
 
 
 @numba.njit(cache=True, nogil=True)
