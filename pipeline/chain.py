@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Hashable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from types import ModuleType
 from typing import Any, Protocol
 
@@ -54,7 +55,7 @@ class Parameters(ParameterSet):
     contrast: contrast.ContrastParameters = contrast.ContrastParameters()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Tick:
     """All stages' results of one tick; contrast is None where the run was told to leave it out."""
 
@@ -68,13 +69,13 @@ class Tick:
     spin: spin.SpinResult
     contrast: contrast.ContrastResult | None
 
-    @property
+    @cached_property
     def estimates(self) -> dict[str, SpinEstimate]:
         """Every method's estimate from the present shot so far, by name."""
         own = {} if self.contrast is None else {contrast.METHOD: self.contrast.estimate}
         return {**self.spin.estimates, **own}
 
-    @property
+    @cached_property
     def best(self) -> str | None:
         """The method whose answer is trusted, None where none is."""
         return best_of(self.estimates)
