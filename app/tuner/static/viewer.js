@@ -4,6 +4,7 @@ const TIMELINE = "t";
 const POLL_MS = 15;
 const PATIENCE_MS = 120_000; // without a graphics card a picture may take seconds
 const PICTURE_MS = 10_000;
+const ANSWER_MS = 3000;
 const APPLICATION = "spinscope";
 
 // The viewer asks elsewhere for its newest version; this page talks to its own server alone.
@@ -89,12 +90,25 @@ export class Viewer extends EventTarget {
       const old = [...this.#sent].filter((other) => other !== id);
       // Both at once: each for itself would have it paint once more.
       const closing = old.length ? this.#viewer.close({ store_ids: old.map(storeOf) }) : null;
-      await Promise.all([this.#viewer.set_time({ recording: storeOf(id), ...time }), closing]);
+      await Promise.all([this.#placed({ recording: storeOf(id), ...time }), closing]);
       this.#sent = new Set([id]);
       this.#shown = id;
       this.#moved(time_ns);
       await new Promise(requestAnimationFrame); // what was set is drawn now
     });
+  }
+
+  // Sets the playhead. A recording may be open before the viewer knows of its times: then it refuses, and is asked again.
+  async #placed(where) {
+    const until = performance.now() + PATIENCE_MS;
+    for (;;) {
+      try {
+        return await this.#viewer.set_time(where);
+      } catch (error) {
+        if (performance.now() > until) throw error;
+        await pause(POLL_MS);
+      }
+    }
   }
 
   // Has the viewer paint until something happened: data alone does not always wake it.
@@ -103,7 +117,8 @@ export class Viewer extends EventTarget {
     const over = () => (waiting = false);
     happened.then(over, over);
     while (waiting) {
-      await this.#viewer.get_state().catch(() => {}); // busy painting
+      const painted = this.#viewer.get_state().catch(() => {}); // busy painting
+      await Promise.race([painted, pause(ANSWER_MS)]); // an answer can get lost while the viewer starts
       await pause(POLL_MS);
     }
     return happened;

@@ -235,6 +235,24 @@ def test_a_changed_playback_speed_survives_a_change(tab: Tab) -> None:
     assert tab.page.evaluate(speed) == pytest.approx(0.05)
 
 
+def test_a_viewer_that_does_not_know_a_recordings_times_yet_is_asked_again(tab: Tab) -> None:
+    """It may tell that a recording is open before that; rarely, so here it is made to."""
+    tab.page.evaluate(
+        """(() => {
+            const viewer = window.spinscope.viewer.api;
+            window.refused = 0;
+            viewer.set_time = (where) => {
+                if (++window.refused < 3) return Promise.reject(new Error("the recording has no timelines yet"));
+                delete viewer.set_time;
+                return viewer.set_time(where);
+            };
+        })()"""
+    )
+    tab.slide("logo.pad_px", what="shown")
+    assert tab.page.evaluate("window.refused") == 3
+    assert not tab.errors
+
+
 def test_typing_reset_undo_and_redo(tab: Tab) -> None:
     start = tab.value("logo.pad_px")
     box = tab.page.locator("[data-name='logo.pad_px'] input.number")
