@@ -29,7 +29,7 @@ def test_the_maps_frame_is_right_handed_about_the_axis(spin: np.ndarray, middle:
     np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-9)
     assert np.linalg.det(frame) == pytest.approx(1)
     np.testing.assert_allclose(frame[2], spin / np.linalg.norm(spin), atol=1e-9)
-    assert frame[0] @ middle >= -1e-9
+    assert frame[0] @ middle >= -1e-6 * np.linalg.norm(middle)  # a middle on the pole has any longitude
 
 
 def test_without_a_spin_or_with_the_logo_on_the_pole_there_is_a_map_all_the_same() -> None:
