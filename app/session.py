@@ -40,6 +40,11 @@ class Choices:
     fixed_ball: tuple[float, float, float] | str | None = None  # (x, y, radius) in px, or "auto"
     sensor_px: tuple[int, int] | None = None
 
+    @property
+    def for_others(self) -> Choices:
+        """What of it goes for other recordings too: neither the window nor the fixed ball's place."""
+        return dataclasses.replace(self, window_us=None, fixed_ball=None)
+
 
 @dataclass(slots=True)
 class Session:

@@ -5,7 +5,6 @@ A finished recording of a real camera cannot be taken again: for it the biases a
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import secrets
 from pathlib import Path
@@ -128,15 +127,13 @@ def measured_curve(
             "no recording of this folder has a .bias file of its own name beside it: put NAME.bias beside NAME.raw, "
             "or load the .bias file that this recording was taken with"
         )
-    # What was chosen for the first recording alone does not go for others.
-    others = dataclasses.replace(bench.choices, window_us=None, fixed_ball=None)
     found: list[dict[str, Any]] = []
     content = {"name": None, "total": len(known), "points": found, "source": "recorded"}
     job.tell(**content)
     for path, biases in known.items():
         job.check()
         try:
-            taken = Bench.open(path, bench.choices if path == bench.original else others)
+            taken = Bench.open(path, bench.choices if path == bench.original else bench.choices.for_others)
             clip = taken.clip(*taken.first_clip_us())
             is_ball = _on_ball(job, clip, parameters)
         except SpinscopeError as error:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import threading
 import time
 from collections import OrderedDict
@@ -45,10 +44,7 @@ class Workshop:
         with self._lock:
             bench = self._benches.pop(path, None)
             if bench is None:
-                # What was chosen for the first recording alone does not go for others.
-                own = path == self.path
-                choices = self._choices if own else dataclasses.replace(self._choices, window_us=None, fixed_ball=None)
-                bench = Bench.open(path, choices)
+                bench = Bench.open(path, self._choices if path == self.path else self._choices.for_others)
             self._benches[path] = bench
             while len(self._benches) > BENCHES_KEPT:
                 self._drop(self._benches.popitem(last=False)[0])

@@ -60,7 +60,7 @@ class ContrastParameters(ParameterGroup):
         0.25, 0.0, 5.0, 0.05, "", "contrast an event must gain over exchanged times (natural log), on average"
     )
     rival_sigmas: float = tunable(1.2, 0.0, 20.0, 0.1, "sigma", "lead that the best spin must have over any other")
-    # On 49 simulated flights that both methods answer rightly the largest distance is 3.9; 14 where contrast is wrong.
+    # On 110 simulated flights that contrast answers rightly one in a hundred is farther away than 5.7.
     flow_sigmas: float = tunable(
         6.0, 0.0, 100.0, 0.5, "sigma", "distance from the normal flow's spin beyond which it is in doubt"
     )

@@ -41,7 +41,9 @@ class LogoParameters(ParameterGroup):
     # A ball that stays leaves no outline, only what its logo does: three more of 24 simulated spinners are answered
     # than with 2.5 px, those whose logo keeps to the rim, and the others' axes are a fifth better.
     fixed_pad_px: float = tunable(1.0, 0.0, 100.0, 0.1, "px", "the same of a fixed ball, whose outline stays dark")
-    rim_pad_px: float = tunable(0.5, 0.0, 100.0, 0.1, "px", "the same for events that the outline cannot have made")
+    rim_pad_px: float = tunable(
+        0.5, 0.0, 100.0, 0.1, "px", "that of events the outline cannot have made, for contrast alone"
+    )
     # A mounted ball's place is known to a third or half of a pixel; a logo at its rim may seem to lie outside.
     fixed_rim_pad_px: float = tunable(-1.0, -10.0, 100.0, 0.1, "px", "that of a fixed ball, for contrast alone")
     # The outline is the stronger step and is seen by its first events. On two simulators' flights the axes are best
