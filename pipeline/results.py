@@ -63,7 +63,7 @@ class SpinEstimate:
 
     @property
     def magnitude_rps(self) -> float | None:
-        return None if self.vector_rps is None else float(np.linalg.norm(self.vector_rps))
+        return None if self.vector_rps is None else math.sqrt(self.vector_rps @ self.vector_rps)
 
     @property
     def axis(self) -> Vector | None:

@@ -56,7 +56,8 @@ class Clip:
     """
 
     session: Session
-    lock: threading.Lock = field(default_factory=threading.Lock)
+    # Of the kind that a thread may take twice: an abandoned run may be cleaned up anywhere.
+    lock: threading.RLock = field(default_factory=threading.RLock)
     cost_s: OrderedDict[Hashable, float] = field(default_factory=OrderedDict)
 
     @property
@@ -89,20 +90,30 @@ class Clip:
         chain = self.session.chain
         with self.lock:
             ticks = chain.run(parameters, without=without)
-        keys = self.keys(parameters)
-        while True:
-            with self.lock:
-                before = dict(chain.seconds)
-                tick = next(ticks, None)
-                took = {stage: chain.seconds[stage] - before[stage] for stage in STAGES}
+        whole = dict.fromkeys(STAGES, 0.0)
+        try:
+            while True:
+                with self.lock:
+                    before = dict(chain.seconds)
+                    tick = next(ticks, None)
+                    took = {stage: chain.seconds[stage] - before[stage] for stage in STAGES}
+                if tick is None:
+                    return
                 for stage, seconds in took.items():
-                    if seconds:
-                        self.cost_s[keys[stage]] = self.cost_s.pop(keys[stage], 0.0) + seconds
-                while len(self.cost_s) > 1000:
-                    self.cost_s.popitem(last=False)
-            if tick is None:
-                return
-            yield Progressed(tick, took)
+                    whole[stage] += seconds
+                yield Progressed(tick, took)
+        finally:
+            self._note_costs(parameters, whole)
+
+    def _note_costs(self, parameters: Parameters, took: dict[str, float]) -> None:
+        """Add what the stages took; comparing keys takes a tenth of a tick."""
+        keys = self.keys(parameters)
+        with self.lock:
+            for stage, seconds in took.items():
+                if seconds:
+                    self.cost_s[keys[stage]] = self.cost_s.pop(keys[stage], 0.0) + seconds
+            while len(self.cost_s) > 1000:
+                self.cost_s.popitem(last=False)
 
     def keys(self, parameters: Parameters) -> dict[str, Hashable]:
         """What each stage's results are made from, compared by value."""
@@ -144,13 +155,18 @@ class Bench:
         """Open a recording and read it once; raises SpinscopeError."""
         return cls(Session.open(path, choices), choices, original or path)
 
+    @property
+    def are_kernels_loaded(self) -> bool:
+        """Whether the compiled kernels are in memory."""
+        return _are_loaded.is_set()
+
     def load_kernels(self) -> None:
         """Have the compiled kernels in memory, once a process, so that no stage's milliseconds hold their loading."""
         with _kernels:
             if not _are_loaded.is_set():
-                _are_loaded.set()
                 with suppress(Exception):  # a stage that raises is told of by the run that is wanted
                     self.clip(*self.first_clip_us()).session.load_kernels()
+                _are_loaded.set()
 
     @contextmanager
     def at_work(self) -> Iterator[None]:

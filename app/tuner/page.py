@@ -20,7 +20,10 @@ from .outbox import Outbox
 from .presets import differences
 from .runs import Finished
 
-REPORT_S = 0.05  # a page learns of a run's progress this often
+# A page learns of a run's progress this often, and not at all of one that is over at once: every change of the page
+# has the browser put the whole picture together anew, in the very time in which it is waited for.
+REPORT_S, QUIET_S = 0.05, 0.3
+IDLE_S = 1.0  # after so long without a wish nobody waits for anything
 # The rest of a clip is worth waiting for when it takes no longer than an eye needs to see a change.
 REST_WORTH_WAITING_S = 0.25
 PICTURES_KEPT = 3
@@ -53,12 +56,13 @@ class _Report:
     serial: int
     began: float = field(default_factory=time.perf_counter)
     seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys([*STAGES, "drawing"], 0.0))
-    last: float = 0.0
+    told: tuple[str, float] = ("", 0.0)  # what was told last, and when
 
     def tell(self, state: str, share: float = 0.0, *, force: bool = False, **more: Any) -> None:
-        now = time.perf_counter()
-        if force or now - self.last >= REPORT_S:
-            self.last = now
+        now, (last_state, last) = time.perf_counter(), self.told
+        is_due = state != last_state or now - last >= REPORT_S
+        if force or (is_due and now - self.began >= QUIET_S):
+            self.told = state, now
             milliseconds = {name: 1000 * seconds for name, seconds in self.seconds.items()}
             total = 1000 * (now - self.began)
             self.outbox.put(
@@ -127,7 +131,9 @@ class Page:
     def _work(self) -> None:
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: self._closed or self._wanted is not None)
+                if not self._changed.wait_for(self._has_work, IDLE_S):
+                    self._drawings.keep_budget()
+                    self._changed.wait_for(self._has_work)
                 if self._closed:
                     return
                 wanted, self._wanted = self._wanted, None
@@ -141,9 +147,13 @@ class Page:
             except Exception as error:  # noqa: BLE001  # whatever a stage raises, the page goes on
                 report.tell("failed", force=True, error=fault(error))
 
+    def _has_work(self) -> bool:
+        return self._closed or self._wanted is not None
+
     def _fulfil(self, wanted: Wanted, report: _Report) -> None:
-        report.tell("loading")
-        self.bench.load_kernels()
+        if not self.bench.are_kernels_loaded:
+            report.tell("loading", force=True)
+            self.bench.load_kernels()
         clip = self.bench.clip(*wanted.window_us)
         a = None
         if wanted.pinned is not None:
@@ -213,7 +223,7 @@ class Page:
         """Draw the run and tell the page where to fetch it."""
         if self._is_old(wanted):
             raise Superseded
-        report.tell("drawing", 1.0, force=True)
+        report.tell("drawing", 1.0)
         began = time.perf_counter()
         chunks = self._drawings.chunks(b.run, clip.keys(b.session.parameters))
         if a is None:
@@ -243,7 +253,6 @@ class Page:
             pinned_measures=None if a is None else _measured(clip, a),
             differs=[] if a is None else differences(a.session.parameters, b.session.parameters),
         )
-        self._drawings.keep_budget()
 
     def _is_old(self, wanted: Wanted) -> bool:
         return self._closed or wanted.serial != self._newest

@@ -7,7 +7,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from . import entities as at
-from .rerun_api import Chunk, columns_at, once
+from .rerun_api import Chunk, columns_at, once, styled
 from .run import Run, shot_starts, shown_estimate, vector_of
 from .still import sphere
 
@@ -86,9 +86,8 @@ def _arrows(run: Run) -> list[Chunk]:
     for method in run.methods:
         vectors = [vector_of(tick.estimates[method]) for tick in run.ticks]
         chunks += _arrow(run, f"{at.SPIN_ARROWS}/{method}", vectors, at.method_colour(method), 0.025)
-    if run.truth is not None:
-        t_us = np.array([tick.track.t_us for tick in run.ticks])
-        spins = np.nan_to_num(run.true_values(t_us, run.truth.spin_rps)) * run.has_ball[:, None]
+    if run.true_spins_rps is not None:
+        spins = np.nan_to_num(run.true_spins_rps) * run.has_ball[:, None]
         chunks += _arrow(run, f"{at.SPIN_ARROWS}/truth", list(spins), at.TRUTH_COLOUR, 0.02)
     shown = [vector_of(shown_estimate(tick)[0]) for tick in run.ticks]
     return [*chunks, *_arrow(run, at.SPIN_SHOWN, shown, at.RING_COLOUR, 0.06)]
@@ -104,47 +103,43 @@ def _arrow(run: Run, entity: str, vectors: list[Floats], colour: at.Colour, thic
         vectors=axes * (magnitudes[known, None] * RPS_M),
         labels=[f"{magnitude:.1f} rps" for magnitude in magnitudes[known]],
     )
-    style = rr.Arrows3D.from_fields(
-        colors=[colour], radii=[thickness * run.ball_radius_m], show_labels=entity == at.SPIN_SHOWN
-    )
-    return [once(entity, style), columns_at(entity, run.times_us, columns, [0, *known.astype(int)])]
+    look = {"colors": colour, "radii": thickness * run.ball_radius_m, "show_labels": entity == at.SPIN_SHOWN}
+    return [styled(entity, rr.Arrows3D, **look), columns_at(entity, run.times_us, columns, [0, *known.astype(int)])]
 
 
 def _ring(run: Run) -> list[Chunk]:
     """Most of a circle around the shown axis, ending in an arrow: which way the ball turns."""
-    strips, lengths = [], [0]
-    for tick in run.ticks:
-        spin = vector_of(shown_estimate(tick)[0]) if tick.track.has_ball else np.zeros(3)
-        magnitude = float(np.linalg.norm(spin))
-        lengths.append(int(magnitude > 0))
-        if magnitude > 0:
-            strips.append(_around(spin / magnitude) * run.ball_radius_m)
-    tips = np.array(strips).reshape(-1, RING_POINTS, 3)[:, -3:]
-    arrows = rr.Arrows3D.columns(origins=tips[:, 0], vectors=tips[:, 2] - tips[:, 0])
+    spins = np.array([vector_of(shown_estimate(tick)[0]) for tick in run.ticks])
+    magnitudes = np.linalg.norm(spins, axis=1)
+    shown = run.has_ball & (magnitudes > 0)
+    strips = _around(spins[shown] / magnitudes[shown, None]) * run.ball_radius_m
+    lengths = [0, *shown.astype(int)]
+    arrows = rr.Arrows3D.columns(origins=strips[:, -3], vectors=strips[:, -1] - strips[:, -3])
     radius = 0.025 * run.ball_radius_m
     return [
-        once(at.SPIN_RING, rr.LineStrips3D.from_fields(colors=[at.RING_COLOUR], radii=[radius])),
-        columns_at(
-            at.SPIN_RING, run.times_us, rr.LineStrips3D.columns(strips=[strip[:-2] for strip in strips]), lengths
-        ),
-        once(at.RING_TIP, rr.Arrows3D.from_fields(colors=[at.RING_COLOUR], radii=[2.5 * radius])),
+        styled(at.SPIN_RING, rr.LineStrips3D, colors=at.RING_COLOUR, radii=radius),
+        columns_at(at.SPIN_RING, run.times_us, rr.LineStrips3D.columns(strips=list(strips[:, :-2])), lengths),
+        styled(at.RING_TIP, rr.Arrows3D, colors=at.RING_COLOUR, radii=2.5 * radius),
         columns_at(at.RING_TIP, run.times_us, arrows, lengths),
     ]
 
 
-def _around(axis: Floats) -> Floats:
-    """(RING_POINTS, 3) a line around the axis by the right-hand rule, its tip where the viewer looks; ball radii."""
-    viewer = EYE if abs(axis @ EYE) < 0.95 else np.array([1.0, 0.0, 0.0])
-    side = viewer - (viewer @ axis) * axis
-    side /= np.linalg.norm(side)
-    angle = np.radians(np.linspace(60, 370, RING_POINTS))
-    ring: Floats = np.cos(angle)[:, None] * side + np.sin(angle)[:, None] * np.cross(axis, side)
+def _around(axes: Floats) -> Floats:
+    """(n, RING_POINTS, 3) a line around each axis (n, 3) by the right-hand rule, its tip where the viewer looks.
+
+    In radii of the ball.
+    """
+    viewers = np.where(np.abs(axes @ EYE)[:, None] < 0.95, EYE, [1.0, 0.0, 0.0])
+    sides = viewers - (viewers * axes).sum(axis=1, keepdims=True) * axes
+    sides /= np.linalg.norm(sides, axis=1, keepdims=True)
+    angle = np.radians(np.linspace(60, 370, RING_POINTS))[:, None]
+    ring: Floats = np.cos(angle) * sides[:, None] + np.sin(angle) * np.cross(axes, sides)[:, None]
     return RING_RADII * ring
 
 
 def _path(run: Run) -> list[Chunk]:
     """The way flown so far, a piece a tick (the view shows all pieces up to the playhead); the truth dashed."""
-    chunks = [once(at.PATH, rr.LineStrips3D.from_fields(colors=[at.PATH_COLOUR], radii=[-2.0]))]
+    chunks = [styled(at.PATH, rr.LineStrips3D, colors=at.PATH_COLOUR, radii=-2.0)]
     if run.fixed or not run.has_ball.any():
         return chunks
     places = run.centre_m(np.nan_to_num(run.means, nan=1.0))

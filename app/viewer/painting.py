@@ -6,19 +6,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 
-import cv2
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from pipeline.kernels.still import colour_counts, read_density, turn_back_and_count
+from pipeline.kernels.still import CELLS, Canvas, centroid, paint, turn_back_and_count
 
 from . import entities as at
-from .rerun_api import Chunk, columns_at, once
+from .rerun_api import Chunk, columns_at, once, styled
 from .run import Run, shot_starts, shown_estimate, vector_of
-from .stages import PNG_QUICK
-from .still import CELLS, MAP_PX, TEXTURE_PX, disc_directions, map_directions, map_frame, texture_directions
+from .still import MAP_PX, TEXTURE_PX, disc_directions, disc_mask, map_directions, map_frame, texture_directions
 
+Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 
@@ -26,43 +25,28 @@ PICTURE_US = 5000  # the logo is painted this often, and every tick of 200 Hz
 EVENTS_PAINTED = 60_000  # the latest of the shot; more add nothing but time
 PAINT = np.array([[32, 42, 80]], np.float32)
 WHITE = np.array([238, 236, 228], np.float32)
-DISC_BGR = np.array([51, 43, 38], np.float32)
-POLARITIES_BGR = np.array([at.OFF[::-1], at.ON[::-1]], np.float32)
-BODY = np.eye(3)
+DISC = np.array([38, 43, 51], np.float32)
+POLARITIES = np.array([at.OFF, at.ON], np.float32)
 TO_CAMERA = np.array([0.0, 0.0, -1.0])
 
 
 def painting_chunks(run: Run) -> list[Chunk]:
     """The logo's events turned back by the estimate of the moment: on the ball's texture, on two discs, unrolled."""
-    nothing = np.zeros((CELLS, CELLS, CELLS, 3), np.float32)
-    times, textures = [run.start_us], [_texture(nothing)]
-    discs, maps = [_discs_around(TO_CAMERA).picture(nothing)], [_map().picture(nothing)]
+    times, pictures = [np.array([run.start_us])], [[nothing[None]] for nothing in _nothing()]
     for shot in _painted_shots(run):
-        density = np.empty_like(nothing)
-        middle = shot.middle(density)
-        flat = _discs_around(middle)
-        for index in shot.pictured:
-            spin_rps = shot.count(density, index)
-            times.append(run.ticks[index].packet.end_us)
-            textures.append(_texture(density))
-            discs.append(flat.picture(density))
-            maps.append(_map().picture(density, map_frame(spin_rps, middle)))
-    t_us = np.array(times)
-    width, height = TEXTURE_PX
-    form = rr.components.ImageFormat(width=width, height=height, color_model="RGB", channel_datatype="U8")
-    columns = rr.Mesh3D.columns(albedo_texture_buffer=textures, albedo_texture_format=[form] * len(times))
-    return [
-        columns_at(at.MESH, t_us, columns),
-        *(
-            chunk
-            for entity, pictures in ((at.STILL_LOGO, discs), (at.UNROLLED, maps))
-            for chunk in (
-                columns_at(entity, t_us, rr.EncodedImage.columns(blob=pictures)),
-                once(entity, rr.EncodedImage.from_fields(media_type="image/png", draw_order=-10.0)),
-            )
-        ),
-        _graticule(),
-    ]
+        times.append(run.ends_us[shot.pictured])
+        for column, painted in zip(pictures, shot.pictures(), strict=True):
+            column.append(painted)
+    t_us = np.concatenate(times)
+    texture, discs, maps = (np.concatenate(column) for column in pictures)
+    buffer, form = _raw(texture)
+    skin = rr.Mesh3D.columns(albedo_texture_buffer=buffer, albedo_texture_format=form)
+    chunks = [columns_at(at.MESH, t_us, skin), _graticule()]
+    for entity, flat in ((at.STILL_LOGO, discs), (at.UNROLLED, maps)):
+        buffer, form = _raw(flat)
+        chunks.append(columns_at(entity, t_us, rr.Image.columns(buffer=buffer, format=form)))
+        chunks.append(styled(entity, rr.Image, magnification_filter="linear", draw_order=-10.0))
+    return chunks
 
 
 @dataclass(frozen=True)
@@ -70,31 +54,42 @@ class _Shot:
     """The events of a shot that turn with the ball.
 
     normals : (n, 3) where they lie on the ball; on : (n,) their polarity; seconds : (n,) from each to the shot's start
-    ends : how many there are at the end of every tick; pictured : the ticks at which they are painted
+    pictured : the ticks at which they are painted; ends : how many events there are at the end of each of these
+    spins_rps : (m, 3) the spin of these ticks
     """
 
-    run: Run
     normals: Floats
     on: NDArray[np.bool_]
     seconds: Floats
-    ends: dict[int, int]
     pictured: list[int]
+    ends: NDArray[np.int64]
+    spins_rps: Floats
 
-    def count(self, density: Singles, index: int) -> Floats:
-        """Fill `density` with the events up to a tick, in the body frame; the spin by which they were turned back."""
-        spin_rps = vector_of(shown_estimate(self.run.ticks[index])[0])
-        seen = slice(max(self.ends[index] - EVENTS_PAINTED, 0), self.ends[index])
-        turn_back_and_count(density, self.normals[seen], self.on[seen], self.seconds[seen], spin_rps)
-        return spin_rps
+    def pictures(self) -> list[Bytes]:
+        """(m, height, width, 3) the ball's texture, the two discs and the unrolled map, at every pictured tick."""
+        seen = np.stack([np.maximum(self.ends - EVENTS_PAINTED, 0), self.ends], axis=1)
+        middle = self._middle(slice(*seen[-1]))
+        body = np.tile(np.eye(3), (len(self.pictured), 1, 1))
+        frames = np.array([map_frame(spin_rps, middle) for spin_rps in self.spins_rps])
+        made = [np.repeat(nothing[None], len(self.pictured), axis=0) for nothing in _nothing()]
+        paint(
+            tuple(pictures.reshape(len(pictures), -1, 3) for pictures in made),
+            (_texture(), _discs(middle), _map()),
+            (body, body, frames),
+            self.normals,
+            self.on,
+            self.seconds,
+            seen,
+            self.spins_rps,
+        )
+        return made
 
-    def middle(self, density: Singles) -> Floats:
+    def _middle(self, seen: slice) -> Floats:
         """The direction in which the logo lies, by the shot's last estimate; to the camera where there is none."""
-        self.count(density, self.pictured[-1])
-        counts = density[..., :2].sum(axis=3)
-        places = np.arange(CELLS) - (CELLS - 1) / 2
-        sides = (counts.sum(axis=(1, 2)), counts.sum(axis=(0, 2)), counts.sum(axis=(0, 1)))
-        direction = np.array([places @ side for side in sides])
-        return direction if np.linalg.norm(direction) > 0 else TO_CAMERA
+        density = np.empty((CELLS, CELLS, CELLS, 3), np.float32)
+        turn_back_and_count(density, self.normals[seen], self.on[seen], self.seconds[seen], self.spins_rps[-1])
+        direction = centroid(density)
+        return direction if direction.any() else TO_CAMERA
 
 
 def _painted_shots(run: Run) -> Iterator[_Shot]:
@@ -110,40 +105,22 @@ def _painted_shots(run: Run) -> Iterator[_Shot]:
         normals, on, t_us = (
             np.concatenate([getattr(part, name) for part in parts_of]) for name in ("normals", "on", "t_us")
         )
-        ends = dict(zip(indices, np.cumsum([len(part) for part in parts_of]).tolist(), strict=True))
+        ends = np.cumsum([len(part) for part in parts_of])
         pictured = []
-        for index in indices:
+        for place, index in enumerate(indices):
             if run.ticks[index].packet.end_us - last_us >= PICTURE_US or index == indices[-1]:
                 last_us = run.ticks[index].packet.end_us
-                pictured.append(index)
-        yield _Shot(run, normals, on, (start_us - t_us) * 1e-6, ends, pictured)
+                pictured.append(place)
+        ticks = [indices[place] for place in pictured]
+        spins_rps = np.array([vector_of(shown_estimate(run.ticks[index])[0]) for index in ticks])
+        yield _Shot(normals, on, (start_us - t_us) * 1e-6, ticks, ends[pictured], spins_rps)
 
 
-def _texture(density: Singles) -> bytes:
-    """RGB of the ball's texture."""
-    directions = _texture_directions()
-    counts, texture = np.empty((2, len(directions)), np.float32), np.empty((len(directions), 3), np.uint8)
-    read_density(counts, density, directions, BODY)
-    colour_counts(texture, np.arange(len(texture)), counts.sum(axis=0, keepdims=True), PAINT, WHITE)
-    return texture.tobytes()
-
-
-class _Flat:
-    """A flat picture of the ball: which direction lies behind which of its pixels."""
-
-    def __init__(self, directions: Floats, mask: NDArray[np.bool_]) -> None:
-        """directions : (height, width, 3); mask : (height, width) which pixels have one."""
-        self._directions = directions[mask]
-        self._places = np.flatnonzero(mask)
-        self._empty = np.full((*mask.shape, 3), at.BACKGROUND, np.uint8)
-
-    def picture(self, density: Singles, frame: Floats = BODY) -> bytes:
-        """PNG with ON's and OFF's densities in their colours; the rows of `frame` are the picture's axes."""
-        counts = np.empty((2, len(self._directions)), np.float32)
-        read_density(counts, density, self._directions, frame)
-        picture = self._empty.copy()
-        colour_counts(picture.reshape(-1, 3), self._places, counts, POLARITIES_BGR, DISC_BGR)
-        return bytes(cv2.imencode(".png", picture, PNG_QUICK)[1])
+def _raw(pictures: Bytes) -> tuple[Bytes, list[rr.components.ImageFormat]]:
+    """The bytes of RGB pictures (m, height, width, 3) as rows, and what they are."""
+    count, height, width, _ = pictures.shape
+    form = rr.components.ImageFormat(width=width, height=height, color_model="RGB", channel_datatype="U8")
+    return pictures.reshape(count, -1), [form] * count
 
 
 def _graticule() -> Chunk:
@@ -155,16 +132,28 @@ def _graticule() -> Chunk:
 
 
 @cache
-def _texture_directions() -> Floats:
-    return texture_directions().reshape(-1, 3)
-
-
-def _discs_around(middle: Floats) -> _Flat:
-    """The two halves of the ball side by side, the left one around this direction of the body frame."""
-    return _Flat(*disc_directions(middle))
+def _nothing() -> tuple[Bytes, Bytes, Bytes]:
+    """The texture, the discs and the map before anything is painted: (height, width, 3) each."""
+    discs = np.full((*disc_mask().shape, 3), at.BACKGROUND, np.uint8)
+    discs[disc_mask()] = DISC
+    texture, maps = ((size[1], size[0], 3) for size in (TEXTURE_PX, MAP_PX))
+    return np.full(texture, WHITE, np.uint8), discs, np.full(maps, DISC, np.uint8)
 
 
 @cache
-def _map() -> _Flat:
-    directions = map_directions()
-    return _Flat(directions, np.ones(directions.shape[:2], np.bool_))
+def _texture() -> Canvas:
+    """The ball's own skin."""
+    directions = texture_directions().reshape(-1, 3)
+    return Canvas(np.arange(len(directions)), directions, PAINT, WHITE)
+
+
+def _discs(middle: Floats) -> Canvas:
+    """The two halves of the ball side by side, the left one around this direction of the body frame."""
+    return Canvas(np.flatnonzero(disc_mask()), disc_directions(middle), POLARITIES, DISC)
+
+
+@cache
+def _map() -> Canvas:
+    """All of the ball, unrolled."""
+    directions = map_directions().reshape(-1, 3)
+    return Canvas(np.arange(len(directions)), directions, POLARITIES, DISC)

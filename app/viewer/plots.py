@@ -84,8 +84,8 @@ def spin_chunks(run: Run) -> list[Chunk]:
     for i, (axis, colour) in enumerate(zip("xyz", (at.ON, at.KALMAN_COLOUR, at.OFF), strict=True)):
         values = from_start(vectors[:, i])
         chunks += line(f"{at.SPIN_PARTS}/{axis}", run.times_us, values, f"{axis} [rps]", colour, 2.0)
-    if run.truth is not None:
-        chunks += _true_spin(run)
+    if run.true_spins_rps is not None:
+        chunks += _true_spin(run, run.true_spins_rps)
     return chunks
 
 
@@ -141,10 +141,7 @@ def _rate_curves(run: Run) -> tuple[NDArray[np.int64], Floats, Floats]:
     return np.concatenate(times[::-1]), np.concatenate(curves[::-1]), found if found.size else np.array([np.nan])
 
 
-def _true_spin(run: Run) -> list[Chunk]:
-    assert run.truth is not None
-    t_us = np.array([tick.track.t_us for tick in run.ticks])
-    spin = run.true_values(t_us, run.truth.spin_rps)
+def _true_spin(run: Run, spin: Floats) -> list[Chunk]:
     magnitude = np.linalg.norm(spin, axis=1)
     chunks = line(f"{at.SPIN_MAGNITUDE}/truth", run.times_us, from_start(magnitude), "truth", at.TRUTH_COLOUR, 0.8)
     for method in run.methods:

@@ -84,6 +84,13 @@ class Run:
         return found[0] if found else self.ticks[0].packet.end_us
 
     @cached_property
+    def true_spins_rps(self) -> Floats | None:
+        """(n, 3) the true spin at the time of every tick's state; NaN where there is none, None without truth."""
+        if self.truth is None:
+            return None
+        return self.true_values(np.array([tick.track.t_us for tick in self.ticks]), self.truth.spin_rps)
+
+    @cached_property
     def has_ball(self) -> NDArray[np.bool_]:
         """(n,) whether there is a ball at the end of each tick."""
         return np.array([tick.track.has_ball for tick in self.ticks], np.bool_)

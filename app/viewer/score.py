@@ -6,7 +6,7 @@ pictures are of the last full estimate.
 
 from __future__ import annotations
 
-from functools import cache, lru_cache
+from functools import cache
 
 import cv2
 import numpy as np
@@ -16,15 +16,16 @@ from numpy.typing import NDArray
 from pipeline.stages.contrast import ContrastResult
 
 from . import entities as at
-from .rerun_api import Chunk, bars, columns_at, once
+from .png import png
+from .rerun_api import Chunk, bars, columns_at, once, styled
 from .run import Run
-from .stages import PNG_QUICK
 
 Floats = NDArray[np.float64]
 
-DISC_RADIUS_PX, GAP_PX = 100, 16
-AXES_WIDTH_PX = 4 * DISC_RADIUS_PX + GAP_PX
-COARSE = 48  # the scores are averaged in so many pixels a side: 2.4 degrees in the middle, far below their reach
+# The scores are averaged in so many cells a side, 3.6 degrees in the middle, far below their reach.
+COARSE, COARSE_GAP, CELL_PX = 32, 3, 6
+COARSE_WIDTH = 2 * COARSE + COARSE_GAP
+DISC_RADIUS_PX, GAP_PX = COARSE * CELL_PX // 2, COARSE_GAP * CELL_PX
 # How far a scored direction shines: half the distance of the hundred scored directions from each other.
 REACH_RAD = 0.18
 BRIGHTEST = 150  # grey value of the highest score: the marks on it must stand out
@@ -45,11 +46,9 @@ def score_chunks(run: Run) -> list[Chunk]:
         "best": [np.empty((0, 3)) if result is None else result.best_rps[None] for result in results],
         "rivals": [np.empty((0, 3)) if result is None else result.rivals_rps for result in results],
     }
-    if run.truth is not None:
-        t_us = np.array([tick.track.t_us for tick in run.ticks])
-        true_rps = run.true_values(t_us, run.truth.spin_rps)
-        known = [result is not None and np.isfinite(spin).all() for result, spin in zip(results, true_rps, strict=True)]
-        spins["truth"] = [spin[None][: int(shown)] for spin, shown in zip(true_rps, known, strict=True)]
+    if run.true_spins_rps is not None:
+        known = np.isfinite(run.true_spins_rps).all(axis=1) & np.array([result is not None for result in results])
+        spins["truth"] = [spin[None][: int(shown)] for spin, shown in zip(run.true_spins_rps, known, strict=True)]
     return [*_over_magnitude(run, results, spins), *_over_axes(run, results, spins)]
 
 
@@ -74,26 +73,29 @@ _NONE: tuple[Floats, Floats] = (np.empty(0), np.empty(0))
 
 def _over_axes(run: Run, results: list[ContrastResult | None], spins: dict[str, list[Floats]]) -> list[Chunk]:
     """Two discs of axis directions: those towards the camera and those away from it, x right and y down in both."""
-    pictures = [_blank()]
-    last: ContrastResult | None = None
-    for result in results:
-        if result is None:
-            pictures.append(_blank())
-        elif last is not None and np.array_equal(result.direction_scores, last.direction_scores):
-            pictures.append(pictures[-1])  # the tick followed the last full estimate
-        else:
-            pictures.append(_heat(result.directions, result.direction_scores))
-        last = result
+    times, pictures = [run.start_us], [np.full((COARSE, COARSE_WIDTH, 3), at.BACKGROUND, np.uint8)]
+    last: Floats | None = None
+    for end_us, result in zip(run.ends_us, results, strict=True):
+        scores = None if result is None else result.direction_scores
+        if scores is last or (scores is not None and last is not None and np.array_equal(scores, last)):
+            continue  # the tick followed the last full estimate
+        last = scores
+        times.append(end_us)
+        pictures.append(pictures[0] if result is None else _heat(result.directions, result.direction_scores))
+    form = rr.components.ImageFormat(width=COARSE_WIDTH, height=COARSE, color_model="RGB", channel_datatype="U8")
+    columns = rr.Image.columns(buffer=np.array(pictures).reshape(len(pictures), -1), format=[form] * len(pictures))
+    heat = f"{at.SCORE_AXES}/score"
     chunks = [
-        columns_at(at.SCORE_AXES, run.times_us, rr.EncodedImage.columns(blob=pictures)),
-        once(at.SCORE_AXES, rr.EncodedImage.from_fields(media_type="image/png", draw_order=-10.0)),
+        columns_at(heat, np.array(times), columns),
+        styled(heat, rr.Image, magnification_filter="linear", draw_order=-20.0),
+        *_frame(heat),
     ]
     for name, column in spins.items():
-        columns = rr.Points2D.columns(positions=np.concatenate([_on_map(rows) for rows in column]))
+        columns = rr.Points2D.columns(positions=_on_map(np.concatenate(column)))
         colour, _, radius = MARKS[name]
-        style = rr.Points2D.from_fields(colors=[colour], radii=[-radius], draw_order=40.0 - radius)
-        entity = f"{at.SCORE_AXES}/{name}"
-        chunks += [once(entity, style), columns_at(entity, run.times_us, columns, [0, *map(len, column)])]
+        entity, look = f"{at.SCORE_AXES}/{name}", {"colors": colour, "radii": -radius, "draw_order": 40.0 - radius}
+        lengths = [0, *map(len, column)]
+        chunks += [styled(entity, rr.Points2D, **look), columns_at(entity, run.times_us, columns, lengths)]
     return chunks
 
 
@@ -105,46 +107,35 @@ def _on_map(spins_rps: Floats) -> NDArray[np.float32]:
     return np.stack([x, y], axis=1).astype(np.float32)
 
 
-def _heat(directions: Floats, scores: Floats) -> bytes:
-    """PNG: at every axis the mean of the scores around it, dark = none, light = the highest."""
-    mean = _weights(directions.astype(np.float32).tobytes()) @ scores.astype(np.float32)
-    grey = np.clip(BRIGHTEST * mean / max(float(scores.max()), 1e-9), 0, BRIGHTEST).astype(np.uint8)
-    side = 2 * DISC_RADIUS_PX
-    values = np.zeros((side, AXES_WIDTH_PX), np.uint8)
-    values[:, :side], values[:, -side:] = (cv2.resize(half, (side, side)) for half in grey)
-    picture = np.full((side, AXES_WIDTH_PX, 3), at.BACKGROUND[0], np.uint8)
-    cv2.copyTo(cv2.applyColorMap(values, cv2.COLORMAP_BONE), _discs(), picture)
-    return bytes(cv2.imencode(".png", picture, PNG_QUICK)[1])
+def _heat(directions: Floats, scores: Floats) -> NDArray[np.uint8]:
+    """(COARSE, COARSE_WIDTH, 3) at every axis the mean of the scores around it, dark = none, light = the highest."""
+    weights = np.exp((_axes() @ directions.astype(np.float32).T - 1) / np.float32(REACH_RAD**2))
+    mean = (weights @ scores.astype(np.float32)) / weights.sum(axis=-1)
+    values = np.zeros((COARSE, COARSE_WIDTH), np.uint8)
+    grey = np.clip(BRIGHTEST * mean / max(float(scores.max()), 1e-9), 0, BRIGHTEST)
+    values[:, :COARSE], values[:, -COARSE:] = grey
+    return np.asarray(cv2.applyColorMap(values, cv2.COLORMAP_BONE)[..., ::-1], np.uint8)
 
 
 @cache
-def _discs() -> NDArray[np.uint8]:
-    """Where the two discs are in the picture: 1, else 0."""
-    mask = np.zeros((2 * DISC_RADIUS_PX, AXES_WIDTH_PX), np.uint8)
-    for x in (DISC_RADIUS_PX, AXES_WIDTH_PX - DISC_RADIUS_PX):
-        cv2.circle(mask, (x, DISC_RADIUS_PX), DISC_RADIUS_PX, 1, cv2.FILLED)
-    return mask
-
-
-@lru_cache(4)  # contrast scores the same directions again and again
-def _weights(directions: bytes) -> NDArray[np.float32]:
-    """(2, COARSE, COARSE, n) how much each of the directions (n, 3) float32 shines on the axes; the sum is 1."""
-    weights = np.exp((_axes() @ np.frombuffer(directions, np.float32).reshape(-1, 3).T - 1) / np.float32(REACH_RAD**2))
-    whole: NDArray[np.float32] = weights / weights.sum(axis=-1, keepdims=True)
-    return whole
+def _frame(heat: str) -> list[Chunk]:
+    """What lies around the two discs, over the coarse picture, and the size of that."""
+    shape = 2 * DISC_RADIUS_PX, 4 * DISC_RADIUS_PX + GAP_PX
+    hidden = np.full(shape, 255, np.uint8)
+    for x in (DISC_RADIUS_PX, shape[1] - DISC_RADIUS_PX):
+        cv2.circle(hidden, (x, DISC_RADIUS_PX), DISC_RADIUS_PX, 0, cv2.FILLED, cv2.LINE_AA)
+    picture = np.dstack([np.full((*shape, 3), at.BACKGROUND, np.uint8), hidden])
+    # Only what is not quite opaque lets through what is below its holes.
+    around = rr.EncodedImage(contents=png(picture), media_type="image/png", draw_order=-10.0, opacity=0.999)
+    return [once(heat, rr.Transform3D(scale=CELL_PX)), once(at.SCORE_AXES, around)]
 
 
 @cache
 def _axes() -> NDArray[np.float32]:
-    """(2, COARSE, COARSE, 3) the axes behind the pixels of a coarse picture of each disc; the rim's beyond it."""
+    """(2, COARSE, COARSE, 3) the axes behind the pixels of the coarse picture's discs; the rim's beyond it."""
     side = (np.arange(COARSE) + 0.5) / COARSE * 2 - 1
     x, y = np.meshgrid(side, side)
     z = np.sqrt(np.clip(1 - x**2 - y**2, 0, None))
     axes = np.stack([np.stack([x, y, -z], axis=-1), np.stack([x, y, z], axis=-1)])
     whole: NDArray[np.float32] = (axes / np.linalg.norm(axes, axis=-1, keepdims=True)).astype(np.float32)
     return whole
-
-
-@cache
-def _blank() -> bytes:
-    return _heat(np.array([[0.0, 0.0, 1.0]]), np.zeros(1))

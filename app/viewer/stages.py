@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import cv2
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
@@ -19,15 +18,13 @@ from pipeline.results import Circle
 
 from . import entities as at
 from .plots import from_start, rate_chunks, residual_plots, spin_chunks, state_plots, true_state
-from .rerun_api import Chunk, columns_at, line, once, states
+from .png import png
+from .rerun_api import Chunk, columns_at, line, once, states, styled
 from .run import Run
 
 Floats = NDArray[np.float64]
 
 EVENTS_SHOWN = 1_500_000  # of more, every second, third ... is shown: 15 MB of points is what a flight may take
-# A fifth faster than the default on EROS surfaces and 3 times on flat pictures; with the filters, made for
-# photographs, which quick compression brings along, it would take 3 times as long.
-PNG_QUICK = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE]
 WHEEL_PX = 128
 DASHES = 12
 
@@ -70,7 +67,7 @@ def filter_chunks(run: Run) -> list[Chunk]:
 def surface_chunks(run: Run) -> list[Chunk]:
     """The surface as it was searched, whole, in its own pixels."""
     blank = np.zeros((run.camera.height_px, run.camera.width_px), np.uint8)
-    blobs = [_png(blank), *(_png(tick.surface.values) for tick in run.ticks)]
+    blobs = [png(blank), *(png(tick.surface.values) for tick in run.ticks)]
     # Pixels are named by their centres: the image's corner lies half a pixel up and left of pixel (0, 0).
     corner = rr.Transform3D(translation=[-0.5, -0.5, 0.0])
     columns = rr.EncodedImage.columns(blob=blobs)
@@ -140,13 +137,13 @@ def flow_chunks(run: Run) -> list[Chunk]:
         )
         for tick in run.ticks
     ]
-    blobs = [_png(picture) for picture in (np.zeros_like(pictures[0]), *pictures)]
+    blobs = [png(picture) for picture in (np.zeros_like(pictures[0]), *pictures)]
     corner = rr.Transform3D(translation=[-half_px - 0.5, -half_px - 0.5, 0.0])
     beside = rr.Transform3D(translation=[1.2 * half_px, -0.4 * half_px, 0.0], scale=0.8 * half_px / WHEEL_PX)
     return [
         once(at.FLOW, corner, rr.EncodedImage.from_fields(media_type="image/png", draw_order=-10.0)),
         columns_at(at.FLOW, run.times_us, rr.EncodedImage.columns(blob=blobs)),
-        once(at.FLOW_WHEEL, beside, rr.EncodedImage(contents=_png(hsv_wheel(WHEEL_PX)), media_type="image/png")),
+        once(at.FLOW_WHEEL, beside, rr.EncodedImage(contents=png(hsv_wheel(WHEEL_PX)), media_type="image/png")),
     ]
 
 
@@ -168,12 +165,6 @@ def _keys(events: object, start_us: int) -> NDArray[np.int64]:
     return keys
 
 
-def _png(image: NDArray[np.uint8]) -> bytes:
-    """A grey or RGB image as PNG."""
-    ordered = image[..., ::-1] if image.ndim == 3 else image
-    return bytes(cv2.imencode(".png", ordered, PNG_QUICK)[1])
-
-
 def _circles(
     run: Run, entity: str, circles: Sequence[Circle | None], colour: at.Colour, width_ui: float
 ) -> list[Chunk]:
@@ -183,9 +174,11 @@ def _circles(
         centers=np.array([[c.x_px, c.y_px] for c in found], np.float32).reshape(-1, 2),
         half_sizes=np.array([[c.radius_px, c.radius_px] for c in found], np.float32).reshape(-1, 2),
     )
-    style = rr.Ellipses2D.from_fields(colors=[colour], line_radii=[-width_ui])
     lengths = [0, *(int(circle is not None) for circle in circles)]
-    return [once(entity, style), columns_at(entity, run.times_us, columns, lengths)]
+    return [
+        styled(entity, rr.Ellipses2D, colors=colour, line_radii=-width_ui),
+        columns_at(entity, run.times_us, columns, lengths),
+    ]
 
 
 def _rings(run: Run, entity: str, radii_px: Sequence[float], colour: at.Colour) -> list[Chunk]:
@@ -213,8 +206,7 @@ def _true_circle(run: Run) -> list[Chunk]:
     known = np.isfinite(state[:, 0])
     strips = [dash for row in state[known] for dash in row[:2] + row[4] * unit]
     columns = rr.LineStrips2D.columns(strips=strips)
-    style = rr.LineStrips2D.from_fields(colors=[at.TRUTH_COLOUR], radii=[-0.8])
     return [
-        once(at.TRUE_CIRCLE, style),
+        styled(at.TRUE_CIRCLE, rr.LineStrips2D, colors=at.TRUTH_COLOUR, radii=-0.8),
         columns_at(at.TRUE_CIRCLE, run.times_us, columns, [0, *(DASHES * known.astype(int))]),
     ]

@@ -7,14 +7,14 @@ The body frame is the camera frame at the shot's start, turning with the ball fr
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-# Cells along the cube around the unit sphere: 2.7 degrees, a pixel's share of a ball of 20 px radius. Finer pictures
-# show no more, and the tuner draws them anew with every change.
-CELLS = 48
+# As fine as the cells in which the events are counted: finer pictures show no more.
 TEXTURE_PX = (144, 72)  # 2.5 degrees a texel
 DISC_PX = 96
 MAP_PX = (180, 90)  # 2 degrees a pixel
@@ -67,8 +67,8 @@ def map_frame(spin_rps: Floats, middle: Floats) -> Floats:
     return np.stack([out, np.cross(pole, out), pole])
 
 
-def disc_directions(middle: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """(height, width, 3) unit vectors behind the pixels of two discs, and which pixels lie on a disc.
+def disc_directions(middle: Floats) -> Floats:
+    """(n, 3) unit vectors behind the pixels of two discs, those of `disc_mask` in its order.
 
     The left disc is the half of the ball around `middle` as seen from outside, the right one the other half, as if
     turned about the vertical. Up is the image's up, as far as it can be.
@@ -78,13 +78,29 @@ def disc_directions(middle: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     down = down - (down @ out) * out
     down /= np.linalg.norm(down)
     right = np.cross(down, -out)  # x right, y down, the third away from the viewer
-    side = (np.arange(DISC_PX) + 0.5) / DISC_PX * 2.1 - 1.05
-    x, y = np.meshgrid(side, side)
-    on_disc = x**2 + y**2 < 1
+    turned: Floats = _discs() @ np.stack([right, down, out])
+    return turned
+
+
+@cache
+def disc_mask() -> NDArray[np.bool_]:
+    """(height, width) which pixels of the picture lie on one of the two discs."""
+    side = _disc_side()
+    on_disc = side[None, :] ** 2 + side[:, None] ** 2 < 1
+    return np.hstack([on_disc, np.zeros((DISC_PX, GAP_PX), np.bool_), on_disc])
+
+
+@cache
+def _discs() -> Floats:
+    """(n, 3) what lies behind the pixels of the discs: right, down and out of the left one."""
+    x, y = np.meshgrid(_disc_side(), _disc_side())
     z = np.sqrt(np.clip(1 - x**2 - y**2, 0, None))
-    front = x[..., None] * right + y[..., None] * down + z[..., None] * out
-    back = -x[..., None] * right + y[..., None] * down - z[..., None] * out
+    front = np.stack([x, y, z], axis=-1)
     gap = np.zeros((DISC_PX, GAP_PX, 3))
-    gap[..., 2] = 1
-    mask = np.hstack([on_disc, np.zeros((DISC_PX, GAP_PX), np.bool_), on_disc])
-    return np.hstack([front, gap, back]), mask
+    both: Floats = np.hstack([front, gap, front * [-1, 1, -1]])[disc_mask()]
+    return both
+
+
+def _disc_side() -> Floats:
+    """The middles of a disc's pixels along one side, in radii."""
+    return (np.arange(DISC_PX) + 0.5) / DISC_PX * 2.1 - 1.05

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+import math
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
-import cv2
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
@@ -12,16 +13,18 @@ from PIL import Image, ImageDraw, ImageFont
 
 from pipeline.chain import Tick
 from pipeline.results import SpinEstimate
-from pipeline.shots import Shot
 
-from ..words import axis_words, kind_of_spin, km_h, rpm, speed_words, std_words
+from ..words import Kind, axis_words, kind_of_spin, km_h, rpm, speed_words, std_words
 from . import entities as at
-from .rerun_api import Chunk, columns_at, once
+from .png import png
+from .rerun_api import Chunk, columns_at, once, styled
 from .run import Run, shown_estimate
 
 Vector = NDArray[np.float64]
+Block = tuple[str, str]  # big letters, small print
+Card = tuple[Block, Block, Block]
 
-CARD_PX = 640
+CARD_PX, BLOCK_PX = 640, 213
 BIG_PX, SMALL_PX = 108, 32
 TEXT, FAINT = 240, 150  # grey values
 # Kalman velocity needs a moment to settle; a flight's direction is told from this speed on.
@@ -30,27 +33,114 @@ SLOWEST_M_S = 0.2
 
 def summary_chunks(run: Run) -> list[Chunk]:
     """The summary and the card at the start and at the end of every tick."""
-    texts, cards = [_opening(run)], [_card(("-", "-", "No ball yet"), ("spin", "speed", run.no_shot_reason or ""))]
+    texts, cards = [_opening(run)], [(("-", "spin"), ("-", "speed"), ("No ball yet", run.no_shot_reason or ""))]
     finals = {shot.end_us: shot for shot in run.shots}
     result: list[str] = []
-    card = cards[0]
-    for tick in run.ticks:
+    for tick, true_rps in zip(run.ticks, _true_spins(run), strict=True):
         velocity = _velocity_m_s(run, tick)
         shot = finals.get(tick.packet.end_us)
+        if shot is not None and not run.fixed and shot.t_us.size > 1:
+            velocity = shot.velocity_m_s(run.camera, run.ball_radius_m)
+        now = _Now(run, tick, velocity, true_rps)
         if shot is not None:
-            if not run.fixed and shot.t_us.size > 1:
-                velocity = shot.velocity_m_s(run.camera, run.ball_radius_m)
-            result = _shot_result(run, tick, shot, velocity)
-        if tick.track.has_ball:
-            card = _tick_card(run, tick, velocity)
-        texts.append("\n".join(_tick_text(run, tick, velocity, result)))
-        cards.append(card)
+            milliseconds = (shot.end_us - shot.start_us) / 1000
+            result = now.told(f"shot {shot.number + 1} of {len(run.shots)}, {milliseconds:.0f} ms")
+        if not tick.track.has_ball:
+            text = _without_ball(run, tick, result)
+        else:
+            text = result if shot is not None else now.told("so far")
+        texts.append("\n".join(text))
+        cards.append(now.card() if tick.track.has_ball else cards[-1])
     return [
         columns_at(at.SUMMARY, run.times_us, rr.TextDocument.columns(text=texts)),
-        once(at.SUMMARY, rr.TextDocument.from_fields(media_type="text/markdown")),
-        columns_at(at.COACH, run.times_us, rr.EncodedImage.columns(blob=cards)),
-        once(at.COACH, rr.EncodedImage.from_fields(media_type="image/png")),
+        styled(at.SUMMARY, rr.TextDocument, media_type="text/markdown"),
+        *_card_chunks(run, cards),
     ]
+
+
+@dataclass(frozen=True)
+class _Now:
+    """What is known at the end of a tick with a ball.
+
+    velocity_m_s : (3,) camera frame, None for a ball in place; true_rps : (3,) None where there is no truth
+    """
+
+    run: Run
+    tick: Tick
+    velocity_m_s: Vector | None
+    true_rps: Vector | None
+
+    @cached_property
+    def answer(self) -> tuple[SpinEstimate, Kind, bool] | None:
+        """The estimate shown, what kind of spin it is, and whether it is trusted; None where no method answers."""
+        estimate, trusted = shown_estimate(self.tick)
+        if estimate is None or estimate.vector_rps is None:
+            return None
+        return estimate, kind_of_spin(estimate.vector_rps, self.velocity_m_s, self.run.camera.up), trusted
+
+    def told(self, said: str) -> list[str]:
+        """The whole summary."""
+        return [*self._headline(said), *self._table(), *_evidence(self.run, self.tick)]
+
+    def _headline(self, said: str) -> list[str]:
+        """The answer in a heading, or that there is none yet and why."""
+        speed = speed_words(self.velocity_m_s)
+        if self.answer is None:
+            return ["## Spin not known", "", f"{_sentence(speed)}; {said}.", ""]
+        estimate, kind, trusted = self.answer
+        magnitude_rps = estimate.magnitude_rps or 0.0
+        doubt = "" if trusted else " (no method is trusted)"
+        return [
+            f"## {magnitude_rps:.1f} rps · {kind.name}{doubt}",
+            "",
+            f"{_sentence(kind.sentence)}. **{rpm(magnitude_rps):.0f} rpm**, {speed}; {said}.",
+            "",
+        ]
+
+    def _table(self) -> list[str]:
+        """Every method's answer or refusal, and the truth where there is one."""
+        lines = ["| method | spin [rps] | axis (x, y, z) |", "|---|---|---|"]
+        for method, estimate in self.tick.estimates.items():
+            name = f"**{method} ✔**" if self.tick.best == method else method
+            lines.append(f"| {name} | {_magnitude(estimate)} | {axis_words(estimate)} |")
+        return [*lines, *self._truth_rows(), ""]
+
+    def _truth_rows(self) -> list[str]:
+        """The truth as the table's last row, and how far from it every answer is."""
+        if self.true_rps is None:
+            return []
+        truth = SpinEstimate("truth", self.true_rps, None, None)
+        lines = [f"| truth | {_magnitude(truth)} | {axis_words(truth)} |", ""]
+        for method, estimate in self.tick.estimates.items():
+            if estimate.axis is not None and truth.axis is not None:
+                angle = math.degrees(math.acos(min(max(float(estimate.axis @ truth.axis), -1.0), 1.0)))
+                off = abs((estimate.magnitude_rps or 0) - (truth.magnitude_rps or 0))
+                lines += [f"{method} is {off:.1f} rps and {angle:.1f}° from the truth.", ""]
+        return lines
+
+    def card(self) -> Card:
+        """Spin, speed and kind, each in big letters with its small print."""
+        velocity = self.velocity_m_s
+        speed = None if velocity is None else float(np.linalg.norm(velocity))
+        big = "In place" if self.run.fixed else "-" if speed is None else f"{km_h(speed):.0f} km/h"
+        speed_lines = big, "" if speed is None else f"{speed:.1f} m/s"
+        if self.answer is None or not self.answer[2]:
+            return ("-", ""), speed_lines, ("Spin not known", "yet, or too little to trust")
+        estimate, kind, _ = self.answer
+        magnitude, std = estimate.magnitude_rps or 0.0, estimate.magnitude_std_rps
+        margin = "" if std is None else f" ± {rpm(std):.0f}"
+        return (
+            (f"{magnitude:.0f} rps", f"{rpm(magnitude):.0f}{margin} rpm"),
+            speed_lines,
+            (kind.name.capitalize(), kind.sentence.removeprefix(kind.name).strip(" ,")),
+        )
+
+
+def _true_spins(run: Run) -> list[Vector | None]:
+    """The true spin at every tick; None where the ball does not spin or is not there."""
+    if run.true_spins_rps is None:
+        return [None] * len(run.ticks)
+    return [spin if np.isfinite(spin).all() and spin.any() else None for spin in run.true_spins_rps]
 
 
 def _velocity_m_s(run: Run, tick: Tick) -> Vector | None:
@@ -87,66 +177,15 @@ def _origin(run: Run) -> list[str]:
     ]
 
 
-def _tick_text(run: Run, tick: Tick, velocity: Vector | None, result: list[str]) -> list[str]:
-    if not tick.track.has_ball:
-        if result:
-            return [*result, "", "---", f"Now: {tick.track.reason or 'no ball'}"]
-        return [_opening(run), "", f"Tracker: {tick.track.status}, {tick.track.reason or 'no ball'}"]
-    if result and run.shots and any(shot.end_us == tick.packet.end_us for shot in run.shots):
-        return result
-    return [*_headline(run, tick, velocity, "so far"), *_table(run, tick), *_evidence(run, tick)]
-
-
-def _shot_result(run: Run, tick: Tick, shot: Shot, velocity: Vector | None) -> list[str]:
-    """What the whole shot says."""
-    milliseconds = (shot.end_us - shot.start_us) / 1000
-    said = f"shot {shot.number + 1} of {len(run.shots)}, {milliseconds:.0f} ms"
-    return [*_headline(run, tick, velocity, said), *_table(run, tick), *_evidence(run, tick)]
-
-
-def _headline(run: Run, tick: Tick, velocity: Vector | None, said: str) -> list[str]:
-    """The answer in a heading, or that there is none yet and why."""
-    estimate, trusted = shown_estimate(tick)
-    lines = []
-    if estimate is not None and estimate.vector_rps is not None:
-        kind = kind_of_spin(estimate.vector_rps, velocity, run.camera.up)
-        doubt = "" if trusted else " (no method is trusted)"
-        lines += [f"## {estimate.magnitude_rps:.1f} rps · {kind.name}{doubt}", ""]
-        turns = f"**{rpm(estimate.magnitude_rps or 0):.0f} rpm**"
-        lines += [f"{_sentence(kind.sentence)}. {turns}, {speed_words(velocity)}; {said}.", ""]
-    else:
-        lines += ["## Spin not known", "", f"{_sentence(speed_words(velocity))}; {said}.", ""]
-    return lines
+def _without_ball(run: Run, tick: Tick, result: list[str]) -> list[str]:
+    """The last shot's result while no ball is there, or that there was none yet."""
+    if result:
+        return [*result, "", "---", f"Now: {tick.track.reason or 'no ball'}"]
+    return [_opening(run), "", f"Tracker: {tick.track.status}, {tick.track.reason or 'no ball'}"]
 
 
 def _sentence(text: str) -> str:
     return text[:1].upper() + text[1:]
-
-
-def _table(run: Run, tick: Tick) -> list[str]:
-    """Every method's answer or refusal, and the truth where there is one."""
-    lines = ["| method | spin [rps] | axis (x, y, z) |", "|---|---|---|"]
-    for method, estimate in tick.estimates.items():
-        name = f"**{method} ✔**" if tick.best == method else method
-        lines.append(f"| {name} | {_magnitude(estimate)} | {axis_words(estimate)} |")
-    return [*lines, *_truth_rows(run, tick), ""]
-
-
-def _truth_rows(run: Run, tick: Tick) -> list[str]:
-    """The truth as the table's last row, and how far from it every answer is."""
-    if run.truth is None:
-        return []
-    spin = run.true_values(np.array([tick.track.t_us]), run.truth.spin_rps)[0]
-    if not (np.isfinite(spin).all() and spin.any()):
-        return []
-    truth = SpinEstimate("truth", spin, None, None)
-    lines = [f"| truth | {_magnitude(truth)} | {axis_words(truth)} |", ""]
-    for method, estimate in tick.estimates.items():
-        if estimate.axis is not None:
-            angle = np.degrees(np.arccos(np.clip(estimate.axis @ spin / np.linalg.norm(spin), -1, 1)))
-            off = abs((estimate.magnitude_rps or 0) - (truth.magnitude_rps or 0))
-            lines += [f"{method} is {off:.1f} rps and {angle:.1f}° from the truth.", ""]
-    return lines
 
 
 def _magnitude(estimate: SpinEstimate) -> str:
@@ -189,36 +228,32 @@ def _contrast_words(tick: Tick) -> list[str]:
     return [f"Contrast {result.contrast:.2f} an event over chance, {stretch}; {rivals}.", ""]
 
 
-def _tick_card(run: Run, tick: Tick, velocity: Vector | None) -> bytes:
-    """Spin, speed and kind, each in big letters with its small print."""
-    estimate, trusted = shown_estimate(tick)
-    speed = None if velocity is None else float(np.linalg.norm(velocity))
-    speed_big = "In place" if run.fixed else "-" if speed is None else f"{km_h(speed):.0f} km/h"
-    speed_small = "" if speed is None else f"{speed:.1f} m/s"
-    if estimate is None or estimate.vector_rps is None or not trusted:
-        return _card(("-", speed_big, "Spin not known"), ("", speed_small, "yet, or too little to trust"))
-    kind = kind_of_spin(estimate.vector_rps, velocity, run.camera.up)
-    magnitude, std = estimate.magnitude_rps or 0.0, estimate.magnitude_std_rps
-    margin = "" if std is None else f" ± {rpm(std):.0f}"
-    rest = kind.sentence.removeprefix(kind.name).strip(" ,")
-    return _card(
-        (f"{magnitude:.0f} rps", speed_big, kind.name.capitalize()),
-        (f"{rpm(magnitude):.0f}{margin} rpm", speed_small, rest),
-    )
+def _card_chunks(run: Run, cards: list[Card]) -> list[Chunk]:
+    """The card's blocks, one below the other, each where its words change."""
+    chunks = []
+    for number, column in enumerate(zip(*cards, strict=True)):
+        entity = f"{at.COACH}/{number}"
+        changes = [row for row in range(len(column)) if row == 0 or column[row] != column[row - 1]]
+        pictures = [_block(*column[row]) for row in changes]
+        place = rr.Transform3D(translation=[0.0, number * BLOCK_PX, 0.0])
+        chunks += [
+            columns_at(entity, run.times_us[changes], rr.EncodedImage.columns(blob=pictures)),
+            once(entity, place, rr.EncodedImage.from_fields(media_type="image/png")),
+        ]
+    return chunks
 
 
-@lru_cache(maxsize=256)
-def _card(big: tuple[str, str, str], small: tuple[str, str, str]) -> bytes:
-    """PNG of three blocks, each a line in big letters and one in small ones."""
-    picture = Image.new("L", (CARD_PX, CARD_PX), at.BACKGROUND[0])
+@lru_cache(maxsize=512)
+def _block(big: str, small: str) -> bytes:
+    """PNG of a line in big letters and one in small ones."""
+    picture = Image.new("L", (CARD_PX, BLOCK_PX), at.BACKGROUND[0])
     draw = ImageDraw.Draw(picture)
-    for block, (first, second) in enumerate(zip(big, small, strict=True)):
-        left, top = 36, 30 + block * CARD_PX // 3
-        size = _fitting(draw, first, BIG_PX)
-        draw.text((left, top), first, TEXT, font=_font(size))
-        font = _font(_fitting(draw, second, SMALL_PX))
-        draw.text((left + 4, top + 1.2 * size), second, FAINT, font=font)
-    return bytes(cv2.imencode(".png", np.asarray(picture))[1])  # five times as fast as Pillow's
+    left, top = 36, 30
+    size = _fitting(draw, big, BIG_PX)
+    draw.text((left, top), big, TEXT, font=_font(size))
+    font = _font(_fitting(draw, small, SMALL_PX))
+    draw.text((left + 4, top + 1.2 * size), small, FAINT, font=font)
+    return png(np.asarray(picture))
 
 
 @lru_cache

@@ -21,7 +21,7 @@ from . import entities as at
 from .ball import ball_chunks
 from .layouts import NAMES, blueprint
 from .painting import painting_chunks
-from .rerun_api import Chunk, columns_at, once
+from .rerun_api import Chunk, columns_at, once, styled
 from .run import Run
 from .score import score_chunks
 from .stages import STAGES
@@ -183,7 +183,7 @@ def _note(run: Run, text: str) -> list[Chunk]:
     times = run.times_us[:1]
     return [
         columns_at(COMPARED, times, rr.TextDocument.columns(text=[text])),
-        once(COMPARED, rr.TextDocument.from_fields(media_type="text/markdown")),
+        styled(COMPARED, rr.TextDocument, media_type="text/markdown"),
     ]
 
 

@@ -9,6 +9,7 @@ direction between this cell's centre and the next ones' has any density, else 0.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -18,6 +19,7 @@ Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 
+CELLS = 48  # along the cube of a painting: 2.7 degrees, a pixel's share of a ball of 20 px radius
 NOISE_SHARE = 0.1  # of the full count: below it there is no colour
 FULL_RANK = 0.95  # of the marked places: what a twentieth of them exceed has full colour
 
@@ -134,3 +136,61 @@ def colour_counts(
         picture[at, 0] = np.uint8(min(max(red, 0.0), 255.0))
         picture[at, 1] = np.uint8(min(max(green, 0.0), 255.0))
         picture[at, 2] = np.uint8(min(max(blue, 0.0), 255.0))
+
+
+class Canvas(NamedTuple):
+    """What is painted of a picture, and how.
+
+    places : (n,) its pixels; directions : (n, 3) what lies behind them in the picture's own frame
+    colours : (1, 3) for both polarities, or (2, 3) OFF's and ON's; ground : (3,) where there are no events
+    """
+
+    places: NDArray[np.int64]
+    directions: Floats
+    colours: Singles
+    ground: Singles
+
+
+@njit(cache=True, nogil=True)
+def paint(
+    pictures: tuple[Bytes, ...],
+    canvases: tuple[Canvas, ...],
+    frames: tuple[Floats, ...],
+    normals: Floats,
+    on: NDArray[np.bool_],
+    seconds: Floats,
+    seen: NDArray[np.int64],
+    spins_rps: Floats,
+) -> None:
+    """Paint the logo at several moments m, each in pictures (m, pixels, 3) of several kinds, in one call.
+
+    canvases, frames : of every kind; frames (m, 3, 3), the axes of each picture's frame as rows
+    normals, on, seconds : (e, 3), (e,), (e,) the events; of them those of seen (m, 2), from and to, are turned back by
+        spins_rps (m, 3)
+    """
+    density = np.empty((CELLS, CELLS, CELLS, 3), np.float32)
+    for moment in range(spins_rps.shape[0]):
+        first, last = seen[moment]
+        turn_back_and_count(density, normals[first:last], on[first:last], seconds[first:last], spins_rps[moment])
+        for kind in range(len(pictures)):
+            canvas = canvases[kind]
+            counts = np.empty((2, canvas.places.size), np.float32)
+            read_density(counts, density, canvas.directions, frames[kind][moment])
+            if canvas.colours.shape[0] == 1:
+                counts[0] += counts[1]
+                counts = counts[:1]
+            colour_counts(pictures[kind][moment], canvas.places, counts, canvas.colours, canvas.ground)
+
+
+@njit(cache=True, nogil=True)
+def centroid(density: Singles) -> Floats:
+    """(3,) where the events lie on the whole, as a vector from the middle of the cube; zeros where there are none."""
+    found = np.zeros(3)
+    middle = 0.5 * (density.shape[0] - 1)
+    for i, j, k in np.ndindex(density.shape[:3]):
+        count = density[i, j, k, 0] + density[i, j, k, 1]
+        if count > 0.0:
+            found[0] += (i - middle) * count
+            found[1] += (j - middle) * count
+            found[2] += (k - middle) * count
+    return found

@@ -105,7 +105,7 @@ function listen(link) {
   let latest = null;
   settings.addEventListener("change", ({ detail }) => {
     app.runner.change(detail.settled);
-    if (detail.settled) rememberLater();
+    if (detail.settled) rememberLater(REMEMBER_UNSEEN_MS);
     buttons();
   });
   connection.addEventListener("run", async ({ detail }) => {
@@ -125,6 +125,7 @@ function listen(link) {
       first = false;
       if (detail.state === "done") document.body.dataset.shown = detail.serial;
       app.runner.shown(detail.serial);
+      rememberLater(REMEMBER_MS);
     } catch (error) {
       if (app.runner.isBlind || (error instanceof Refused && error.status === 404)) return;
       throw error;
@@ -206,10 +207,13 @@ function shortcuts(event) {
 }
 
 // The address always says what is seen: a reload, or the link in another browser, comes back to it.
+// While a picture is waited for it is left alone, as browser and viewer both take notice of it.
+const REMEMBER_MS = 300;
+const REMEMBER_UNSEEN_MS = 3000;
 let later = null;
-function rememberLater() {
+function rememberLater(wait_ms) {
   clearTimeout(later);
-  later = setTimeout(async () => history.replaceState(null, "", await linkOf(app)), 300);
+  later = setTimeout(async () => history.replaceState(null, "", await linkOf(app)), wait_ms);
 }
 
 window.addEventListener("pagehide", () => connection.close());

@@ -23,6 +23,11 @@ class Rows:
         row = int(np.searchsorted(self.t_us[component], t_us, side="right")) - 1
         return self.values[component][row]
 
+    def picture(self, t_us: int) -> np.ndarray:
+        """(height, width, 3) the newest image at a time."""
+        ((buffer,), (form,)) = self.at("buffer", t_us), self.at("format", t_us)
+        return np.array(buffer, np.uint8).reshape(form["height"], form["width"], 3)
+
 
 def read_back(path: Path, blueprint: bool = False) -> dict[str, Rows]:
     """Every entity of the recording, or of its blueprint, by its path; components by their short names."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -52,8 +51,7 @@ def test_a_point_on_the_ball_moves_right_on_the_map() -> None:
 def strength(run: Run, path: Path) -> np.ndarray:
     """(height, width) how strongly the last map is coloured, its sum 1."""
     write_rrd(run, path, "spin")
-    (blob,) = read_back(path)[entities.UNROLLED].at("blob", run.end_us)
-    picture = cv2.imdecode(np.array(blob, np.uint8), cv2.IMREAD_COLOR).astype(float)
+    picture = read_back(path)[entities.UNROLLED].picture(run.end_us).astype(float)
     coloured = np.ptp(picture, axis=2) - np.ptp(picture[0, 0])
     return coloured.clip(0) / coloured.clip(0).sum()
 

@@ -25,7 +25,14 @@ Logged = dict[str, Rows]
 EVERYWHERE = {
     *(entities.FRAME, entities.EVENTS, entities.SURFACE, entities.HOUGH, entities.MEASURED, entities.KALMAN),
     *(entities.BALL_PLACE, entities.BALL_CENTRE, entities.LOGO, entities.LOGO_OUTLINE, entities.LOGO_MASK),
-    *(entities.FLOW, entities.FLOW_WHEEL, entities.STILL_LOGO, entities.STATUS, entities.SUMMARY, entities.COACH),
+    *(
+        entities.FLOW,
+        entities.FLOW_WHEEL,
+        entities.STILL_LOGO,
+        entities.STATUS,
+        entities.SUMMARY,
+        f"{entities.COACH}/0",
+    ),
     *(entities.WORLD, entities.PATH, entities.AXES, entities.BALL, entities.MESH),
     *(entities.SPIN_SHOWN, entities.SPIN_RING, entities.RING_TIP),
     *(entities.UNROLLED, entities.GRATICULE, entities.SCORE_AXES, f"{entities.SCORE_MAGNITUDE}/score"),

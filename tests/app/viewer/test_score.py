@@ -5,14 +5,13 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 
 from app.viewer import entities
 from app.viewer.recorded import write_rrd
 from app.viewer.run import Run
-from app.viewer.score import DISC_RADIUS_PX, GAP_PX
+from app.viewer.score import CELL_PX, DISC_RADIUS_PX, GAP_PX
 from pipeline.chain import Tick
 from tests.app.viewer.reading import Rows, read_back
 
@@ -81,10 +80,9 @@ def test_axes_lie_on_the_disc_of_their_side(rivalled: Run, logged: dict[str, Row
 
 def test_the_map_of_axes_is_lightest_at_the_best(rivalled: Run, logged: dict[str, Rows]) -> None:
     tick = rivalled.ticks[-3]
-    (blob,) = logged[entities.SCORE_AXES].at("blob", tick.packet.end_us)
-    picture = cv2.imdecode(np.array(blob, np.uint8), cv2.IMREAD_GRAYSCALE)
-    ((x, y),) = np.array(logged[f"{entities.SCORE_AXES}/best"].at("positions", tick.packet.end_us))
-    around = picture[max(int(y) - 20, 0) : int(y) + 20, max(int(x) - 20, 0) : int(x) + 20]
+    picture = logged[f"{entities.SCORE_AXES}/score"].picture(tick.packet.end_us).mean(axis=2)
+    ((x, y),) = np.array(logged[f"{entities.SCORE_AXES}/best"].at("positions", tick.packet.end_us)) / CELL_PX
+    around = picture[max(int(y) - 3, 0) : int(y) + 4, max(int(x) - 3, 0) : int(x) + 4]
     assert around.max() > 0.85 * picture.max()
     assert np.median(picture) < 0.6 * picture.max()
 

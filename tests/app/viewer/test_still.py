@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.viewer.still import disc_directions, texture_directions
+from app.viewer.still import disc_directions, disc_mask, texture_directions
 
 
 def test_the_textures_middle_faces_the_camera_with_the_images_right_and_down() -> None:
@@ -18,7 +18,9 @@ def test_the_textures_middle_faces_the_camera_with_the_images_right_and_down() -
 
 def test_the_left_disc_looks_at_the_middle_and_the_right_one_at_the_back() -> None:
     """Seen by the camera: x to the right and y down on the left disc; mirrored left to right on the right one."""
-    directions, mask = disc_directions(np.array([0.0, 0.0, -1.0]))
+    mask = disc_mask()
+    directions = np.full((*mask.shape, 3), np.nan)
+    directions[mask] = disc_directions(np.array([0.0, 0.0, -1.0]))
     size = mask.shape[0]
     np.testing.assert_allclose(directions[size // 2, size // 2], [0, 0, -1], atol=0.02)
     assert directions[size // 2, size // 2 + 40][0] > 0.4

@@ -101,8 +101,20 @@ def test_doubt_and_warnings_are_said(flight: Run, tmp_path: Path) -> None:
     assert "seven hot pixels" in text
 
 
+def block(logged: dict[str, Rows], number: int, t_us: int) -> np.ndarray:
+    """One of the card's blocks, grey values."""
+    (blob,) = logged[f"{entities.COACH}/{number}"].at("blob", t_us)
+    return cv2.imdecode(np.array(blob, np.uint8), cv2.IMREAD_GRAYSCALE)
+
+
 def test_the_card_changes_with_the_shot(flight: Run, logged: dict[str, Rows]) -> None:
-    blobs = [logged[entities.COACH].at("blob", t)[0] for t in (flight.start_us, flight.shots[0].end_us)]
-    first, last = (cv2.imdecode(np.array(blob, np.uint8), cv2.IMREAD_GRAYSCALE) for blob in blobs)
-    assert first.shape == last.shape
-    assert (last > 200).sum() > 1.3 * (first > 200).sum()  # letters where dashes were
+    for number in range(2):
+        first, last = (block(logged, number, t_us) for t_us in (flight.start_us, flight.shots[0].end_us))
+        assert first.shape == last.shape
+        assert (last > 200).sum() > 1.3 * (first > 200).sum()  # letters where dashes were
+
+
+def test_blocks_of_the_card_lie_below_each_other(logged: dict[str, Rows]) -> None:
+    height, _ = block(logged, 0, 0).shape
+    for number in range(3):
+        assert logged[f"{entities.COACH}/{number}"].static["translation"] == [[0, number * height, 0]]

@@ -13,7 +13,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.kernels.still import colour_counts, full_count, read_density, turn_back_and_count
+from pipeline.kernels.still import (
+    Canvas,
+    centroid,
+    colour_counts,
+    full_count,
+    paint,
+    read_density,
+    turn_back_and_count,
+)
 from tests.naive_still import CELLS, Sampler, density, tone, turned
 
 seeds = st.integers(0, 2**32 - 1)
@@ -127,6 +135,49 @@ def test_density_peaks_where_the_events_are_and_nowhere_else(direction: np.ndarr
     assert np.all((directions @ direction)[found[1] > 0] > np.cos(np.radians(10)))
 
 
+def painting(seed: int, spins_rps: np.ndarray, seen: np.ndarray, colours: int) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Moments painted in one call, and the same one after the other by the kernels it is made of."""
+    random = np.random.default_rng(seed)
+    normals, on, seconds = unit_vectors(random, 60), random.random(60) < 0.5, random.uniform(-0.1, 0, 60)
+    directions, places = unit_vectors(random, 50), random.permutation(70)[:50]
+    canvas = Canvas(
+        places, directions, random.integers(0, 256, (colours, 3)).astype(np.float32), np.full(3, 20, np.float32)
+    )
+    frames = np.array([np.linalg.qr(random.normal(size=(3, 3)))[0] for _ in spins_rps])
+    made = np.full((len(spins_rps), 70, 3), 7, np.uint8)
+    paint((made,), (canvas,), (frames,), normals, on, seconds, seen, spins_rps)
+    expected = []
+    for (first, last), spin_rps, frame in zip(seen, spins_rps, frames, strict=True):
+        counted_cells = counted(normals[first:last], on[first:last], seconds[first:last], spin_rps)
+        counts, picture = np.empty((2, 50), np.float32), np.full((70, 3), 7, np.uint8)
+        read_density(counts, counted_cells, directions, frame)
+        counts = counts.sum(axis=0, keepdims=True) if colours == 1 else counts
+        colour_counts(picture, places, counts, canvas.colours, canvas.ground)
+        expected.append(picture)
+    return made, expected
+
+
+@given(seed=seeds, colours=st.integers(1, 2))
+@settings(max_examples=20, deadline=None)
+def test_painting_is_counting_reading_and_colouring_moment_by_moment(seed: int, colours: int) -> None:
+    spins_rps = np.random.default_rng(seed).normal(size=(3, 3)) * 40
+    made, expected = painting(seed, spins_rps, np.array([[0, 10], [0, 60], [30, 30]]), colours)
+    for one, other in zip(made, expected, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@given(seed=seeds)
+@settings(max_examples=20, deadline=None)
+def test_the_centroid_is_the_mean_of_the_events_directions(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    normals = unit_vectors(random, 1) + 0.1 * random.normal(size=(200, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    middle = centroid(counted(normals, random.random(200) < 0.5, np.zeros(200), np.zeros(3)))
+    mean = normals.mean(axis=0)
+    assert middle @ mean > 0.9999 * np.linalg.norm(middle) * np.linalg.norm(mean)
+    assert not centroid(np.zeros((CELLS, CELLS, CELLS, 3), np.float32)).any()
+
+
 def digest() -> list[float]:
     """Numbers of everything here, for the comparison without the JIT."""
     random = np.random.default_rng(5)
@@ -134,7 +185,9 @@ def digest() -> list[float]:
     counts, picture = np.empty((2, 200), np.float32), np.zeros((200, 3), np.uint8)
     read_density(counts, made, unit_vectors(random, 200), np.eye(3))
     colour_counts(picture, np.arange(200), counts, np.full((2, 3), 250, np.float32), np.full(3, 20, np.float32))
-    return [*map(float, made.sum(axis=(0, 1, 2))), *map(float, counts.sum(axis=1)), float(picture.sum())]
+    painted, _ = painting(5, np.array([[9.0, -4, 3], [0, 0, 0]]), np.array([[0, 20], [0, 60]]), 2)
+    sums = [*map(float, made.sum(axis=(0, 1, 2))), *map(float, counts.sum(axis=1)), float(picture.sum())]
+    return [*sums, float(painted.sum())]
 
 
 def test_without_the_jit_everything_is_the_same_and_nothing_overflows() -> None:
