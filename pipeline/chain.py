@@ -10,6 +10,7 @@ it, nothing else, and going back to earlier values finds their columns still the
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Collection, Hashable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -131,17 +132,25 @@ class EventSource:
 
 @dataclass(slots=True, eq=False)
 class _Column:
-    """One stage's results from the first tick on; `results` lacks what a run was told to forget."""
+    """One stage's results from the first tick on; `results` lacks what a run was told to forget.
+
+    making : held while the next result is made: another thread that wants it waits for it
+    is_kept : whether all results so far are there
+    """
 
     state: Any
+    making: threading.Lock = field(default_factory=threading.Lock)
     results: list[Any] = field(default_factory=list)
-    length: int = 0
+    is_kept: bool = True
     bytes: int = 0
     last_use: int = 0
 
 
 class Chain:
     """Runs the stages over one source and keeps every stage's column.
+
+    Several threads may run it at once: each stage's next result is made by whichever wants it first. Runs that forget
+    have their chain to themselves.
 
     budget_bytes, most_columns : the columns that were not used for longest are dropped when all together hold more
         bytes than this, or are more
@@ -162,6 +171,7 @@ class Chain:
         self._clock = clock
         self._columns: dict[Hashable, _Column] = {}
         self._uses = 0
+        self._lock = threading.Lock()  # for the columns as a whole
 
     def tick_count(self, parameters: Parameters) -> int:
         """How many ticks the source holds so far, the last one perhaps cut short by the source's end."""
@@ -192,6 +202,7 @@ class Chain:
         forget: Collection[str] = (),
         without: Collection[str] = (),
         together: int = 1,
+        seconds: dict[str, float] | None = None,
     ) -> Iterator[Tick]:
         """Yield the first `ticks` ticks (all there are so far by default), computing only what is not yet known.
 
@@ -201,6 +212,7 @@ class Chain:
 
         together : how many ticks a stage works through before the next stage has them. One by one each tick comes as
             soon as it can; several at a time every stage finds its code and memory in the processor's caches.
+        seconds : where to add up what each stage takes in this run, if not in the chain's own
         """
         setting = self.setting(parameters)
         keys = self.keys(parameters)
@@ -214,17 +226,21 @@ class Chain:
             ]
             for name, column in columns.items():
                 for index, results in enumerate(rows, first):
-                    if index < len(column.results):
-                        results[name] = column.results[index]
-                        continue
-                    try:
-                        results[name] = self._step(name, parameters, column, results)
-                    except BaseException:
-                        self._columns.pop(keys[name], None)  # its state may be half way into this tick
-                        raise
-                    if name not in forget:
-                        column.results.append(results[name])
-                        column.bytes += nbytes(results[name])
+                    with column.making:
+                        if index < len(column.results):
+                            results[name] = column.results[index]
+                            continue
+                        try:
+                            results[name] = self._step(name, parameters, column, results, seconds)
+                        except BaseException:
+                            with self._lock:
+                                self._columns.pop(keys[name], None)  # its state may be half way into this tick
+                            raise
+                        if name in forget:
+                            column.is_kept = False
+                        else:
+                            column.bytes += nbytes(results[name])
+                            column.results.append(results[name])
             yield from (Tick(**results) for results in rows)
             self._keep_budget(set(keys.values()))
 
@@ -249,31 +265,40 @@ class Chain:
 
     def knows(self, parameters: Parameters, name: str) -> bool:
         """Whether a stage's results of every tick so far are kept."""
-        column = self._columns.get(self.keys(parameters)[name])
+        with self._lock:
+            column = self._columns.get(self.keys(parameters)[name])
         return column is not None and len(column.results) >= self.tick_count(parameters)
 
     def _column(self, key: Hashable, name: str, parameters: Parameters, setting: Setting) -> _Column:
-        column = self._columns.get(key)
-        if column is None or column.length > len(column.results):  # the latter: a run that forgot left it
-            column = self._columns[key] = _Column(STAGES[name].start(parameters.group(name), setting))
-        self._uses += 1
-        column.last_use = self._uses
-        return column
+        with self._lock:
+            column = self._columns.get(key)
+            if column is None or not column.is_kept:
+                column = self._columns[key] = _Column(STAGES[name].start(parameters.group(name), setting))
+            self._uses += 1
+            column.last_use = self._uses
+            return column
 
-    def _step(self, name: str, parameters: Parameters, column: _Column, results: dict[str, Any]) -> Any:
-        stage = STAGES[name]
+    def _step(
+        self,
+        name: str,
+        parameters: Parameters,
+        column: _Column,
+        results: dict[str, Any],
+        seconds: dict[str, float] | None,
+    ) -> Any:
+        stage, seconds = STAGES[name], self.seconds if seconds is None else seconds
         begin = self._clock() if self._clock else 0.0
         result = stage.step(parameters.group(name), column.state, *(results[other] for other in stage.INPUTS))
         if self._clock:
-            self.seconds[name] += self._clock() - begin
-        column.length += 1
+            seconds[name] += self._clock() - begin
         return result
 
     def _keep_budget(self, in_use: set[Hashable]) -> None:
-        total = sum(column.bytes for column in self._columns.values())
-        if total <= self._budget_bytes and len(self._columns) <= self._most_columns:
-            return  # comparing the keys of all columns would take longer than a quick tick
-        for key in sorted(self._columns.keys() - in_use, key=lambda k: self._columns[k].last_use):
+        with self._lock:
+            total = sum(column.bytes for column in self._columns.values())
             if total <= self._budget_bytes and len(self._columns) <= self._most_columns:
-                break
-            total -= self._columns.pop(key).bytes
+                return  # comparing the keys of all columns would take longer than a quick tick
+            for key in sorted(self._columns.keys() - in_use, key=lambda k: self._columns[k].last_use):
+                if total <= self._budget_bytes and len(self._columns) <= self._most_columns:
+                    break
+                total -= self._columns.pop(key).bytes

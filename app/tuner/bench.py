@@ -51,7 +51,7 @@ class Progressed:
 class Clip:
     """A part of the recording with the chain that runs over it; several threads may run it at once.
 
-    lock : held while the chain makes a tick
+    lock : held while costs are noted
     cost_s : what each stage took when it was computed, by the value of what it was computed with
     """
 
@@ -83,30 +83,22 @@ class Clip:
             )
 
     def run(self, parameters: Parameters, without: Collection[str] = ()) -> Iterator[Progressed]:
-        """The clip's ticks; between two of them other threads may run theirs, and the run may be abandoned.
+        """The clip's ticks; the run may be abandoned between two of them. Several threads may run at once.
 
         without : stages that are left out, see Chain.run
         """
-        chain = self.session.chain
-        with self.lock:
-            ticks = chain.run(parameters, without=without)
-        whole = dict.fromkeys(STAGES, 0.0)
+        whole, took = dict.fromkeys(STAGES, 0.0), dict.fromkeys(STAGES, 0.0)
         try:
-            while True:
-                with self.lock:
-                    before = dict(chain.seconds)
-                    tick = next(ticks, None)
-                    took = {stage: chain.seconds[stage] - before[stage] for stage in STAGES}
-                if tick is None:
-                    return
+            for tick in self.session.chain.run(parameters, without=without, seconds=took):
                 for stage, seconds in took.items():
                     whole[stage] += seconds
-                yield Progressed(tick, took)
+                yield Progressed(tick, dict(took))
+                took.update(dict.fromkeys(STAGES, 0.0))
         finally:
             self._note_costs(parameters, whole)
 
     def _note_costs(self, parameters: Parameters, took: dict[str, float]) -> None:
-        """Add what the stages took; comparing keys takes a tenth of a tick."""
+        """Add what the stages took, once a run: comparing keys takes a tenth of a tick."""
         keys = self.keys(parameters)
         with self.lock:
             for stage, seconds in took.items():
@@ -121,8 +113,7 @@ class Clip:
 
     def knows(self, parameters: Parameters, stages: Collection[str]) -> bool:
         """Whether these stages' results are all there."""
-        with self.lock:
-            return all(self.session.chain.knows(parameters, stage) for stage in stages)
+        return all(self.session.chain.knows(parameters, stage) for stage in stages)
 
     def cost_of(self, parameters: Parameters) -> dict[str, float]:
         """Seconds each stage took with these parameters when it was computed; absent where it never was."""

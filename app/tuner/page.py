@@ -7,6 +7,7 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -57,6 +58,13 @@ class _Report:
     began: float = field(default_factory=time.perf_counter)
     seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys([*STAGES, "drawing"], 0.0))
     told: tuple[str, float] = ("", 0.0)  # what was told last, and when
+    lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def add(self, seconds: dict[str, float]) -> None:
+        """Count what stages took; from any thread."""
+        with self.lock:
+            for stage, more in seconds.items():
+                self.seconds[stage] += more
 
     def tell(self, state: str, share: float = 0.0, *, force: bool = False, **more: Any) -> None:
         now, (last_state, last) = time.perf_counter(), self.told
@@ -87,6 +95,7 @@ class Page:
         self._newest = -1
         self._closed = False
         self._changed = threading.Condition()
+        self._late = ThreadPoolExecutor(1, f"late {self.id}")
         self._thread = threading.Thread(target=self._work, name=f"page {self.id}", daemon=True)
         self._thread.start()
 
@@ -125,6 +134,7 @@ class Page:
     def join(self, seconds: float) -> None:
         """Wait for the threads to end."""
         self._thread.join(seconds)
+        self._late.shutdown(wait=False, cancel_futures=True)
         for job in self._jobs.values():
             job.cancel(seconds)
 
@@ -172,32 +182,40 @@ class Page:
         *,
         is_shown: bool = True,
     ) -> Finished:
-        """Run a clip to its end, the late stages last.
+        """Run a clip to its end: the late stages in a thread of their own, behind the others.
 
-        Where that takes long it shows, beside A if there is one, first what is there at the playhead, and for a
-        dragged slider all but the late stages.
+        Where that takes long it shows, beside A if there is one, first what is there at the playhead. For a dragged
+        slider it shows all but the late stages, which have to wait that long.
         """
         session = clip.with_parameters(parameters)
         ticks: list[Tick] = []
         count = clip.session.chain.tick_count(parameters)
         began, playhead_us = time.perf_counter(), wanted.playhead_us if is_shown else None
+        is_first_early = is_shown and wanted.hasty and not clip.knows(parameters, LATE)
+        late = None if is_first_early else self._late.submit(self._whole, clip, parameters, wanted, report)
         for tick in self._steps(clip, parameters, wanted, report, LATE):
             ticks.append(tick)
-            report.tell("computing", len(ticks) / count)
             if playhead_us is not None and tick.packet.end_us >= playhead_us:
                 playhead_us = None
                 rest_s = (time.perf_counter() - began) / len(ticks) * (count - len(ticks))
                 if rest_s > REST_WORTH_WAITING_S:
                     self._show(wanted, clip, Finished.of(session, ticks), a, report, partial=True)
-        early, ticks = Finished.of(session, ticks), []
-        if is_shown and wanted.hasty and not clip.knows(parameters, LATE):
+        early = Finished.of(session, ticks)
+        if is_first_early:
             self._show(wanted, clip, early, a, report, partial=True)
         else:
             self._drawings.begin(early.run, clip.keys(parameters))
+        whole = self._whole(clip, parameters, wanted, report) if late is None else late.result()
+        return Finished.of(session, whole)
+
+    def _whole(self, clip: Clip, parameters: Parameters, wanted: Wanted, report: _Report) -> list[Tick]:
+        """All ticks with all stages' results."""
+        ticks: list[Tick] = []
+        count = clip.session.chain.tick_count(parameters)
         for tick in self._steps(clip, parameters, wanted, report, ()):
             ticks.append(tick)
             report.tell("computing", len(ticks) / count)
-        return Finished.of(session, ticks)
+        return ticks
 
     def _steps(
         self, clip: Clip, parameters: Parameters, wanted: Wanted, report: _Report, without: Collection[str]
@@ -206,8 +224,7 @@ class Page:
         for step in clip.run(parameters, without):
             if self._is_old(wanted):
                 raise Superseded
-            for stage, seconds in step.seconds.items():
-                report.seconds[stage] += seconds
+            report.add(step.seconds)
             yield step.tick
 
     def _show(

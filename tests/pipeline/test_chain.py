@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import threading
+import time
 from types import SimpleNamespace
 from typing import Any
 
@@ -189,3 +191,31 @@ def test_a_damaged_clock_is_refused_instead_of_running_forever(calls: dict[str, 
     events = EventBatch.checked([0, 10**15], [0, 0], [0, 0], [0, 0], width_px=8, height_px=8)
     with pytest.raises(ParameterError, match="--window"):
         list(Chain(EventSource("long", events, 8, 8, 0, 10**15 + 1)).run(DEFAULT))
+
+
+def test_threads_share_the_work_and_get_the_same(calls: dict[str, int], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two runs at once, one of them without the last stage: every result is made once, whoever wants it first."""
+    whole = [tick.contrast for tick in Chain(source()).run(DEFAULT)]
+    for stage in chain_module.STAGES.values():
+        step = stage.step
+        monkeypatch.setattr(stage, "step", lambda *inputs, step=step: (time.sleep(2e-4), step(*inputs))[1])
+    calls.update(dict.fromkeys(calls, 0))
+    chain = Chain(source(), clock=time.perf_counter)
+    took = [dict.fromkeys(INPUTS, 0.0) for _ in range(3)]
+    found: dict[int, list[Any]] = {}
+
+    def run(number: int, without: tuple[str, ...]) -> None:
+        found[number] = [tick.contrast for tick in chain.run(DEFAULT, without=without, seconds=took[number])]
+
+    threads = [threading.Thread(target=run, args=(n, ("contrast",) if n == 0 else ())) for n in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(30)
+    assert calls == dict.fromkeys(INPUTS, 20)
+    assert found[1] == found[2] == whole
+    assert found[0] == [None] * 20
+    for name in INPUTS:
+        assert sum(seconds[name] for seconds in took) >= 20 * 2e-4
+    assert not took[0]["contrast"]
+    assert not any(chain.seconds.values()), "each run has its own account"

@@ -43,6 +43,8 @@ export function notice(text, kind = "error", seconds = 8) {
   return made;
 }
 
+export const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
 export function download(name, content, type) {
   const url = URL.createObjectURL(new Blob([content], { type }));
   element("a", { href: url, download: name }).click();

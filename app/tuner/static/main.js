@@ -6,7 +6,7 @@ import { Biases } from "./biases.js";
 import { Coach } from "./coach.js";
 import { Controls } from "./controls.js";
 import { Curve } from "./curve.js";
-import { byId, element, notice } from "./elements.js";
+import { byId, element, notice, pause } from "./elements.js";
 import { linkOf, wantedByLink } from "./link.js";
 import { Overview } from "./overview.js";
 import { Results } from "./results.js";
@@ -18,6 +18,7 @@ import { Settings } from "./settings.js";
 import { Viewer } from "./viewer.js";
 
 const MARGIN_US = 20_000; // shown before and after a shot
+const NUMBERS_MS = 1000; // as long as numbers wait for their picture
 
 const connection = new Connection();
 const settings = new Settings();
@@ -108,27 +109,42 @@ function listen(link) {
     if (detail.settled) rememberLater(REMEMBER_UNSEEN_MS);
     buttons();
   });
-  connection.addEventListener("run", async ({ detail }) => {
-    if (detail.serial !== app.runner.serial) return;
+  const numbers = (detail) => {
     app.bar.show(detail);
     if (detail.error) notice(detail.error);
     app.results.show(detail);
     if (["done", "failed"].includes(detail.state)) document.body.dataset.done = detail.serial;
     if (detail.measures && !app.opening.recording.is_long) showShots(detail.measures);
-    if (!detail.recording || app.runner.isBlind) return;
+  };
+  // Fetches and shows a picture; false where a newer one took its place.
+  const picture = async (detail) => {
     latest = detail.recording;
     try {
       const picture = await bytes(connection.path(`pictures/${detail.recording}`));
-      if (latest !== detail.recording) return;
+      if (latest !== detail.recording) return false;
       if (first) await viewer.layout(await bytes(connection.path(`layout?tab=${encodeURIComponent(link.tab ?? "")}`)));
       await viewer.show(picture, detail.recording, (first && link.time) || detail.first_sight_us);
       first = false;
       if (detail.state === "done") document.body.dataset.shown = detail.serial;
+      return true;
+    } catch (error) {
+      if (app.runner.isBlind || (error instanceof Refused && error.status === 404)) return false;
+      throw error;
+    }
+  };
+  connection.addEventListener("run", async ({ detail }) => {
+    if (detail.serial !== app.runner.serial) return;
+    if (!detail.recording || app.runner.isBlind) {
+      numbers(detail);
+      return;
+    }
+    const seen = picture(detail);
+    // For any change of the page the browser puts the whole picture together anew: numbers come with their picture.
+    if (!first) await Promise.race([seen.catch(() => {}), pause(NUMBERS_MS)]);
+    numbers(detail);
+    if (await seen) {
       app.runner.shown(detail.serial);
       rememberLater(REMEMBER_MS);
-    } catch (error) {
-      if (app.runner.isBlind || (error instanceof Refused && error.status === 404)) return;
-      throw error;
     }
   });
   connection.addEventListener("shots", ({ detail }) => {

@@ -1,5 +1,7 @@
 // The embedded viewer: shows one recording after another at the same playhead.
 
+import { pause } from "./elements.js";
+
 const TIMELINE = "t";
 const POLL_MS = 15;
 const PATIENCE_MS = 120_000; // without a graphics card a picture may take seconds
@@ -17,7 +19,6 @@ function stayAtHome() {
 }
 
 const storeOf = (id) => `Recording:${APPLICATION}:${id}`;
-const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
 export class Viewer extends EventTarget {
   #viewer = null;
