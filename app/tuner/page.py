@@ -265,7 +265,7 @@ class Page:
             bytes=len(picture),
             start_us=b.run.start_us,
             end_us=b.run.end_us,
-            first_sight_us=b.run.first_sight_us,
+            opening_us=b.run.opening_us,
             measures=_measured(clip, b) if is_whole else None,
             pinned_measures=None if a is None else _measured(clip, a),
             differs=[] if a is None else differences(a.session.parameters, b.session.parameters),

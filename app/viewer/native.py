@@ -60,6 +60,6 @@ def _place_playhead(run: Run, port: int, process: subprocess.Popen[bytes]) -> No
     """Put the playhead where the track starts, as soon as the window has read the recording; give up quietly."""
     deadline = time.monotonic() + START_S
     while process.poll() is None and time.monotonic() < deadline:
-        if place_playhead(HOST, port, run.first_sight_us):
+        if place_playhead(HOST, port, run.opening_us):
             return
         time.sleep(0.2)

@@ -79,9 +79,14 @@ class Run:
 
     @cached_property
     def first_sight_us(self) -> int:
-        """When the first track starts: where the viewer waits for the user. The first tick's end if there is none."""
+        """When the first track starts. The first tick's end if there is none."""
         found = [tick.packet.end_us for tick in self.ticks if tick.track.has_ball]
         return found[0] if found else self.ticks[0].packet.end_us
+
+    @cached_property
+    def opening_us(self) -> int:
+        """When a spin is first trusted: where the viewer waits for the user. Where none is, at the first sight."""
+        return next((tick.packet.end_us for tick in self.ticks if tick.best is not None), self.first_sight_us)
 
     @cached_property
     def true_spins_rps(self) -> Floats | None:

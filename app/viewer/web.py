@@ -65,7 +65,7 @@ def served(run: Run, layout: str) -> Iterator[tuple[http.server.ThreadingHTTPSer
     files = {f"/{path.name}": path.read_bytes() for path in PAGE.iterdir()}
     files["/"] = files.pop("/index.html").replace(b"VERSION", VERSION.encode())
     files |= _rerun_files()
-    files["/playhead"] = playhead_request(run.first_sight_us)
+    files["/playhead"] = playhead_request(run.opening_us)
     with tempfile.TemporaryDirectory(prefix="spinscope-") as folder:
         path = Path(folder) / "recording.rrd"
         write_rrd(run, path, layout)

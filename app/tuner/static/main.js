@@ -123,7 +123,7 @@ function listen(link) {
       const picture = await bytes(connection.path(`pictures/${detail.recording}`));
       if (latest !== detail.recording) return false;
       if (first) await viewer.layout(await bytes(connection.path(`layout?tab=${encodeURIComponent(link.tab ?? "")}`)));
-      await viewer.show(picture, detail.recording, (first && link.time) || detail.first_sight_us);
+      await viewer.show(picture, detail.recording, (first && link.time) || detail.opening_us);
       first = false;
       if (detail.state === "done") document.body.dataset.shown = detail.serial;
       return true;

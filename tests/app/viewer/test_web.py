@@ -80,11 +80,17 @@ def test_a_taken_port_gives_another(address: str, no_ball: Run) -> None:
         assert second != address
 
 
-def test_the_playhead_goes_to_the_first_sight(flight: Run) -> None:
+def test_it_opens_where_a_spin_is_first_trusted(flight: Run, no_ball: Run) -> None:
+    first = next(tick for tick in flight.ticks if tick.best is not None)
+    assert flight.opening_us == first.packet.end_us > flight.first_sight_us
+    assert no_ball.opening_us == no_ball.first_sight_us == no_ball.ticks[0].packet.end_us
+
+
+def test_the_playhead_goes_where_the_run_opens(flight: Run) -> None:
     """Decoded as protobuf: {6: {2: {1: "t"}, 3: {1: nanoseconds}, 5: 1 (paused)}}."""
-    cursor = fields(fields(playhead_request(flight.first_sight_us))[6])
+    cursor = fields(fields(playhead_request(flight.opening_us))[6])
     assert fields(cursor[2]) == {1: b"t"}
-    assert fields(cursor[3]) == {1: flight.first_sight_us * 1000}
+    assert fields(cursor[3]) == {1: flight.opening_us * 1000}
     assert cursor[5] == 1
     negative = fields(fields(fields(playhead_request(-1))[6])[3])[1]
     assert negative == 2**64 - 1000
