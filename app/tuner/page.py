@@ -24,7 +24,8 @@ from .runs import Finished
 # A page learns of a run's progress this often, and not at all of one that is over at once: every change of the page
 # has the browser put the whole picture together anew, in the very time in which it is waited for.
 REPORT_S, QUIET_S = 0.05, 0.3
-IDLE_S = 1.0  # after so long without a wish nobody waits for anything
+# After so long without a wish, or at the latest after so many wishes, old drawings are sorted out.
+IDLE_S, UNTIDIED_MOST = 1.0, 10
 # The rest of a clip is worth waiting for when it takes no longer than an eye needs to see a change.
 REST_WORTH_WAITING_S = 0.25
 PICTURES_KEPT = 3
@@ -134,20 +135,25 @@ class Page:
     def join(self, seconds: float) -> None:
         """Wait for the threads to end."""
         self._thread.join(seconds)
-        self._late.shutdown(wait=False, cancel_futures=True)
         for job in self._jobs.values():
             job.cancel(seconds)
 
     def _work(self) -> None:
+        fulfilled = 0
         while True:
             with self._changed:
-                if not self._changed.wait_for(self._has_work, IDLE_S):
-                    self._drawings.keep_budget()
-                    self._changed.wait_for(self._has_work)
+                is_idle = not self._changed.wait_for(self._has_work, IDLE_S)
+            if is_idle or fulfilled == UNTIDIED_MOST:
+                self._drawings.keep_budget()
+                fulfilled = 0
+            with self._changed:
+                self._changed.wait_for(self._has_work)
                 if self._closed:
+                    self._late.shutdown(wait=False)
                     return
                 wanted, self._wanted = self._wanted, None
             assert wanted is not None
+            fulfilled += 1
             report = _Report(self.outbox, wanted.serial)
             try:
                 with self.bench.at_work():

@@ -21,7 +21,8 @@ Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 
-PICTURE_US = 5000  # the logo is painted this often, and every tick of 200 Hz
+# The logo is painted every tick of 200 Hz; less often in a long run, for a painting takes 140 kB.
+PICTURE_US, PICTURES_MOST = 5000, 200
 EVENTS_PAINTED = 60_000  # the latest of the shot; more add nothing but time
 PAINT = np.array([[32, 42, 80]], np.float32)
 WHITE = np.array([238, 236, 228], np.float32)
@@ -99,7 +100,8 @@ def _painted_shots(run: Run) -> Iterator[_Shot]:
         if start_us is not None:
             assert tick.track.shot is not None
             parts.setdefault(tick.track.shot, (start_us, []))[1].append(index)
-    last_us = -PICTURE_US
+    every_us = max(PICTURE_US, (run.end_us - run.start_us) // PICTURES_MOST)
+    last_us = run.start_us - every_us
     for start_us, indices in parts.values():
         parts_of = [run.ticks[index].logo.turning for index in indices]
         normals, on, t_us = (
@@ -108,7 +110,7 @@ def _painted_shots(run: Run) -> Iterator[_Shot]:
         ends = np.cumsum([len(part) for part in parts_of])
         pictured = []
         for place, index in enumerate(indices):
-            if run.ticks[index].packet.end_us - last_us >= PICTURE_US or index == indices[-1]:
+            if run.ticks[index].packet.end_us - last_us >= every_us or index == indices[-1]:
                 last_us = run.ticks[index].packet.end_us
                 pictured.append(place)
         ticks = [indices[place] for place in pictured]

@@ -60,7 +60,7 @@ def summary_chunks(run: Run) -> list[Chunk]:
 
 @dataclass(frozen=True)
 class _Now:
-    """What is known at the end of a tick with a ball.
+    """What is known at the end of a tick.
 
     velocity_m_s : (3,) camera frame, None for a ball in place; true_rps : (3,) None where there is no truth
     """

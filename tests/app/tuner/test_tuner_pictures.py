@@ -17,6 +17,7 @@ from app.tuner.bench import LATE, Bench
 from app.tuner.jobs import Job, fault
 from app.tuner.measures import _jitter_px, coach_sentence, measures
 from app.tuner.outbox import Outbox
+from app.tuner.page import Page, Wanted
 from app.tuner.runs import Finished, finish
 from app.viewer.tuning import Drawings, compared, layout_bytes, rrd_bytes, tab_names
 from app.words import kind_of_spin
@@ -74,7 +75,7 @@ def test_what_did_not_change_is_not_drawn_again(bench: Bench, finished: Finished
         assert all(a is b for a, b in zip(first, again, strict=True))
         other = bench.session.parameters.with_assignments(["logo.pad_px=5"])
         changed = drawings.chunks(finish(clip, other, lambda: None).run, clip.keys(other))
-        same = {chunk.entity_path for chunk in first} & {c.entity_path for c in changed if any(c is f for f in first)}
+        same = {c.entity_path for c in changed if not c.is_static and any(c is f for f in first)}
         assert {"/image/events", "/image/surface", "/plots/x/kalman"} <= same
         assert "/image/ball/logo" not in same
     finally:
@@ -90,6 +91,31 @@ def test_drawings_keep_to_their_budget(finished: Finished, bench: Bench) -> None
         assert len(drawings._made) == 1
     finally:
         drawings.close()
+
+
+def test_drawings_are_sorted_out_while_wishes_never_cease(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.tuner.page.IDLE_S", 60.0)
+    monkeypatch.setattr("app.tuner.page.UNTIDIED_MOST", 2)
+    drawings, sorted_out = Drawings(), list[int]()
+    monkeypatch.setattr(drawings, "keep_budget", lambda: sorted_out.append(1))
+    page = Page(bench, drawings)
+    try:
+        for serial in range(5):
+            parameters = bench.session.parameters.with_assignments([f"logo.pad_px={2 + serial / 10}"])
+            before, until = page.finished, time.monotonic() + 30
+            page.ask(Wanted(serial, parameters, None, bench.first_clip_us()))
+            while page.finished is before and time.monotonic() < until:
+                time.sleep(0.01)
+            assert page.finished is not before
+    finally:
+        page.close()
+        page.join(10)
+        drawings.close()
+    assert len(sorted_out) == 2
+    for thread in threading.enumerate():
+        if page.id in thread.name:
+            thread.join(10)
+            assert not thread.is_alive()
 
 
 def test_the_layout_has_a_tab_for_every_view(finished: Finished) -> None:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.viewer import entities
+from app.viewer import entities, painting
 from app.viewer.recorded import write_rrd
 from app.viewer.run import Run
 from app.viewer.still import MAP_PX, map_directions, map_frame
@@ -74,3 +74,19 @@ def test_the_map_is_sharp_when_the_spin_is_right(flight: Run, tmp_path: Path) ->
     across, width = sharp.sum(axis=0), sharp.shape[1]
     middle = across[width // 4 : 3 * width // 4].sum()
     assert middle > 0.9, "the logo is in the middle of the map"
+
+
+def test_a_long_run_is_painted_less_often_and_at_its_shots_end_all_the_same(
+    flight: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def painted_us() -> np.ndarray:
+        write_rrd(flight, tmp_path / "run.rrd", "spin")
+        return read_back(tmp_path / "run.rrd")[entities.UNROLLED].t_us["buffer"]
+
+    every = painted_us()
+    assert len(every) >= flight.has_ball.sum()
+    monkeypatch.setattr(painting, "PICTURES_MOST", 5)
+    few = painted_us()
+    assert 4 <= len(few) <= 5 + 2
+    assert few[0] == flight.start_us
+    assert few[-1] == every[-1] == flight.shots[0].end_us
