@@ -26,8 +26,9 @@ from .runs import Finished
 REPORT_S, QUIET_S = 0.05, 0.3
 # After so long without a wish, or at the latest after so many wishes, old drawings are sorted out.
 IDLE_S, UNTIDIED_MOST = 1.0, 10
-# The rest of a clip is worth waiting for when it takes no longer than an eye needs to see a change.
-REST_WORTH_WAITING_S = 0.25
+# The rest of a clip is waited for when it takes no longer than this: drawing a part of it first takes its time, too.
+REST_WORTH_WAITING_S = 0.5
+TIMED_TICKS = 5  # from fewer it cannot be told how long the rest takes
 PICTURES_KEPT = 3
 
 
@@ -201,7 +202,7 @@ class Page:
         late = None if is_first_early else self._late.submit(self._whole, clip, parameters, wanted, report)
         for tick in self._steps(clip, parameters, wanted, report, LATE):
             ticks.append(tick)
-            if playhead_us is not None and tick.packet.end_us >= playhead_us:
+            if playhead_us is not None and tick.packet.end_us >= playhead_us and len(ticks) >= TIMED_TICKS:
                 playhead_us = None
                 rest_s = (time.perf_counter() - began) / len(ticks) * (count - len(ticks))
                 if rest_s > REST_WORTH_WAITING_S:

@@ -143,55 +143,57 @@ def _two_hundred_changes() -> None:
         process.stdout.close()
 
 
-# Changes the pad; milliseconds to the server's answer and to the picture. The page looks itself: asking it again and
-# again from outside would take the time that is measured.
-CHANGE = """(pad) => new Promise((resolve) => {
+# Changes the pad, or moves its slider without letting go; milliseconds to the server's answer and to the first picture
+# of it. The page looks itself: asking it again and again from outside would take the time that is measured.
+CHANGE = """([pad, settled]) => new Promise((resolve) => {
     const { connection, runner, settings } = window.spinscope, { dataset } = document.body;
     const began = performance.now(), before = runner.serial;
     let answer = null;
     const heard = ({ detail }) => {
-        if (detail.serial > before && detail.state === "done") answer ??= performance.now() - began;
+        if (detail.serial > before && detail.recording) answer ??= performance.now() - began;
     };
     connection.addEventListener("run", heard);
     const look = new MutationObserver(() => {
-        if (runner.serial > before && dataset.shown == runner.serial) {
+        if (runner.serial > before && dataset.picture.startsWith(`${connection.page}-${before + 1}`)) {
             look.disconnect();
             connection.removeEventListener("run", heard);
             resolve([answer, performance.now() - began]);
         }
     });
     look.observe(document.body, { attributes: true });
-    settings.set("logo.pad_px", pad);
+    settings.set("logo.pad_px", pad, settled);
 })"""
 
 
 def _drive(page: Any, pid: int) -> None:
-    server, shown = [], []
+    whole, dragged = [], []
     own_ms = statistics.median(_shows(page))
     print("\nchange  server RSS  threads  browser heap")
     for number in range(CHANGES):
         page.wait_for_timeout(PAUSE_MS)
-        answer_ms, picture_ms = page.evaluate(CHANGE, round(2 + 0.01 * (number % 150), 2))
-        server.append(answer_ms)
-        shown.append(picture_ms)
+        whole.append(page.evaluate(CHANGE, [round(2 + 0.01 * (number % 150), 2), True]))
         if number % 25 == 24:
             heap = page.evaluate("performance.memory?.usedJSHeapSize ?? 0") / 1e6
             print(
                 f"{number + 1:6d}  {_status(pid, 'VmRSS') / 1e3:7.0f} MB  {_status(pid, 'Threads'):7d}  {heap:9.0f} MB"
             )
-    answer_ms, picture_ms = statistics.median(server), statistics.median(shown)
-    print(f"change to answer {answer_ms:.0f} ms, change to picture {picture_ms:.0f} ms (medians)")
-    print(
-        f"the viewer alone needs {own_ms:.0f} ms for a recording that is there already: "
-        f"{picture_ms - own_ms:+.0f} ms (asked for: 300 ms at most)"
-    )
+    for number in range(SHOWS):
+        page.wait_for_timeout(2 * PAUSE_MS)  # the whole picture has come meanwhile
+        dragged.append(page.evaluate(CHANGE, [round(4 + 0.01 * number, 2), False]))
+    print(f"the viewer alone needs {own_ms:.0f} ms for a recording that is there already; medians from a change on:")
+    for name, rows, also in (("a picture", whole, ", and 400 ms more for contrast"), ("while dragging", dragged, "")):
+        answer_ms, picture_ms = (statistics.median(column) for column in zip(*rows, strict=True))
+        print(
+            f"{name}: answer {answer_ms:.0f} ms, to be seen after {picture_ms:.0f} ms: {picture_ms - own_ms:+.0f} ms "
+            f"(asked for: 300 ms{also})"
+        )
 
 
 def _shows(page: Any) -> list[float]:
     """Milliseconds from two finished recordings' bytes, in turn, to their picture: nothing is computed meanwhile."""
     pictures = []
     for pad in (3.0, 4.0):
-        page.evaluate(CHANGE, pad)
+        page.evaluate(CHANGE, [pad, True])
         pictures.append(page.evaluate("`${window.spinscope.connection.page}-${window.spinscope.runner.serial}`"))
     took: list[float] = page.evaluate(
         """async ([pictures, count, pause]) => {

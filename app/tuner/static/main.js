@@ -125,6 +125,7 @@ function listen(link) {
       if (first) await viewer.layout(await bytes(connection.path(`layout?tab=${encodeURIComponent(link.tab ?? "")}`)));
       await viewer.show(picture, detail.recording, (first && link.time) || detail.opening_us);
       first = false;
+      document.body.dataset.picture = detail.recording;
       if (detail.state === "done") document.body.dataset.shown = detail.serial;
       return true;
     } catch (error) {
