@@ -147,6 +147,11 @@ class Bench:
         return cls(Session.open(path, choices), choices, original or path)
 
     @property
+    def is_taken_again(self) -> bool:
+        """Whether the scene was simulated again, with other biases than the original's."""
+        return self.session.recording.path != self.original
+
+    @property
     def are_kernels_loaded(self) -> bool:
         """Whether the compiled kernels are in memory."""
         return _are_loaded.is_set()

@@ -71,7 +71,7 @@ def state_of(recording: Recording) -> dict[str, Any]:
 
 def taken_again(job: Job, bench: Bench, biases: BiasParameters, folder: Path) -> Path:
     """Simulate the bench's scene with other biases into the folder; returns the new recording's path."""
-    name = bench.session.recording.path.stem
+    name = bench.original.stem
     bias_path = folder / f"{secrets.token_hex(4)}.bias"
     write_biases(biases, bias_path)
     target = folder / f"{bias_path.stem}-{name}.h5"

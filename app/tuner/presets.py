@@ -16,6 +16,9 @@ from .controls import setup_of
 Values = dict[str, dict[str, Any]]
 
 
+BIAS_FILE, AGAIN_FILE = "spinscope.bias", "again.h5"  # what the page saves, and the scene taken again with it
+
+
 def built_in(opened: Parameters) -> dict[str, Values]:
     """The presets by name, each in the set-up of the opened recording; `opened` is what it was opened with."""
     found = {}
@@ -49,15 +52,22 @@ def as_toml(parameters: Parameters) -> str:
     return "\n".join([*lines, ""])
 
 
-def command(path: Path, parameters: Parameters, window_us: tuple[int, int] | None) -> str:
-    """The command that gives the same numbers: `spinscope analyze ...`, ready for a shell."""
-    words = ["spinscope", "analyze", str(path)]
+def command(path: Path, parameters: Parameters, window_us: tuple[int, int] | None, *, again: bool = False) -> str:
+    """The command that gives the same numbers: `spinscope analyze ...`, ready for a shell.
+
+    again : the scene of the recording was simulated again, with the biases of BIAS_FILE
+    """
+    words = ["spinscope", "analyze", AGAIN_FILE if again else str(path)]
     for group, values in _differing(parameters, Parameters()).items():
         for name, value in values.items():
             words += ["--set", f"{group}.{name}={_assignment(value)}"]
     if window_us is not None:
         words += ["--window", str(window_us[0]), str(window_us[1])]
-    return " ".join(shlex.quote(word) for word in words)
+    line = shlex.join(words)
+    if not again:
+        return line
+    first = ["spinscope", "simulate", "again", "--scene", str(path), "--biases", BIAS_FILE, "--out", AGAIN_FILE]
+    return f"{shlex.join(first)} && {line}"
 
 
 def differences(parameters: Parameters, other: Parameters) -> list[tuple[str, Any, Any]]:

@@ -33,7 +33,7 @@ class Run(Request):
     pinned: Values | None = None
     start_us: int = Field(ge=-(2**62), le=2**62)
     end_us: int = Field(ge=-(2**62), le=2**62)
-    playhead_us: float | None = None
+    playhead_us: float | None = Field(default=None, allow_inf_nan=False)
     hasty: bool = False
 
 

@@ -13,7 +13,7 @@ from starlette.concurrency import run_in_threadpool
 
 from pipeline.biases import BiasParameters, read_biases, write_biases
 from pipeline.chain import Parameters
-from pipeline.errors import ParameterError
+from pipeline.errors import ParameterError, SpinscopeError
 from pipeline.stages.fixed_ball import find_fixed_ball
 
 from . import biases, curve, exports, search
@@ -145,7 +145,7 @@ def _add_biases(app: FastAPI, workshop: Workshop, page_of: PageOf) -> None:
             path.write_text(request.text, encoding="utf-8")
             try:
                 return {"biases": read_biases(path).as_dict()}
-            except ParameterError as error:
+            except SpinscopeError as error:
                 raise ParameterError(str(error).removesuffix(f": {path}")) from None
 
     @app.post("/api/biases/write")

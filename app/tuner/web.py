@@ -145,7 +145,8 @@ def _preset_routes(app: FastAPI, page_of: PageOf) -> None:
             window = None
         return {
             "toml": presets.as_toml(parameters),
-            "command": presets.command(bench.session.recording.path, parameters, window),
+            "command": presets.command(bench.original, parameters, window, again=bench.is_taken_again),
+            "needs": presets.BIAS_FILE if bench.is_taken_again else None,
         }
 
 

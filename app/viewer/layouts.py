@@ -29,11 +29,15 @@ NAMES = {
 }
 
 
-def blueprint(run: Run, layout: str) -> rrb.Blueprint:
-    """All tabs, with the one of `layout` (a key of NAMES) in front."""
+def blueprint(run: Run, layout: str, *, is_lasting: bool = False) -> rrb.Blueprint:
+    """All tabs, with the one of `layout` (a key of NAMES) in front. Played over and over is the first shot.
+
+    is_lasting : other recordings are to be shown with it: all of each is played, for the viewer forgets the selection
+    """
     makers = {"all": _all, "tracker": _tracker, "logo": _logo, "spin": _spin, "coach": _coach}
     tabs = [makers[name](run) for name in LAYOUTS]
     end_us = run.shots[0].end_us if run.shots else run.end_us
+    shot = rrb.components.AbsoluteTimeRange(min=run.first_sight_us * 1000, max=end_us * 1000)
     return rrb.Blueprint(
         rrb.Tabs(*tabs, active_tab=LAYOUTS.index(layout)),
         rrb.TopPanel(state="collapsed"),
@@ -44,8 +48,8 @@ def blueprint(run: Run, layout: str) -> rrb.Blueprint:
             timeline=at.TIMELINE,
             playback_speed=SLOW_MOTION,
             play_state="paused",
-            loop_mode="selection",
-            time_selection=rrb.components.AbsoluteTimeRange(min=run.first_sight_us * 1000, max=end_us * 1000),
+            loop_mode="all" if is_lasting else "selection",
+            time_selection=None if is_lasting else shot,
         ),
         auto_layout=False,
         auto_views=False,

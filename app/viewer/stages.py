@@ -58,7 +58,7 @@ def filter_chunks(run: Run) -> list[Chunk]:
     frame = rr.Boxes2D(mins=[[-0.5, -0.5]], sizes=[[width, height]], colors=[at.MASK_COLOUR], radii=[-0.5])
     return [
         once(at.FRAME, frame),
-        once(at.EVENTS, rr.AnnotationContext(context), rr.Points2D.from_fields(radii=[-1.0])),
+        once(at.EVENTS, rr.AnnotationContext(context), rr.Points2D.from_fields(radii=[-1.0], show_labels=False)),
         columns_at(at.EVENTS, run.times_us, columns, lengths),
         *(chunk for rate in rates for chunk in rate),
     ]
@@ -115,7 +115,7 @@ def logo_chunks(run: Run) -> list[Chunk]:
     cross = rr.LineStrips2D([[[-arm, 0], [arm, 0]], [[0, -arm], [0, arm]]], colors=[at.MASK_COLOUR], radii=[-0.7])
     return [
         once(at.BALL_CENTRE, cross),
-        once(at.LOGO, rr.AnnotationContext(context), rr.Points2D.from_fields(radii=[-2.0])),
+        once(at.LOGO, rr.AnnotationContext(context), rr.Points2D.from_fields(radii=[-2.0], show_labels=False)),
         columns_at(at.LOGO, run.times_us, columns, lengths),
         *_rings(run, at.LOGO_OUTLINE, radii, at.KALMAN_COLOUR),
         *_rings(run, at.LOGO_MASK, [logo.radius_px - logo.pad_px for logo in logos], at.MASK_COLOUR),

@@ -151,7 +151,7 @@ def layout_bytes(run: Run, tab: str) -> bytes:
 
     tab : the name of the one in front; the first one when there is none of that name
     """
-    made = blueprint(run, "all")
+    made = blueprint(run, "all", is_lasting=True)
     tabs = list(made.root_container.contents)
     tabs.insert(len(tabs) - 1, _compare(run))
     made.root_container.contents = tabs

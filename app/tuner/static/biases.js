@@ -14,6 +14,8 @@ export class Biases extends EventTarget {
     this.connection = connection;
     this.state = opening.biases;
     this.values = { ...this.state.values };
+    this.before = { ...this.values }; // what the events that are seen were taken with
+    this.unwanted = false;
     this.rows = new Map();
     this.note = element("p.note");
     this.progress = element("progress", { hidden: true, max: 1, value: 0 });
@@ -47,7 +49,7 @@ export class Biases extends EventTarget {
     slider.addEventListener("change", () => this.#put(name, Number(slider.value)));
     box.addEventListener("change", () => {
       const value = Math.round(Number(box.value));
-      if (Number.isFinite(value) && low <= value && value <= high) this.#put(name, value);
+      if (box.value.trim() && Number.isFinite(value) && low <= value && value <= high) this.#put(name, value);
       else {
         notice(`bias_${name} = ${box.value} is not possible: ${low} to ${high}`);
         this.#refresh();
@@ -96,17 +98,29 @@ export class Biases extends EventTarget {
   }
 
   async #again() {
+    this.unwanted = false;
     try {
       await post(this.connection.path("biases"), { biases: this.values });
     } catch (error) {
       notice(error.message);
+      this.#back();
     }
   }
 
   #taken({ state, share = 0, error, biases }) {
     this.#working(state === "running", share);
     if (error) notice(error);
-    if (state === "done") this.dispatchEvent(new CustomEvent("taken", { detail: biases }));
+    // One that a newer one replaces is cancelled, too.
+    if (state === "failed" || (state === "cancelled" && this.unwanted)) this.#back();
+    if (state !== "done") return;
+    this.before = { ...this.values };
+    this.dispatchEvent(new CustomEvent("taken", { detail: biases }));
+  }
+
+  // The events are still the earlier ones.
+  #back() {
+    this.values = { ...this.before };
+    this.#refresh();
   }
 
   #working(running, share) {
@@ -115,6 +129,7 @@ export class Biases extends EventTarget {
   }
 
   #cancel() {
+    this.unwanted = true;
     for (const kind of ["biases", "bias_curve"]) post(this.connection.path("cancel"), { kind });
   }
 

@@ -43,6 +43,10 @@ export class Curve {
     const name = this.which.value;
     const { low, high } = this.described.get(name);
     const wanted = [Number(this.low.value), Number(this.high.value)];
+    if (!this.range.hidden && [this.low, this.high].some(({ value }) => !value.trim() || Number.isNaN(Number(value)))) {
+      notice("The curve's range needs two numbers: from and to.");
+      return;
+    }
     const whole = this.range.hidden || (wanted[0] === low && wanted[1] === high);
     const [start_us, end_us] = this.settings.clip;
     const request = { name, parameters: this.settings.parameters, start_us, end_us, points: Number(this.points.value) || 0 };

@@ -36,6 +36,7 @@ async function start() {
   }
   app.opening = opening;
   const { recording, presets } = opening;
+  app.builtIn = Object.keys(presets);
   const values = presets.opened;
   settings.start({
     parameters: link.parameters(values),
@@ -107,6 +108,8 @@ function listen(link) {
   settings.addEventListener("change", ({ detail }) => {
     app.runner.change(detail.settled);
     if (detail.settled) rememberLater(REMEMBER_UNSEEN_MS);
+    byId("preset").value = settings.preset.name;
+    if (String(app.overview.clip) !== String(settings.clip)) app.overview.show(settings.clip, app.overview.shots);
     buttons();
   });
   const numbers = (detail) => {
@@ -189,8 +192,8 @@ async function takenAgain() {
   if (byId("about").innerHTML !== innerHTML) notice("The scene was taken again with these biases.", "info", 3);
   app.overview.take(recording);
   const [start, end] = settings.clip;
-  if (recording.is_long && start >= recording.start_us && end <= recording.end_us) app.runner.want(true);
-  else settings.takeClip(...recording.clip_us);
+  if (!recording.is_long || start < recording.start_us || end > recording.end_us) settings.takeClip(...recording.clip_us);
+  app.runner.want(true); // whatever the page has asked for before, the events are others
 }
 
 function showShots(measures) {
@@ -201,8 +204,7 @@ function chooseClip(from, to) {
   const { start_us, end_us, longest_us } = app.opening.recording;
   const start = Math.max(start_us, Math.round(from));
   settings.takeClip(start, Math.min(end_us, Math.round(to), start + longest_us));
-  app.overview.show(settings.clip, app.overview.shots);
-  viewer.seek(start);
+  viewer.leave();
 }
 
 function buttons() {

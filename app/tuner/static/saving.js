@@ -46,8 +46,9 @@ export class Saving {
   }
 
   async #copyCommand() {
-    const { command } = await this.#written();
+    const { command, needs } = await this.#written();
     await copied(command, "The command");
+    if (needs) notice(`It needs the biases as ${needs} beside it: Biases, Save .bias.`, "info", 12);
   }
 
   async #savePreset() {
@@ -71,7 +72,8 @@ export class Saving {
     });
     this.file.value = "";
     if (!parameters) return;
-    const name = file.name.replace(/\.toml$/, "");
+    const plain = file.name.replace(/\.toml$/, "");
+    const name = this.app.builtIn.includes(plain) ? file.name : plain;
     opening.presets[name] = parameters;
     const list = byId("preset");
     if (![...list.options].some(({ value }) => value === name)) list.append(element("option", { value: name }, name));

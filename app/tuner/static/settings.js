@@ -98,7 +98,7 @@ export class Settings extends EventTarget {
   }
 
   #snapshot() {
-    return copy({ parameters: this.parameters, pinned: this.pinned, clip: this.clip });
+    return copy({ parameters: this.parameters, pinned: this.pinned, clip: this.clip, preset: this.preset });
   }
 
   #go(from, to) {

@@ -18,6 +18,14 @@ function stayAtHome() {
   };
 }
 
+// A canvas that has been shown loses its picture, which is to be saved: this keeps it.
+function keepPictures() {
+  const made = HTMLCanvasElement.prototype.getContext;
+  HTMLCanvasElement.prototype.getContext = function (kind, options) {
+    return made.call(this, kind, kind.startsWith("webgl") ? { ...options, preserveDrawingBuffer: true } : options);
+  };
+}
+
 const storeOf = (id) => `Recording:${APPLICATION}:${id}`;
 
 export class Viewer extends EventTarget {
@@ -37,6 +45,7 @@ export class Viewer extends EventTarget {
 
   async #start(version, parent) {
     stayAtHome();
+    keepPictures();
     const { WebViewer } = await import(`/rerun/${version}/widget.js`);
     const viewer = new WebViewer();
     const ready = new Promise((resolve) => viewer.once("ready", resolve));
@@ -77,6 +86,11 @@ export class Viewer extends EventTarget {
   // Where the playhead is; null while nothing is shown.
   get playhead_us() {
     return this.#time_ns === null ? null : this.#time_ns / 1000;
+  }
+
+  // The next recording is shown where it opens, not at the present playhead.
+  leave() {
+    this.#time_ns = null;
   }
 
   // Show a recording in place of the present one, at the same playhead; at `time_us` when there is none.

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 
 from app.simulate import simulate_to_file
@@ -234,6 +236,35 @@ def test_a_changed_playback_speed_survives_a_change(tab: Tab) -> None:
     assert tab.page.evaluate(speed) == pytest.approx(0.05)
 
 
+def test_it_plays_over_and_over_after_a_change_too(tab: Tab) -> None:
+    tab.slide("logo.pad_px", what="shown")
+    tab.page.evaluate("window.spinscope.viewer.seek(94500, 'playing')")
+    tab.until("window.spinscope.viewer.playhead_us < 50000")
+    tab.page.evaluate("window.spinscope.viewer.play('paused')")
+
+
+def test_the_picture_of_the_view_is_saved(tab: Tab) -> None:
+    with tab.page.expect_download() as download:
+        tab.page.evaluate(
+            "[...document.querySelectorAll('#save .items button')].find((b) => b.textContent.includes('PNG')).click()"
+        )
+    picture = cv2.imread(str(download.value.path()))
+    box = tab.page.locator("#viewer canvas").bounding_box()
+    assert picture.shape == (round(box["height"]), round(box["width"]), 3)
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 100
+    assert (picture.max(axis=2) > 200).mean() > 0.002  # letters and curves
+
+
+def test_a_smaller_and_a_larger_window_hold_the_whole_page(tab: Tab) -> None:
+    try:
+        for height in (500, 700):
+            tab.page.set_viewport_size({**SIZE, "height": height})
+            end = "document.getElementById('bar').getBoundingClientRect().bottom"
+            tab.until(f"Math.abs({end} - {height}) <= 1")
+    finally:
+        tab.page.set_viewport_size(SIZE)
+
+
 def test_a_viewer_that_does_not_know_a_recordings_times_yet_is_asked_again(tab: Tab) -> None:
     """It may tell that a recording is open before that; rarely, so here it is made to."""
     tab.page.evaluate(
@@ -305,6 +336,19 @@ def test_a_preset_is_taken_and_marks_follow_it(tab: Tab) -> None:
     assert tab.page.locator(".control.differs").count() == 0
     tab.slide("logo.pad_px")
     assert tab.page.locator(".control.differs").count() == 1
+    tab.after(lambda: tab.page.click("#undo"))
+    tab.after(lambda: tab.page.click("#undo"))
+    assert tab.page.input_value("#preset") == "opened"
+    assert tab.page.locator(".control.differs").count() == 0
+
+
+def test_a_file_named_like_a_preset_of_ours_does_not_take_its_place(tab: Tab, tmp_path: Path) -> None:
+    (tmp_path / "paper.toml").write_text("[logo]\npad_px = 4.25\n", encoding="utf-8")
+    paper = tab.page.evaluate("JSON.stringify(window.spinscope.opening.presets.paper)")
+    tab.after(lambda: tab.page.set_input_files("#save input[type=file]", tmp_path / "paper.toml"))
+    assert tab.value("logo.pad_px") == 4.25
+    assert tab.page.input_value("#preset") == "paper.toml"
+    assert tab.page.evaluate("JSON.stringify(window.spinscope.opening.presets.paper)") == paper
     tab.after(lambda: tab.page.select_option("#preset", "opened"))
 
 
@@ -398,6 +442,19 @@ def test_a_simulated_scene_is_taken_again_from_the_page(browser: Any, tmp_path: 
         slider = panel.locator("[data-bias=diff_on] input[type=range]")
         tab.after(lambda: slider.press("End"))
         assert tab.page.inner_text("#about") != before
+        # Refractory periods hardly change when the first and last event come: the results are new all the same.
+        tab.after(lambda: panel.locator("[data-bias=refr] input[type=range]").press("ArrowUp"))
+        mine = tab.page.evaluate("JSON.stringify(window.spinscope.biases.values)")
+        tab.page.evaluate(
+            """new Promise((resolve) => {
+                const { biases, connection } = window.spinscope;
+                connection.addEventListener("biases", ({ detail }) => detail.state === "cancelled" && resolve());
+                biases.take({ diff_off: 150 }).then(() => biases.stop.click());
+            })"""
+        )
+        assert tab.page.evaluate("JSON.stringify(window.spinscope.biases.values)") == mine, (
+            "what was cancelled is undone"
+        )
         panel.get_by_text("Rates against it").click()
         tab.page.wait_for_selector("#side details[data-title=Biases] svg.chart")
         panel.locator("progress").wait_for(state="hidden")

@@ -141,6 +141,10 @@ def test_a_simulated_scene_is_taken_again_with_other_biases(simulated: Path) -> 
         again = client.http.get(client.path("recording")).json()
         assert again["recording"]["events"] < 0.9 * before  # higher thresholds, fewer events
         assert again["biases"]["values"] == biases
+        written = client.post("presets/write", parameters={}).json()
+        assert written["needs"] == "spinscope.bias"
+        assert written["command"].startswith(f"spinscope simulate again --scene {simulated} --biases spinscope.bias")
+        assert written["command"].endswith("&& spinscope analyze again.h5")
         client.post("bias_curve", biases=biases, name="diff_on", points=3)
         curve = client.wait("bias_curve", lambda m: m["state"] in ("done", "failed"))
         assert curve["state"] == "done", curve
@@ -153,7 +157,16 @@ def test_a_simulated_scene_is_taken_again_with_other_biases(simulated: Path) -> 
         text = client.http.post(f"{tuner.address}api/biases/write", json={"biases": biases}).json()["text"]
         read = client.http.post(f"{tuner.address}api/biases/read", json={"text": text}).json()
         assert read["biases"] == biases
-        assert client.http.post(f"{tuner.address}api/biases/read", json={"text": "x"}).status_code == 400
+        refused = client.http.post(f"{tuner.address}api/biases/read", json={"text": "x"})
+        assert refused.status_code == 400
+        assert "/" not in refused.json()["error"], "a file of the server's says nothing"
+        # The name of what is taken again does not grow.
+        client.messages.clear()
+        client.post("biases", biases=client.opening["biases"]["values"])
+        client.wait("biases", lambda m: m["state"] == "done")
+        page = tuner.workshop.page(client.opening["page"])
+        assert page is not None
+        assert len(page.bench.session.recording.path.stem) == len(simulated.stem) + 9
     finally:
         tuner.stop()
 
