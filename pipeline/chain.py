@@ -136,12 +136,14 @@ class _Column:
 
     making : held while the next result is made: another thread that wants it waits for it
     is_kept : whether all results so far are there
+    fault : what a step raised; the state may be half way into its tick, so that no other run may go on from it
     """
 
     state: Any
     making: threading.Lock = field(default_factory=threading.Lock)
     results: list[Any] = field(default_factory=list)
     is_kept: bool = True
+    fault: BaseException | None = None
     bytes: int = 0
     last_use: int = 0
 
@@ -230,11 +232,14 @@ class Chain:
                         if index < len(column.results):
                             results[name] = column.results[index]
                             continue
+                        if column.fault is not None:
+                            raise column.fault
                         try:
                             results[name] = self._step(name, parameters, column, results, seconds)
-                        except BaseException:
+                        except BaseException as error:
+                            column.fault = error
                             with self._lock:
-                                self._columns.pop(keys[name], None)  # its state may be half way into this tick
+                                self._columns.pop(keys[name], None)
                             raise
                         if name in forget:
                             column.is_kept = False

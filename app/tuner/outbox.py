@@ -21,10 +21,14 @@ class Outbox:
         self._closed = False
 
     def put(self, kind: str, **content: Any) -> None:
-        """Leave a message; an older one of the same kind that was not read yet is dropped."""
+        """Leave a message; an older one of the same kind that was not read yet is dropped.
+
+        One that names a recording stays until another one does: word of progress must not take a picture's place.
+        """
+        slot = f"{kind} with recording" if "recording" in content else kind
         with self._lock:
-            self._waiting.pop(kind, None)
-            self._waiting[kind] = {"kind": kind, **content}
+            self._waiting.pop(slot, None)
+            self._waiting[slot] = {"kind": kind, **content}
         self._wake()
 
     def close(self) -> None:

@@ -219,3 +219,24 @@ def test_threads_share_the_work_and_get_the_same(calls: dict[str, int], monkeypa
         assert sum(seconds[name] for seconds in took) >= 20 * 2e-4
     assert not took[0]["contrast"]
     assert not any(chain.seconds.values()), "each run has its own account"
+
+
+def test_no_run_goes_on_from_a_state_that_another_one_left_half_way(calls: dict[str, int]) -> None:
+    chain = Chain(source())
+    stage = chain_module.STAGES["rate"]
+    sound = stage.step
+
+    def broken(parameters: Any, state: list[str], packet: Any, *inputs: Any) -> Any:
+        state.append("half way")
+        raise ValueError("broken")
+
+    first, second = chain.run(DEFAULT), chain.run(DEFAULT)
+    next(first)
+    next(second)  # both hold the same columns now
+    stage.step = broken
+    with pytest.raises(ValueError, match="broken"):
+        next(first)
+    stage.step = sound
+    with pytest.raises(ValueError, match="broken"):
+        next(second)
+    assert [tick.contrast for tick in chain.run(DEFAULT)] == [tick.contrast for tick in Chain(source()).run(DEFAULT)]

@@ -123,10 +123,10 @@ function listen(link) {
   const picture = async (detail) => {
     latest = detail.recording;
     try {
-      const picture = await bytes(connection.path(`pictures/${detail.recording}`));
+      const content = await bytes(connection.path(`pictures/${detail.recording}`));
       if (latest !== detail.recording) return false;
       if (first) await viewer.layout(await bytes(connection.path(`layout?tab=${encodeURIComponent(link.tab ?? "")}`)));
-      await viewer.show(picture, detail.recording, (first && link.time) || detail.opening_us);
+      await viewer.show(content, detail.recording, (first && link.time) || detail.opening_us);
       first = false;
       document.body.dataset.picture = detail.recording;
       if (detail.state === "done") document.body.dataset.shown = detail.serial;

@@ -150,6 +150,21 @@ def test_an_old_message_of_a_kind_gives_way_to_a_newer_one() -> None:
     assert asyncio.run(read()) == [{"kind": "run", "share": 99}, {"kind": "curve", "points": 3}]
 
 
+def test_word_of_progress_does_not_take_a_pictures_place() -> None:
+    async def read() -> list[str]:
+        outbox = Outbox()
+        for content in ({"state": "a"}, {"state": "b", "recording": "1"}, {"state": "c"}, {"state": "d"}):
+            outbox.put("run", **content)
+        found = []
+        async for message in outbox.messages():
+            found.append(message["state"])
+            if len(found) == 2:
+                outbox.close()
+        return found
+
+    assert asyncio.run(read()) == ["b", "d"]
+
+
 def test_a_job_tells_how_it_ended_and_stops_when_asked() -> None:
     outbox = Outbox()
 
