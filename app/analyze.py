@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pipeline.results import SpinEstimate
-from pipeline.shots import Shot
+from spinscope.pipeline.results import SpinEstimate
+from spinscope.pipeline.shots import Shot
 
 from .session import Choices, Progress, Session
 

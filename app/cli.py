@@ -11,8 +11,8 @@ from typing import Any
 
 import click
 
-from pipeline.errors import ParameterError, SpinscopeError
-from pipeline.methods import METHODS
+from spinscope.pipeline.errors import ParameterError, SpinscopeError
+from spinscope.pipeline.methods import METHODS
 
 from .session import DEFAULT_SAMPLE, Choices, Session
 from .simulate import KINDS, SimulateParameters
@@ -130,7 +130,7 @@ def cli(context: click.Context) -> None:
     Without a command: open a sample recording in a page with sliders beside the viewer.
     """
     if context.invoked_subcommand is None:
-        from .tuner import serve
+        from .web import serve
 
         note(f"opening the sample {DEFAULT_SAMPLE.name}; `spinscope --help` lists what else there is")
         serve(DEFAULT_SAMPLE, Choices(), None, open_browser=True)
@@ -214,7 +214,7 @@ def view(recording: Path, save: Path | None, native: bool, layout: str, choices:
 @click.option("--sensor", type=SensorSize(), help="Size of the sensor in pixels, where the file does not say it.")
 def convert(source: Path, target: Path, sensor: tuple[int, int] | None) -> None:
     """Write a recording in another format, chosen by the suffix of TARGET (.h5, .npz, .raw)."""
-    from pipeline.recordings import convert as converted
+    from spinscope.pipeline.recordings import convert as converted
 
     with ProgressBar() as bar:
         converted(source, target, sensor=sensor, on_progress=lambda share: bar(share, "converting"))
@@ -231,7 +231,7 @@ def convert(source: Path, target: Path, sensor: tuple[int, int] | None) -> None:
 @_choices
 def tune(recording: Path, port: int | None, no_browser: bool, choices: Choices) -> None:
     """Open a page with sliders beside the viewer: turn a knob, see the same instant change."""
-    from .tuner import serve
+    from .web import serve
 
     serve(recording, choices, port, open_browser=not no_browser)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from pipeline.recordings import RecordingInfo, open_recording, summary
+from spinscope.pipeline.recordings import RecordingInfo, open_recording, summary
 
 from .session import Progress
 

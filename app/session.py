@@ -10,13 +10,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from pipeline.camera import Camera, CameraParameters
-from pipeline.chain import Chain, EventSource, Parameters, Tick
-from pipeline.errors import ParameterError, RecordingError
-from pipeline.recordings import Recording, open_recording
-from pipeline.results import Truth
-from pipeline.shots import ShotLog
-from pipeline.stages.fixed_ball import find_fixed_ball
+from spinscope.pipeline.camera import Camera, CameraParameters
+from spinscope.pipeline.chain import Chain, EventSource, Parameters, Tick
+from spinscope.pipeline.errors import ParameterError, RecordingError
+from spinscope.pipeline.recordings import Recording, open_recording
+from spinscope.pipeline.results import Truth
+from spinscope.pipeline.shots import ShotLog
+from spinscope.pipeline.stages.fixed_ball import find_fixed_ball
 
 PRESETS = Path(__file__).parent / "presets"
 SAMPLES = Path(__file__).parents[1] / "sample_recordings"

@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.biases import PAPER, BiasParameters, read_biases
-from pipeline.camera import Camera, CameraParameters
-from pipeline.errors import ParameterError, RecordingError
-from pipeline.parameters import ParameterGroup, choice, switch, tunable
-from pipeline.recordings import open_recording, write_npz, write_raw, write_recording
-from pipeline.simulator import Background, Light, Scene, SimulatedRecording, flight, rally, simulate, spinner
-from pipeline.simulator import simulate_again as simulated_again
-from pipeline.simulator.shots import FLIGHT_KINDS
+from spinscope.pipeline.biases import PAPER, BiasParameters, read_biases
+from spinscope.pipeline.camera import Camera, CameraParameters
+from spinscope.pipeline.errors import ParameterError, RecordingError
+from spinscope.pipeline.parameters import ParameterGroup, choice, switch, tunable
+from spinscope.pipeline.recordings import open_recording, write_npz, write_raw, write_recording
+from spinscope.pipeline.simulator import Background, Light, Scene, SimulatedRecording, flight, rally, simulate, spinner
+from spinscope.pipeline.simulator import simulate_again as simulated_again
+from spinscope.pipeline.simulator.shots import FLIGHT_KINDS
 
 Progress = Callable[[float, str], None]  # share done (0..1) and what is being done
 

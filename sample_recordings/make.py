@@ -10,8 +10,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from app.simulate import Written, simulate_to_file
-from app.terminal import ProgressBar, note
+from spinscope.app.simulate import Written, simulate_to_file
+from spinscope.app.terminal import ProgressBar, note
 
 FOLDER = Path(__file__).parent / "own"
 

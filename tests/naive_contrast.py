@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.kernels.contrast_events import LogoEvents
+from spinscope.pipeline.kernels.contrast_events import LogoEvents
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.camera import Camera
-from pipeline.simulator.kernels_light import Physics
-from pipeline.simulator.logos import _drawing
-from pipeline.simulator.scene import Ball, Light
+from spinscope.pipeline.camera import Camera
+from spinscope.pipeline.simulator.kernels_light import Physics
+from spinscope.pipeline.simulator.logos import _drawing
+from spinscope.pipeline.simulator.scene import Ball, Light
 
 Floats = NDArray[np.float64]
 

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.camera import Camera, CameraParameters, Setting
-from pipeline.events import EventBatch
-from pipeline.results import Packet, SpinEstimate
-from pipeline.stages import flow, logo, rate, spin
-from pipeline.stages.filter import FilterResult
-from pipeline.stages.track import TrackResult
+from spinscope.pipeline.camera import Camera, CameraParameters, Setting
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.results import Packet, SpinEstimate
+from spinscope.pipeline.stages import flow, logo, rate, spin
+from spinscope.pipeline.stages.filter import FilterResult
+from spinscope.pipeline.stages.track import TrackResult
 
 Floats = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.simulate import BIASES, DESCRIPTION
-from pipeline.biases import FACTORY, PAPER
-from pipeline.recordings import open_recording
-from pipeline.simulator import Scene, Sensor
 from sample_recordings.make import FOLDER, SAMPLES, make
+from spinscope.app.simulate import BIASES, DESCRIPTION
+from spinscope.pipeline.biases import FACTORY, PAPER
+from spinscope.pipeline.recordings import open_recording
+from spinscope.pipeline.simulator import Scene, Sensor
 
 FOREIGN = sorted(FOLDER.parent.glob("*.h5"))
 OWN = [FOLDER / f"{name}.h5" for name in SAMPLES]

@@ -10,13 +10,13 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.camera import Camera, CameraParameters, Setting
-from pipeline.events import EventBatch
-from pipeline.results import Packet, Truth
-from pipeline.stages import filter, surface, track
-from pipeline.stages.filter import FilterParameters, FilterResult
-from pipeline.stages.surface import SurfaceParameters, SurfaceResult
-from pipeline.stages.track import TrackParameters, TrackResult
+from spinscope.pipeline.camera import Camera, CameraParameters, Setting
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.results import Packet, Truth
+from spinscope.pipeline.stages import filter, surface, track
+from spinscope.pipeline.stages.filter import FilterParameters, FilterResult
+from spinscope.pipeline.stages.surface import SurfaceParameters, SurfaceResult
+from spinscope.pipeline.stages.track import TrackParameters, TrackResult
 
 SAMPLES = Path(__file__).parents[1] / "sample_recordings"
 WIDTH, HEIGHT = 1280, 720

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.chain import Tick
-from pipeline.errors import SpinscopeError
-from pipeline.shots import Shot
+from spinscope.pipeline.chain import Tick
+from spinscope.pipeline.errors import SpinscopeError
+from spinscope.pipeline.shots import Shot
 
 if TYPE_CHECKING:
     from ..session import Session

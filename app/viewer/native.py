@@ -7,7 +7,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from pipeline.errors import SpinscopeError
+from spinscope.pipeline.errors import SpinscopeError
 
 from ..terminal import note
 from . import require_display

@@ -10,7 +10,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from pipeline.kernels.still import CELLS, Canvas, centroid, paint, turn_back_and_count
+from spinscope.pipeline.kernels.still import CELLS, Canvas, centroid, paint, turn_back_and_count
 
 from . import entities as at
 from .rerun_api import Chunk, columns_at, once, styled

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.results import Circle
+from spinscope.pipeline.results import Circle
 
 from . import entities as at
 from .rerun_api import Chunk, band, line, points

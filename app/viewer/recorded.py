@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from pipeline.errors import RecordingError
+from spinscope.pipeline.errors import RecordingError
 
 from .ball import ball_chunks
 from .layouts import blueprint

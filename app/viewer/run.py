@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.camera import Camera
-from pipeline.chain import Tick
-from pipeline.results import SpinEstimate, Truth
-from pipeline.shots import Shot
+from spinscope.pipeline.camera import Camera
+from spinscope.pipeline.chain import Tick
+from spinscope.pipeline.results import SpinEstimate, Truth
+from spinscope.pipeline.shots import Shot
 
 if TYPE_CHECKING:
     from ..session import Session

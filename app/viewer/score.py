@@ -13,7 +13,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from pipeline.stages.contrast import ContrastResult
+from spinscope.pipeline.stages.contrast import ContrastResult
 
 from . import entities as at
 from .png import png

@@ -13,8 +13,8 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from pipeline.kernels.hsv import hsv_image, hsv_wheel
-from pipeline.results import Circle
+from spinscope.pipeline.kernels.hsv import hsv_image, hsv_wheel
+from spinscope.pipeline.results import Circle
 
 from . import entities as at
 from .plots import from_start, rate_chunks, residual_plots, spin_chunks, state_plots, true_state

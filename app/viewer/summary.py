@@ -11,8 +11,8 @@ import rerun as rr
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from pipeline.chain import Tick
-from pipeline.results import SpinEstimate
+from spinscope.pipeline.chain import Tick
+from spinscope.pipeline.results import SpinEstimate
 
 from ..words import Kind, axis_words, kind_of_spin, km_h, rpm, speed_words, std_words
 from . import entities as at

@@ -21,7 +21,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from pipeline.errors import SpinscopeError
+from spinscope.pipeline.errors import SpinscopeError
 
 from ..terminal import note
 from .recorded import write_rrd

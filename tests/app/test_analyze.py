@@ -13,8 +13,8 @@ import jsonschema
 import numpy as np
 import pytest
 
-from app.analyze import report as report_of
-from app.session import Choices, Session
+from spinscope.app.analyze import report as report_of
+from spinscope.app.session import Choices, Session
 
 SCHEMA = json.loads((Path(__file__).parent / "analyze.schema.json").read_text(encoding="utf-8"))
 FLIGHTS = (
@@ -28,7 +28,7 @@ FLIGHTS = (
 
 
 def spinscope(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "app", *map(str, arguments)]
+    command = [sys.executable, "-m", "spinscope", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
 
 

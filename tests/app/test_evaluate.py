@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from app.evaluate import (
+from spinscope.app.evaluate import (
     Evaluation,
     evaluate_suite,
     print_evaluation,
@@ -20,10 +20,10 @@ from app.evaluate import (
     write_json,
     write_page,
 )
-from pipeline.errors import ParameterError, RecordingError
-from pipeline.evaluation import SUITES, Bench, Row, Suite, Summary, Table
-from pipeline.evaluation import figures as figures_of_suites
-from pipeline.evaluation.work import Task
+from spinscope.pipeline.errors import ParameterError, RecordingError
+from spinscope.pipeline.evaluation import SUITES, Bench, Row, Suite, Summary, Table
+from spinscope.pipeline.evaluation import figures as figures_of_suites
+from spinscope.pipeline.evaluation.work import Task
 
 
 def measure(bench: Bench, number: int) -> list[Row]:

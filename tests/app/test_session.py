@@ -8,9 +8,9 @@ from pathlib import Path
 import h5py
 import pytest
 
-from app.session import Choices, Session, chosen_parameters, preset
-from pipeline.chain import Parameters
-from pipeline.errors import ParameterError, RecordingError
+from spinscope.app.session import Choices, Session, chosen_parameters, preset
+from spinscope.pipeline.chain import Parameters
+from spinscope.pipeline.errors import ParameterError, RecordingError
 
 
 def test_the_default_preset_is_the_declared_defaults() -> None:

@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from app.cli import cli
-from app.simulate import BIASES, DESCRIPTION, simulate_again_to_file, simulate_to_file
-from pipeline.biases import PAPER, BiasParameters, write_biases
-from pipeline.errors import ParameterError, RecordingError, SpinscopeError
-from pipeline.recordings import open_recording
+from spinscope.app.cli import cli
+from spinscope.app.simulate import BIASES, DESCRIPTION, simulate_again_to_file, simulate_to_file
+from spinscope.pipeline.biases import PAPER, BiasParameters, write_biases
+from spinscope.pipeline.errors import ParameterError, RecordingError, SpinscopeError
+from spinscope.pipeline.recordings import open_recording
 
 SENSITIVE = BiasParameters(diff_on=0, diff_off=0)  # lower thresholds: more events
 SMALL: dict[str, Any] = {"width_px": 240, "height_px": 160, "seed": 5}

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from pipeline.chain import STAGES, Chain, EventSource, Parameters
-from pipeline.events import EventBatch
-from pipeline.results import Packet
+from spinscope.pipeline.chain import STAGES, Chain, EventSource, Parameters
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.results import Packet
 
 SAMPLES = Path(__file__).parents[2] / "sample_recordings"
 TRACKING = ("filter", "surface", "track", "logo")

@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.session import Choices, Session
-from pipeline.camera import Setting
-from pipeline.chain import Tick
-from pipeline.kernels.contrast import score
-from pipeline.kernels.contrast_window import whole
-from pipeline.results import SpinEstimate
-from pipeline.stages import contrast
-from pipeline.stages.spin import SpinResult
+from spinscope.app.session import Choices, Session
+from spinscope.pipeline.camera import Setting
+from spinscope.pipeline.chain import Tick
+from spinscope.pipeline.kernels.contrast import score
+from spinscope.pipeline.kernels.contrast_window import whole
+from spinscope.pipeline.results import SpinEstimate
+from spinscope.pipeline.stages import contrast
+from spinscope.pipeline.stages.spin import SpinResult
 from tests.naive_contrast import dotted_ball, naive_score
 
 # The thread's own time: what other programs do on a shared machine does not count.

@@ -11,11 +11,11 @@ import h5py
 import numpy as np
 import pytest
 
-from pipeline.camera import Camera, CameraParameters, Setting
-from pipeline.events import EventBatch
-from pipeline.results import Packet
-from pipeline.stages import filter as stage
-from pipeline.stages.filter import FilterParameters
+from spinscope.pipeline.camera import Camera, CameraParameters, Setting
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.results import Packet
+from spinscope.pipeline.stages import filter as stage
+from spinscope.pipeline.stages.filter import FilterParameters
 from tests.naive_filter import NaiveFilter
 
 # The thread's own time: what other programs do on a shared machine does not count.

@@ -17,8 +17,8 @@ import h5py
 import numpy as np
 import pytest
 
-from pipeline.events import EventBatch
-from pipeline.recordings import open_recording, summary, write_npz, write_raw, write_recording
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.recordings import open_recording, summary, write_npz, write_raw, write_recording
 from tests.naive_recordings import naive_evt2, naive_evt3
 
 EVENTS = 2_000_000

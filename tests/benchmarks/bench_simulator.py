@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.camera import Camera, CameraParameters
-from pipeline.simulator import flight, simulate, spinner
+from spinscope.pipeline.camera import Camera, CameraParameters
+from spinscope.pipeline.simulator import flight, simulate, spinner
 from tests.naive_simulator import naive_pixel
 from tests.pipeline.simulator.test_simulator_pixel import IDEAL, events_of
 

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.kernels.logo import logo_rows
-from pipeline.kernels.plane_flow import FEWEST, SPREAD_PX, fit_plane
-from pipeline.kernels.rate import low_passed
-from pipeline.kernels.triplet import earlier_neighbours, triplet_flow
-from pipeline.stages import flow, logo, rate, spin
-from pipeline.stages.filter import FilterResult
+from spinscope.pipeline.kernels.logo import logo_rows
+from spinscope.pipeline.kernels.plane_flow import FEWEST, SPREAD_PX, fit_plane
+from spinscope.pipeline.kernels.rate import low_passed
+from spinscope.pipeline.kernels.triplet import earlier_neighbours, triplet_flow
+from spinscope.pipeline.stages import flow, logo, rate, spin
+from spinscope.pipeline.stages.filter import FilterResult
 from tests.naive_spin import (
     naive_logo_rows,
     naive_low_pass,

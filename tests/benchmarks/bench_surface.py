@@ -15,14 +15,14 @@ import numpy as np
 import pytest
 from numba import njit
 
-from pipeline.camera import Camera, CameraParameters, Setting
-from pipeline.events import EventBatch
-from pipeline.kernels import eros, isolated
-from pipeline.results import Packet
-from pipeline.stages import filter as filter_stage
-from pipeline.stages import surface as stage
-from pipeline.stages.filter import FilterParameters
-from pipeline.stages.surface import SurfaceParameters
+from spinscope.pipeline.camera import Camera, CameraParameters, Setting
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.kernels import eros, isolated
+from spinscope.pipeline.results import Packet
+from spinscope.pipeline.stages import filter as filter_stage
+from spinscope.pipeline.stages import surface as stage
+from spinscope.pipeline.stages.filter import FilterParameters
+from spinscope.pipeline.stages.surface import SurfaceParameters
 from tests.naive_surface import eros_float32_loop
 
 WIDTH, HEIGHT = 1280, 720

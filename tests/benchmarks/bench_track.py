@@ -12,11 +12,11 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.kernels import circle, contour, outline
-from pipeline.stages import filter, surface, track
-from pipeline.stages.filter import FilterParameters
-from pipeline.stages.surface import SurfaceParameters
-from pipeline.stages.track import TrackParameters
+from spinscope.pipeline.kernels import circle, contour, outline
+from spinscope.pipeline.stages import filter, surface, track
+from spinscope.pipeline.stages.filter import FilterParameters
+from spinscope.pipeline.stages.surface import SurfaceParameters
+from spinscope.pipeline.stages.track import TrackParameters
 from tests import naive_circle
 from tests.track_runs import PAPERS_SETTING, inputs, run, sample, tracked
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from tests.app.tuner.conftest import Client, Served, served
+from tests.app.web.conftest import Client, Served, served
 
 ROOT = Path(__file__).parents[2]
 FLIGHT = ROOT / "sample_recordings/flight_fast_top.h5"
@@ -124,7 +124,7 @@ def test_200_changes_and_the_picture_in_the_browser(benchmark: Any) -> None:
 def _two_hundred_changes() -> None:
     from playwright.sync_api import sync_playwright
 
-    command = [sys.executable, "-m", "app", "tune", str(FLIGHT), "--no-browser", "--port", "0"]
+    command = [sys.executable, "-m", "spinscope", "tune", str(FLIGHT), "--no-browser", "--port", "0"]
     process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     address = process.stdout.readline().strip()

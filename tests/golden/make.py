@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from app.session import SAMPLES, Choices, Session
-from pipeline.recordings import open_recording
+from spinscope.app.session import SAMPLES, Choices, Session
+from spinscope.pipeline.recordings import open_recording
 
 FILE = Path(__file__).with_name("samples.json")
 

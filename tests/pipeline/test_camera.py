@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.camera import Camera, CameraParameters
-from pipeline.errors import ParameterError
+from spinscope.pipeline.camera import Camera, CameraParameters
+from spinscope.pipeline.errors import ParameterError
 
 CAMERA = Camera.of(CameraParameters(), 1280, 720)
 LENS = dataclasses.replace(CAMERA, distortion=(-0.12, 0.05, 0.001, -0.0005, 0.0))

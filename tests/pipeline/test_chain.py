@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline import chain as chain_module
-from pipeline.chain import Chain, EventSource, Parameters
-from pipeline.errors import ParameterError
-from pipeline.events import EventBatch
+from spinscope.pipeline import chain as chain_module
+from spinscope.pipeline.chain import Chain, EventSource, Parameters
+from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.events import EventBatch
 
 INPUTS = {
     "filter": ("packet",),

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.errors import RecordingError
-from pipeline.events import EventBatch
+from spinscope.pipeline.errors import RecordingError
+from spinscope.pipeline.events import EventBatch
 
 
 def batch(times: list[int]) -> EventBatch:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.methods import best_of
-from pipeline.results import SpinEstimate
+from spinscope.pipeline.methods import best_of
+from spinscope.pipeline.results import SpinEstimate
 
 
 def estimate(method: str, std_rps: float | None) -> SpinEstimate:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.camera import Camera, CameraParameters
-from pipeline.results import SpinEstimate, Truth
-from pipeline.shots import Shot, ShotLog
+from spinscope.pipeline.camera import Camera, CameraParameters
+from spinscope.pipeline.results import SpinEstimate, Truth
+from spinscope.pipeline.shots import Shot, ShotLog
 
 CAMERA = Camera.of(CameraParameters(), 1280, 720)
 

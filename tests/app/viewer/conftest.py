@@ -8,8 +8,8 @@ import h5py
 import numpy as np
 import pytest
 
-from app.session import Choices, Session
-from app.viewer.run import Run
+from spinscope.app.session import Choices, Session
+from spinscope.app.viewer.run import Run
 
 
 def run_of(path: Path, choices: Choices) -> Run:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.viewer import entities
-from app.viewer.recorded import write_rrd
-from app.viewer.run import Run, shown_estimate
-from app.viewer.still import TEXTURE_PX
+from spinscope.app.viewer import entities
+from spinscope.app.viewer.recorded import write_rrd
+from spinscope.app.viewer.run import Run, shown_estimate
+from spinscope.app.viewer.still import TEXTURE_PX
 from tests.app.viewer.reading import Rows, read_back
 from tests.naive_still import turned
 

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.viewer import entities, painting
-from app.viewer.recorded import write_rrd
-from app.viewer.run import Run
-from app.viewer.still import MAP_PX, map_directions, map_frame
+from spinscope.app.viewer import entities, painting
+from spinscope.app.viewer.recorded import write_rrd
+from spinscope.app.viewer.run import Run
+from spinscope.app.viewer.still import MAP_PX, map_directions, map_frame
 from tests.app.viewer.reading import read_back
 from tests.naive_still import turned
 

@@ -12,12 +12,12 @@ import cv2
 import numpy as np
 import pytest
 
-from app.viewer import LAYOUTS, entities
-from app.viewer.layouts import NAMES
-from app.viewer.recorded import write_rrd
-from app.viewer.rerun_api import program, quiet_environment
-from app.viewer.run import Run
-from pipeline.errors import RecordingError
+from spinscope.app.viewer import LAYOUTS, entities
+from spinscope.app.viewer.layouts import NAMES
+from spinscope.app.viewer.recorded import write_rrd
+from spinscope.app.viewer.rerun_api import program, quiet_environment
+from spinscope.app.viewer.run import Run
+from spinscope.pipeline.errors import RecordingError
 from tests.app.viewer.reading import Rows, read_back
 
 Logged = dict[str, Rows]
@@ -206,7 +206,7 @@ def test_a_failed_write_leaves_the_old_file_and_no_litter(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("app.viewer.recorded.file_with", full)
+    monkeypatch.setattr("spinscope.app.viewer.recorded.file_with", full)
     with pytest.raises(RecordingError, match=r"No space left on device.*--save"):
         write_rrd(flight, path, "all")
     assert [file.name for file in tmp_path.iterdir()] == ["run.rrd"]

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.viewer import entities
-from app.viewer.recorded import write_rrd
-from app.viewer.run import Run
-from app.viewer.score import CELL_PX, DISC_RADIUS_PX, GAP_PX
-from pipeline.chain import Tick
+from spinscope.app.viewer import entities
+from spinscope.app.viewer.recorded import write_rrd
+from spinscope.app.viewer.run import Run
+from spinscope.app.viewer.score import CELL_PX, DISC_RADIUS_PX, GAP_PX
+from spinscope.pipeline.chain import Tick
 from tests.app.viewer.reading import Rows, read_back
 
 RIVALS = np.array([[20.0, 0.0, -30.0], [0.0, 40.0, 5.0]])

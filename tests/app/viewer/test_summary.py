@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 import pytest
 
-from app.viewer import entities
-from app.viewer.recorded import write_rrd
-from app.viewer.run import Run
-from app.words import kind_of_spin
-from pipeline.stages.spin import SpinResult
+from spinscope.app.viewer import entities
+from spinscope.app.viewer.recorded import write_rrd
+from spinscope.app.viewer.run import Run
+from spinscope.app.words import kind_of_spin
+from spinscope.pipeline.stages.spin import SpinResult
 from tests.app.viewer.reading import Rows, read_back
 
 

@@ -10,12 +10,12 @@ from collections.abc import Iterator
 import psutil
 import pytest
 
-from app.viewer import show
-from app.viewer.native import show_native
-from app.viewer.rerun_api import playhead_request
-from app.viewer.run import Run
-from app.viewer.web import served
-from pipeline.errors import SpinscopeError
+from spinscope.app.viewer import show
+from spinscope.app.viewer.native import show_native
+from spinscope.app.viewer.rerun_api import playhead_request
+from spinscope.app.viewer.run import Run
+from spinscope.app.viewer.web import served
+from spinscope.pipeline.errors import SpinscopeError
 
 
 @pytest.fixture(scope="module")
@@ -128,8 +128,8 @@ def test_ctrl_c_ends_it(no_ball: Run, monkeypatch: pytest.MonkeyPatch, capsys: p
         raise KeyboardInterrupt
 
     monkeypatch.setattr("http.server.ThreadingHTTPServer.serve_forever", interrupted)
-    monkeypatch.setattr("app.viewer.web._open_browser", lambda _: False)
-    from app.viewer.web import show_web
+    monkeypatch.setattr("spinscope.app.viewer.web._open_browser", lambda _: False)
+    from spinscope.app.viewer.web import show_web
 
     show_web(no_ball, "all")
     (line, _) = capsys.readouterr().err.split("\n", 1)

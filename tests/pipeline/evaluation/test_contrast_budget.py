@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.evaluation.contrast_budget import (
+from spinscope.pipeline.evaluation.contrast_budget import (
     CASES,
     FLIGHTS,
     Outcome,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.evaluation.honesty import Goal, by_coverage, goals, honesty, is_gross, ratios, refusals
-from pipeline.evaluation.tables import Row
+from spinscope.pipeline.evaluation.honesty import Goal, by_coverage, goals, honesty, is_gross, ratios, refusals
+from spinscope.pipeline.evaluation.tables import Row
 
 
 def row(magnitude: float | None, axis: float | None, std: tuple[float, float] = (1.0, 1.0), method: str = "m") -> Row:

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.errors import ParameterError
-from pipeline.evaluation import SUITES, Bench, Report, evaluate
-from pipeline.evaluation.biases import picture_of
-from pipeline.evaluation.figures import DRAWINGS, draw
-from pipeline.evaluation.tables import Row, where
+from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.evaluation import SUITES, Bench, Report, evaluate
+from spinscope.pipeline.evaluation.biases import picture_of
+from spinscope.pipeline.evaluation.figures import DRAWINGS, draw
+from spinscope.pipeline.evaluation.tables import Row, where
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,7 @@ import statistics
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.evaluation.tables import Summary, Table, text
+from spinscope.pipeline.evaluation.tables import Summary, Table, text
 
 numbers = st.floats(-1e6, 1e6)
 

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.chain import Parameters
-from pipeline.errors import ParameterError, RecordingError
-from pipeline.evaluation.tables import Row
-from pipeline.evaluation.work import Bench, Task, _make_room, executor, run, write_whole
+from spinscope.pipeline.chain import Parameters
+from spinscope.pipeline.errors import ParameterError, RecordingError
+from spinscope.pipeline.evaluation.tables import Row
+from spinscope.pipeline.evaluation.work import Bench, Task, _make_room, executor, run, write_whole
 
 CALLS: list[int] = []
 
@@ -103,7 +103,7 @@ def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
     """Also when it is killed and cannot stop them."""
     script = (
         "import os, signal\n"
-        "from pipeline.evaluation.work import executor\n"
+        "from spinscope.pipeline.evaluation.work import executor\n"
         "if __name__ == '__main__':\n"
         "    with executor(1) as by:\n"
         "        print(by.submit(os.getpid).result(), flush=True)\n"
@@ -186,7 +186,7 @@ def test_results_that_need_only_a_part_do_not_care_for_parameters(tmp_path: Path
 
 
 def test_cache_keeps_to_its_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pipeline.evaluation.work.CACHE_BYTES", 250)
+    monkeypatch.setattr("spinscope.pipeline.evaluation.work.CACHE_BYTES", 250)
     (tmp_path / "results").mkdir()
     for age in range(4):
         file = tmp_path / "results" / str(age)

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pipeline.kernels import contour, outline
+from spinscope.pipeline.kernels import contour, outline
 from tests import naive_circle
 
 ROUND = np.zeros(2)

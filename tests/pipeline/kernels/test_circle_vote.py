@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pipeline.kernels import circle
+from spinscope.pipeline.kernels import circle
 from tests import naive_circle
 
 

@@ -6,7 +6,13 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.kernels.comoving import ROUNDS, comoving_constraints, drifting_line, position_response, turned_back
+from spinscope.pipeline.kernels.comoving import (
+    ROUNDS,
+    comoving_constraints,
+    drifting_line,
+    position_response,
+    turned_back,
+)
 from tests.naive_spin import naive_line
 from tests.spinning_ball import turns
 

@@ -13,14 +13,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.kernels import contrast_scan
-from pipeline.kernels.contrast import score
-from pipeline.kernels.contrast_estimate import estimate_spin, follow_spin
-from pipeline.kernels.contrast_events import Answer, LogoEvents, Place, Settings
-from pipeline.kernels.contrast_place import moved_normals, place_slopes
-from pipeline.kernels.contrast_refine import solved
-from pipeline.kernels.contrast_search import distinct
-from pipeline.kernels.contrast_window import segment_starts, segmented, whole
+from spinscope.pipeline.kernels import contrast_scan
+from spinscope.pipeline.kernels.contrast import score
+from spinscope.pipeline.kernels.contrast_estimate import estimate_spin, follow_spin
+from spinscope.pipeline.kernels.contrast_events import Answer, LogoEvents, Place, Settings
+from spinscope.pipeline.kernels.contrast_place import moved_normals, place_slopes
+from spinscope.pipeline.kernels.contrast_refine import solved
+from spinscope.pipeline.kernels.contrast_search import distinct
+from spinscope.pipeline.kernels.contrast_window import segment_starts, segmented, whole
 from tests.naive_contrast import dotted_ball, naive_score, turned
 
 PLACE = Place(centre_std_px=0.2, radius_std_px=0.2)
@@ -207,10 +207,10 @@ def test_too_few_events_give_nothing() -> None:
 TINY = """
 import json
 import numpy as np
-from pipeline.kernels.contrast_place import place_slopes
-from pipeline.kernels.contrast_refine import Hill, climb
-from pipeline.kernels.contrast_search import search, distinct
-from pipeline.kernels.contrast_window import whole
+from spinscope.pipeline.kernels.contrast_place import place_slopes
+from spinscope.pipeline.kernels.contrast_refine import Hill, climb
+from spinscope.pipeline.kernels.contrast_search import search, distinct
+from spinscope.pipeline.kernels.contrast_window import whole
 from tests.naive_contrast import dotted_ball
 
 events = dotted_ball(np.array([20.0, 5.0, 5.0]), duration_s=0.01, events=30)

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pipeline.kernels import eros
+from spinscope.pipeline.kernels import eros
 from tests.naive_surface import NaiveEros
 
 SAMPLES = sorted((Path(__file__).parents[3] / "sample_recordings").glob("*.h5"))

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.kernels import filter as kernels
-from pipeline.kernels.rows import taken
+from spinscope.pipeline.kernels import filter as kernels
+from spinscope.pipeline.kernels.rows import taken
 from tests.naive_filter import NaiveFilter
 
 MODES = ("off", "stc", "trail", "stc_cut_trail")

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.kernels.hsv import flow_colours, hsv_image, hsv_wheel
+from spinscope.pipeline.kernels.hsv import flow_colours, hsv_image, hsv_wheel
 
 
 @given(vx=st.floats(-2000, 2000), vy=st.floats(-2000, 2000))

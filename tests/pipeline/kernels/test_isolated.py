@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pipeline.kernels import isolated
+from spinscope.pipeline.kernels import isolated
 from tests.naive_surface import cleaned
 
 RULES = ("isolated", "printed")

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.kernels.logo import logo_rows, outline_like
+from spinscope.pipeline.kernels.logo import logo_rows, outline_like
 from tests.naive_spin import naive_logo_rows
 
 

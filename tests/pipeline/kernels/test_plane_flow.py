@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.kernels.plane_flow import FEWEST, SPREAD_PX, fit_plane, near_in_time, plane_flow
+from spinscope.pipeline.kernels.plane_flow import FEWEST, SPREAD_PX, fit_plane, near_in_time, plane_flow
 from tests.naive_spin import naive_plane
 from tests.pipeline.kernels.test_triplet import moving_edge
 

@@ -7,7 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.kernels.rate import autocorrelation, falling_crossings, low_passed, moving_average, shortest_period
+from spinscope.pipeline.kernels.rate import (
+    autocorrelation,
+    falling_crossings,
+    low_passed,
+    moving_average,
+    shortest_period,
+)
 from tests.naive_spin import naive_autocorrelation, naive_low_pass
 
 

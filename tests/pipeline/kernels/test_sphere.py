@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.kernels.sphere import image_velocity, meet_ball, spin_rows, surface_velocity
+from spinscope.pipeline.kernels.sphere import image_velocity, meet_ball, spin_rows, surface_velocity
 from tests.spinning_ball import CAMERA, turns
 
 RADIUS_M = 0.02

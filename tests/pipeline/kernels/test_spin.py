@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.kernels.spin import robust_spin, sampled_spin, solve3, support
+from spinscope.pipeline.kernels.spin import robust_spin, sampled_spin, solve3, support
 
 spins = st.tuples(*[st.floats(-600, 600)] * 3).filter(lambda s: np.linalg.norm(s) > 30)
 

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.kernels.still import (
+from spinscope.pipeline.kernels.still import (
     Canvas,
     centroid,
     colour_counts,

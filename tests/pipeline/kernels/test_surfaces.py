@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.kernels import surfaces
+from spinscope.pipeline.kernels import surfaces
 from tests.naive_surface import recent_events
 
 event = st.tuples(st.integers(0, 40), st.integers(0, 5), st.integers(0, 3))

@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.errors import RecordingError
-from pipeline.events import EventBatch
-from pipeline.recordings import Recording, open_recording, write_npz, write_recording
+from spinscope.pipeline.errors import RecordingError
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.recordings import Recording, open_recording, write_npz, write_recording
 from tests.naive_recordings import ecf_block, naive_order
 
 N = 5000
@@ -110,7 +110,7 @@ def test_prophesees_ecf_compression_is_undone(tmp_path: Path, way: int, dense: b
 
 
 def test_damaged_ecf_blocks_are_refused_not_misread(tmp_path: Path) -> None:
-    from pipeline.recordings.ecf import DAMAGED, PAD_BYTES, _room, decode_ecf
+    from spinscope.pipeline.recordings.ecf import DAMAGED, PAD_BYTES, _room, decode_ecf
 
     c = some_columns(300)
     rng = np.random.default_rng(0)
@@ -317,7 +317,7 @@ def test_objects_in_npz_are_refused_without_opening_them(tmp_path: Path) -> None
 @pytest.mark.parametrize("kind", ["h5", "npz"])
 def test_bombs_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
     """Zeros that pack a thousand times; what is too small to be refused is lowered to 1 MB."""
-    monkeypatch.setattr("pipeline.recordings.columns.EXPANSION_FREE_BYTES", 1 << 20)
+    monkeypatch.setattr("spinscope.pipeline.recordings.columns.EXPANSION_FREE_BYTES", 1 << 20)
     path, zeros = tmp_path / f"bomb.{kind}", dict.fromkeys("txyp", np.zeros(3_000_000, np.int8))
     if kind == "h5":
         write_columns(path, zeros, chunks=(1_000_000,), compression="gzip", compression_opts=9)

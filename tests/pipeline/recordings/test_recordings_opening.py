@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.errors import RecordingError
-from pipeline.recordings import open_recording, write_npz, write_raw, write_recording
-from pipeline.recordings.sensor import KNOWN_SENSORS, smallest_known
+from spinscope.pipeline.errors import RecordingError
+from spinscope.pipeline.recordings import open_recording, write_npz, write_raw, write_recording
+from spinscope.pipeline.recordings.sensor import KNOWN_SENSORS, smallest_known
 from tests.pipeline.recordings.test_recordings_raw import assert_same_events, moving_edge
 
 HEADS = {

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.errors import RecordingError
-from pipeline.events import EventBatch
-from pipeline.recordings import Recording, Triggers, open_recording, write_raw
-from pipeline.recordings.evt_time import BAD_WORDS, OUTSIDE, TIME_JUMPS, UNTIMED
-from pipeline.recordings.raw import Decoder
-from pipeline.recordings.source import Pass
+from spinscope.pipeline.errors import RecordingError
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.recordings import Recording, Triggers, open_recording, write_raw
+from spinscope.pipeline.recordings.evt_time import BAD_WORDS, OUTSIDE, TIME_JUMPS, UNTIMED
+from spinscope.pipeline.recordings.raw import Decoder
+from spinscope.pipeline.recordings.source import Pass
 from tests.naive_recordings import NaiveDecoded, naive_evt2, naive_evt3, naive_order
 
 EVT3_HEADER = b"% evt 3.0\n% format EVT3;height=720;width=1280\n% geometry 1280x720\n% end\n"

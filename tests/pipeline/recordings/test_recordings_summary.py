@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.events import EventBatch
-from pipeline.recordings import open_recording, summary, write_npz, write_recording
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.recordings import open_recording, summary, write_npz, write_recording
 from tests.pipeline.recordings.test_recordings_raw import moving_edge
 
 

@@ -13,10 +13,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.errors import RecordingError
-from pipeline.events import EventBatch
-from pipeline.recordings import Triggers, convert, open_recording, write_npz, write_raw, write_recording
-from pipeline.results import Truth
+from spinscope.pipeline.errors import RecordingError
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.recordings import Triggers, convert, open_recording, write_npz, write_raw, write_recording
+from spinscope.pipeline.results import Truth
 from tests.pipeline.recordings.test_recordings_raw import assert_same_events, moving_edge
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.biases import CURVES, FACTORY, PAPER, BiasParameters, Curve, physical, read_biases, write_biases
-from pipeline.errors import ParameterError, RecordingError
+from spinscope.pipeline.biases import CURVES, FACTORY, PAPER, BiasParameters, Curve, physical, read_biases, write_biases
+from spinscope.pipeline.errors import ParameterError, RecordingError
 
 # Which way the quantity goes as its bias rises.
 RISING = {

@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.camera import Camera, CameraParameters
-from pipeline.simulator import kernels_light as columns
-from pipeline.simulator.bodies import BallBody
-from pipeline.simulator.logos import NAMES, Logo, texture
-from pipeline.simulator.motion import matrix_of
-from pipeline.simulator.scene import Ball, Fixed, Light, Scene
-from pipeline.simulator.sensor import Lens
+from spinscope.pipeline.camera import Camera, CameraParameters
+from spinscope.pipeline.simulator import kernels_light as columns
+from spinscope.pipeline.simulator.bodies import BallBody
+from spinscope.pipeline.simulator.logos import NAMES, Logo, texture
+from spinscope.pipeline.simulator.motion import matrix_of
+from spinscope.pipeline.simulator.scene import Ball, Fixed, Light, Scene
+from spinscope.pipeline.simulator.sensor import Lens
 from tests.naive_simulator import naive_picture
 from tests.pipeline.simulator.test_simulator_pixel import IDEAL
 

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.camera import Camera, CameraParameters
-from pipeline.errors import ParameterError
-from pipeline.simulator import Air, Ball, Flight, Scene, flight, human_shot, rally, spinner, thrown
-from pipeline.simulator.motion import bounced, matrix_of, path, quaternion_of, rotations
-from pipeline.simulator.shots import SPINNER_BALLS, mounted
-from pipeline.simulator.thrower import THROWER_BACKTOP_RPS, THROWER_SIDE_RPS, thrower_spin
+from spinscope.pipeline.camera import Camera, CameraParameters
+from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.simulator import Air, Ball, Flight, Scene, flight, human_shot, rally, spinner, thrown
+from spinscope.pipeline.simulator.motion import bounced, matrix_of, path, quaternion_of, rotations
+from spinscope.pipeline.simulator.shots import SPINNER_BALLS, mounted
+from spinscope.pipeline.simulator.thrower import THROWER_BACKTOP_RPS, THROWER_SIDE_RPS, thrower_spin
 
 UP = np.array([0.0, 0.0, -1.0])
 CAMERA = Camera.of(CameraParameters(), 1280, 720)

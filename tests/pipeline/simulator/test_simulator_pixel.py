@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.simulator import Light, kernels_pixel
-from pipeline.simulator.kernels_light import Physics
+from spinscope.pipeline.simulator import Light, kernels_pixel
+from spinscope.pipeline.simulator.kernels_light import Physics
 from tests.naive_simulator import naive_pixel
 
 IDEAL = Physics(

@@ -16,10 +16,10 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.biases import FACTORY
-from pipeline.camera import Camera, CameraParameters
-from pipeline.errors import ParameterError
-from pipeline.simulator import (
+from spinscope.pipeline.biases import FACTORY
+from spinscope.pipeline.camera import Camera, CameraParameters
+from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.simulator import (
     Background,
     Ball,
     Fixed,
@@ -33,9 +33,9 @@ from pipeline.simulator import (
     simulate_again,
     spinner,
 )
-from pipeline.simulator.logos import Logo, texture
-from pipeline.simulator.motion import rotations
-from pipeline.simulator.sensor import hot_rates_hz, thresholds
+from spinscope.pipeline.simulator.logos import Logo, texture
+from spinscope.pipeline.simulator.motion import rotations
+from spinscope.pipeline.simulator.sensor import hot_rates_hz, thresholds
 
 SMALL = Camera.of(CameraParameters(), 160, 120)
 QUIET = replace(Sensor(), noise_hz=0.0, hot_share=0.0)
@@ -232,7 +232,7 @@ def test_flicker_wakes_every_pixel_at_its_frequency():
 
 def test_a_moving_edge_is_seen_the_same_however_it_is_stepped(monkeypatch):
     """Half the step, nearly the same events: the steps are fine enough."""
-    import pipeline.simulator.simulation as simulation
+    import spinscope.pipeline.simulator.simulation as simulation
 
     sensor = replace(QUIET, jitter_us=0.0, contrast_noise=0.0)
     once = simulate(shot(), camera=SMALL, sensor=sensor)
@@ -330,8 +330,8 @@ def test_balls_may_come_and_go():
 
 WITHOUT_COMPILER = """
 import numpy as np
-from pipeline.camera import Camera, CameraParameters
-from pipeline.simulator import simulate, spinner
+from spinscope.pipeline.camera import Camera, CameraParameters
+from spinscope.pipeline.simulator import simulate, spinner
 scene = spinner(spin_rps=(40.0, 10.0, 15.0), ball=3, duration_ms=1.0, position_m=(0.0, 0.0, 2.0), seed=1)
 found = simulate(scene, camera=Camera.of(CameraParameters(), 48, 40), seed=1)
 np.save("OUT", np.stack([found.events.t_us, found.events.x_px, found.events.y_px, found.events.on, found.truth.label]))

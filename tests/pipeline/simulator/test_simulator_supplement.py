@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.biases import CURVES, FACTORY, PAPER, BiasParameters, Curve
-from pipeline.camera import Camera, CameraParameters
-from pipeline.simulator import Background, Scene, Sensor, SimulatedRecording, flight, simulate, spinner
+from spinscope.pipeline.biases import CURVES, FACTORY, PAPER, BiasParameters, Curve
+from spinscope.pipeline.camera import Camera, CameraParameters
+from spinscope.pipeline.simulator import Background, Scene, Sensor, SimulatedRecording, flight, simulate, spinner
 
 SMALL = Camera.of(CameraParameters(), 160, 120)
 QUIET = replace(Sensor(), noise_hz=0.0, hot_share=0.0)

@@ -13,8 +13,8 @@ import h5py
 import numpy as np
 import pytest
 
-from pipeline.chain import STAGES, Chain, EventSource, Parameters, Tick
-from pipeline.events import EventBatch
+from spinscope.pipeline.chain import STAGES, Chain, EventSource, Parameters, Tick
+from spinscope.pipeline.events import EventBatch
 
 FIXED = Parameters().with_values(
     {"track": {"ball": "fixed", "fixed_x_px": 528.43, "fixed_y_px": 426.87, "fixed_radius_px": 16.49}}

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.session import Choices, Session
-from pipeline.events import EventBatch
-from pipeline.methods import best_of
-from pipeline.results import SpinEstimate
-from pipeline.stages import contrast
-from pipeline.stages.contrast import ContrastResult
-from pipeline.stages.logo import LogoResult
+from spinscope.app.session import Choices, Session
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.methods import best_of
+from spinscope.pipeline.results import SpinEstimate
+from spinscope.pipeline.stages import contrast
+from spinscope.pipeline.stages.contrast import ContrastResult
+from spinscope.pipeline.stages.logo import LogoResult
 from tests.spinning_ball import SETTING, after_track, known_track, packets
 
 BALLS = {"spinner_ball2_side": (528.43, 426.87, 16.49), "spinner_ball5_back_no_logo": (606.67, 302.79, 16.47)}

@@ -7,11 +7,11 @@ import itertools
 import numpy as np
 import pytest
 
-from pipeline.camera import Camera, CameraParameters, Setting
-from pipeline.events import EventBatch
-from pipeline.results import Packet
-from pipeline.stages import filter as stage
-from pipeline.stages.filter import MODES, FilterParameters
+from spinscope.pipeline.camera import Camera, CameraParameters, Setting
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.results import Packet
+from spinscope.pipeline.stages import filter as stage
+from spinscope.pipeline.stages.filter import MODES, FilterParameters
 from tests.naive_filter import NaiveFilter
 
 WIDTH, HEIGHT, TICK_US = 9, 7, 1000

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.errors import RecordingError
-from pipeline.events import EventBatch
-from pipeline.stages.fixed_ball import find_fixed_ball
+from spinscope.pipeline.errors import RecordingError
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.stages.fixed_ball import find_fixed_ball
 from tests.track_runs import HEIGHT, WIDTH, merged, sample, setting
 
 

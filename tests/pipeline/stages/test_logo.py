@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.session import Choices, Session
-from pipeline.camera import Camera, CameraParameters, Setting
-from pipeline.events import EventBatch
-from pipeline.results import Packet
-from pipeline.stages import logo as stage
-from pipeline.stages.filter import FilterResult
-from pipeline.stages.logo import LogoParameters, LogoResult, TurningEvents
-from pipeline.stages.track import TrackResult
+from spinscope.app.session import Choices, Session
+from spinscope.pipeline.camera import Camera, CameraParameters, Setting
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.results import Packet
+from spinscope.pipeline.stages import logo as stage
+from spinscope.pipeline.stages.filter import FilterResult
+from spinscope.pipeline.stages.logo import LogoParameters, LogoResult, TurningEvents
+from spinscope.pipeline.stages.track import TrackResult
 from tests.spinning_ball import SETTING, known_track, no_track
 
 LOGO_LABEL = 2  # of the truth

@@ -7,13 +7,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from pipeline.events import EventBatch
-from pipeline.results import Packet
-from pipeline.stages import logo as logo_stage
-from pipeline.stages import rate as stage
-from pipeline.stages.filter import FilterResult
-from pipeline.stages.rate import RateParameters, RateResult
-from pipeline.stages.track import TrackResult
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.results import Packet
+from spinscope.pipeline.stages import logo as logo_stage
+from spinscope.pipeline.stages import rate as stage
+from spinscope.pipeline.stages.filter import FilterResult
+from spinscope.pipeline.stages.rate import RateParameters, RateResult
+from spinscope.pipeline.stages.track import TrackResult
 from tests.spinning_ball import SETTING, known_track, no_track, packets
 
 

@@ -15,14 +15,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.events import EventBatch
-from pipeline.kernels.sphere import image_velocity
-from pipeline.methods import best_of
-from pipeline.results import SpinEstimate
-from pipeline.stages.flow import FlowResult
-from pipeline.stages.rate import RateResult
-from pipeline.stages.spin import METHODS, SpinParameters, SpinResult
-from pipeline.stages.triplet_spin import TripletSpin
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.kernels.sphere import image_velocity
+from spinscope.pipeline.methods import best_of
+from spinscope.pipeline.results import SpinEstimate
+from spinscope.pipeline.stages.flow import FlowResult
+from spinscope.pipeline.stages.rate import RateResult
+from spinscope.pipeline.stages.spin import METHODS, SpinParameters, SpinResult
+from spinscope.pipeline.stages.triplet_spin import TripletSpin
 from tests.spinning_ball import (
     CAMERA,
     SETTING,

@@ -12,12 +12,12 @@ import h5py
 import numpy as np
 import pytest
 
-from pipeline.events import EventBatch
-from pipeline.methods import best_of
-from pipeline.results import SpinEstimate
-from pipeline.stages import filter as filter_stage
-from pipeline.stages.spin import SpinParameters, SpinResult
-from pipeline.stages.track import TrackResult
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.methods import best_of
+from spinscope.pipeline.results import SpinEstimate
+from spinscope.pipeline.stages import filter as filter_stage
+from spinscope.pipeline.stages.spin import SpinParameters, SpinResult
+from spinscope.pipeline.stages.track import TrackResult
 from tests.spinning_ball import SETTING, after_track, errors, no_track, packets
 
 LATENCY_US = 65.0

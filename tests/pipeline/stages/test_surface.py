@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.camera import Camera, CameraParameters, Setting
-from pipeline.errors import ParameterError
-from pipeline.events import EventBatch
-from pipeline.results import Packet
-from pipeline.stages import filter as filter_stage
-from pipeline.stages import surface as stage
-from pipeline.stages.filter import FilterParameters, FilterResult
-from pipeline.stages.surface import SurfaceParameters, SurfaceResult
+from spinscope.pipeline.camera import Camera, CameraParameters, Setting
+from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.results import Packet
+from spinscope.pipeline.stages import filter as filter_stage
+from spinscope.pipeline.stages import surface as stage
+from spinscope.pipeline.stages.filter import FilterParameters, FilterResult
+from spinscope.pipeline.stages.surface import SurfaceParameters, SurfaceResult
 from tests.naive_surface import NaiveEros, cleaned, recent_events
 
 WIDTH, HEIGHT, TICK_US = 45, 31, 1000  # neither is a multiple of a word

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.errors import ParameterError
-from pipeline.events import EventBatch
-from pipeline.stages import track
-from pipeline.stages.track import TrackParameters
-from pipeline.stages.track_calibration import calibrate_latency
+from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.stages import track
+from spinscope.pipeline.stages.track import TrackParameters
+from spinscope.pipeline.stages.track_calibration import calibrate_latency
 from tests.track_runs import (
     HEIGHT,
     WIDTH,

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pipeline.recordings.opening import open_recording
-from pipeline.stages.surface import SurfaceResult
-from pipeline.stages.track_hough import candidates, find_circle, hough_near
+from spinscope.pipeline.recordings.opening import open_recording
+from spinscope.pipeline.stages.surface import SurfaceResult
+from spinscope.pipeline.stages.track_hough import candidates, find_circle, hough_near
 from tests.track_runs import inputs, run, sample, setting, true_ball
 
 FRAMES = "tt_ball_frames_64x64_1ms.npz"

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import uvicorn
 
-from app.session import Choices
-from pipeline.errors import ParameterError
+from spinscope.app.session import Choices
+from spinscope.pipeline.errors import ParameterError
 
 from .bench import Bench
 from .web import application

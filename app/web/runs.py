@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from app.session import Session
-from app.viewer.run import Run
-from pipeline.chain import Parameters, Tick
-from pipeline.shots import Shot, ShotLog
+from spinscope.app.session import Session
+from spinscope.app.viewer.run import Run
+from spinscope.pipeline.chain import Parameters, Tick
+from spinscope.pipeline.shots import Shot, ShotLog
 
 from .bench import Clip
 

@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.session import Choices
-from app.tuner.bench import LATE, Bench
-from app.tuner.jobs import Job, fault
-from app.tuner.measures import _jitter_px, coach_sentence, measures
-from app.tuner.outbox import Outbox
-from app.tuner.page import Page, Wanted
-from app.tuner.runs import Finished, finish
-from app.viewer.tuning import Drawings, compared, layout_bytes, rrd_bytes, tab_names
-from app.words import kind_of_spin
-from pipeline.errors import ParameterError
-from pipeline.results import Circle, SpinEstimate
+from spinscope.app.session import Choices
+from spinscope.app.viewer.tuning import Drawings, compared, layout_bytes, rrd_bytes, tab_names
+from spinscope.app.web.bench import LATE, Bench
+from spinscope.app.web.jobs import Job, fault
+from spinscope.app.web.measures import _jitter_px, coach_sentence, measures
+from spinscope.app.web.outbox import Outbox
+from spinscope.app.web.page import Page, Wanted
+from spinscope.app.web.runs import Finished, finish
+from spinscope.app.words import kind_of_spin
+from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.results import Circle, SpinEstimate
 
 from .conftest import Client
 
@@ -94,8 +94,8 @@ def test_drawings_keep_to_their_budget(finished: Finished, bench: Bench) -> None
 
 
 def test_drawings_are_sorted_out_while_wishes_never_cease(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.tuner.page.IDLE_S", 60.0)
-    monkeypatch.setattr("app.tuner.page.UNTIDIED_MOST", 2)
+    monkeypatch.setattr("spinscope.app.web.page.IDLE_S", 60.0)
+    monkeypatch.setattr("spinscope.app.web.page.UNTIDIED_MOST", 2)
     drawings, sorted_out = Drawings(), list[int]()
     monkeypatch.setattr(drawings, "keep_budget", lambda: sorted_out.append(1))
     page = Page(bench, drawings)
@@ -218,7 +218,7 @@ def told(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
 def test_what_is_seen_at_the_playhead_comes_first_when_the_rest_takes_long(
     client: Client, monkeypatch: pytest.MonkeyPatch, told: list[dict[str, Any]]
 ) -> None:
-    monkeypatch.setattr("app.tuner.page.REST_WORTH_WAITING_S", 0.0)
+    monkeypatch.setattr("spinscope.app.web.page.REST_WORTH_WAITING_S", 0.0)
     start_us, end_us = client.opening["recording"]["clip_us"]
     middle_us = (start_us + end_us) / 2
     done = client.run({"surface": {"k_px": 13}}, playhead_us=middle_us)
@@ -266,7 +266,7 @@ def test_a_drawing_that_fails_is_tried_again(finished: Finished, bench: Bench, m
     drawings, keys = Drawings(), bench.clip(*bench.first_clip_us()).keys(bench.session.parameters)
     try:
         with monkeypatch.context() as patch:
-            patch.setattr("app.viewer.tuning.DRAWERS", ((broken, "filter"),))
+            patch.setattr("spinscope.app.viewer.tuning.DRAWERS", ((broken, "filter"),))
             with pytest.raises(ValueError, match="no paint"):
                 drawings.chunks(finished.run, keys)
         assert drawings.chunks(finished.run, keys)
@@ -286,7 +286,7 @@ def test_the_coach_is_told_in_one_sentence() -> None:
 
 
 def test_the_background_makes_way_while_somebody_waits(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.tuner.bench.MAKE_WAY_S", 60.0)
+    monkeypatch.setattr("spinscope.app.web.bench.MAKE_WAY_S", 60.0)
     done = threading.Event()
 
     def background() -> None:

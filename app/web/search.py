@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from pipeline.chain import Parameters
-from pipeline.errors import ParameterError
-from pipeline.parameters import Tunable
+from spinscope.pipeline.chain import Parameters
+from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.parameters import Tunable
 
 from .bench import Clip
 from .controls import scale_of
@@ -70,7 +70,7 @@ def search(
 
 
 def cost_of(found: dict[str, Any], objective: str) -> float:
-    """What is to be made small: see `app.tuner.measures` for what was found.
+    """What is to be made small: see `app.web.measures` for what was found.
 
     truth : |spin - truth| / |truth| of the trusted method
     stated : relative 1 sigma of the spin vector that the trusted method states, and 0.1 / px of the circle's residual

@@ -7,15 +7,15 @@ from typing import Any
 
 import pytest
 
-from app.session import Choices
-from app.simulate import simulate_to_file
-from app.tuner.biases import known_biases
-from app.tuner.controls import scale_of, sections
-from app.tuner.curve import values_over
-from app.tuner.search import REFUSED, cost_of
-from pipeline.biases import BiasParameters
-from pipeline.chain import Parameters
-from pipeline.errors import ParameterError
+from spinscope.app.session import Choices
+from spinscope.app.simulate import simulate_to_file
+from spinscope.app.web.biases import known_biases
+from spinscope.app.web.controls import scale_of, sections
+from spinscope.app.web.curve import values_over
+from spinscope.app.web.search import REFUSED, cost_of
+from spinscope.pipeline.biases import BiasParameters
+from spinscope.pipeline.chain import Parameters
+from spinscope.pipeline.errors import ParameterError
 
 from .conftest import Client, served
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.chain import Parameters
-from pipeline.errors import ParameterError
-from pipeline.parameters import Tunable
+from spinscope.pipeline.chain import Parameters
+from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.parameters import Tunable
 
 from .bench import Clip
 from .controls import scale_of

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.simulate import BIASES, DESCRIPTION, simulate_again_to_file
-from pipeline.biases import CURVES, BiasParameters, read_biases, write_biases
-from pipeline.chain import Parameters
-from pipeline.errors import ParameterError, RecordingError, SpinscopeError
-from pipeline.events import EventBatch
-from pipeline.recordings import Recording, open_recording
-from pipeline.simulator import simulate_again
+from spinscope.app.simulate import BIASES, DESCRIPTION, simulate_again_to_file
+from spinscope.pipeline.biases import CURVES, BiasParameters, read_biases, write_biases
+from spinscope.pipeline.chain import Parameters
+from spinscope.pipeline.errors import ParameterError, RecordingError, SpinscopeError
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.recordings import Recording, open_recording
+from spinscope.pipeline.simulator import simulate_again
 
 from .bench import LATE, SUFFIXES, Bench, Clip
 from .jobs import Job

@@ -16,9 +16,9 @@ from fastapi.staticfiles import StaticFiles
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException as StarletteHTTPException
 
-from app.viewer.tuning import layout_bytes, tab_names
-from pipeline.chain import STAGES
-from pipeline.errors import SpinscopeError
+from spinscope.app.viewer.tuning import layout_bytes, tab_names
+from spinscope.pipeline.chain import STAGES
+from spinscope.pipeline.errors import SpinscopeError
 
 from . import presets
 from .assets import STATIC, viewer_script, viewer_version, viewer_wasm

@@ -7,7 +7,7 @@ import traceback
 from collections.abc import Callable
 from typing import Any
 
-from pipeline.errors import SpinscopeError
+from spinscope.pipeline.errors import SpinscopeError
 
 from .outbox import Outbox
 
@@ -60,5 +60,7 @@ def fault(error: Exception) -> str:
     if isinstance(error, SpinscopeError):
         return str(error)
     places = [str(frame.f_globals.get("__name__")) for frame, _ in traceback.walk_tb(error.__traceback__)]
-    stage = next((place.rsplit(".", 1)[1] for place in places if place.startswith("pipeline.stages.")), "the tuner")
+    stage = next(
+        (place.rsplit(".", 1)[1] for place in places if place.startswith("spinscope.pipeline.stages.")), "the tuner"
+    )
     return f"{stage} failed: {type(error).__name__}: {' '.join(str(error).split())[:300]}"

@@ -14,11 +14,11 @@ import pytest
 from click.testing import CliRunner
 from rerun.chunk import RrdReader
 
-from app.cli import cli
-from app.session import Choices
-from app.tuner.bench import Bench
-from pipeline.chain import STAGES, Parameters
-from pipeline.stages import logo
+from spinscope.app.cli import cli
+from spinscope.app.session import Choices
+from spinscope.app.web.bench import Bench
+from spinscope.pipeline.chain import STAGES, Parameters
+from spinscope.pipeline.stages import logo
 
 from .conftest import Client, Served
 
@@ -70,7 +70,7 @@ def test_a_change_runs_its_stage_and_those_below_and_going_back_runs_nothing(
 
 
 def test_frames_that_would_not_fit_are_refused(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.tuner.bench.MOST_FRAMES_BYTES", 30 * 1280 * 720)
+    monkeypatch.setattr("spinscope.app.web.bench.MOST_FRAMES_BYTES", 30 * 1280 * 720)
     answer = client.http.post(client.path("run"), json=client.wish({"track": {"tick_us": 1000}}))
     assert answer.status_code == 400 and "frames of this clip" in answer.json()["error"]
 
@@ -190,7 +190,7 @@ def test_the_page_fetches_nothing_from_elsewhere(tuner: Served) -> None:
     assert index.status_code == 200
     policy = index.headers["content-security-policy"]
     assert "default-src 'self'" in policy and "http" not in policy
-    static = Path(__file__).parents[3] / "app/tuner/static"
+    static = Path(__file__).parents[3] / "app/web/static"
     for path in static.iterdir():
         text = path.read_text(encoding="utf-8").replace("http://www.w3.org/", "")
         assert "http://" not in text and "https://" not in text, path
@@ -283,7 +283,7 @@ def test_a_fixed_ball_is_found_and_its_picture_shown(tuner: Served) -> None:
 
 
 def test_a_long_recording_is_worked_on_clip_by_clip(flight: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.tuner.bench.CLIP_FRAMES_BYTES", 10 * 1280 * 720)
+    monkeypatch.setattr("spinscope.app.web.bench.CLIP_FRAMES_BYTES", 10 * 1280 * 720)
     bench = Bench.open(flight, Choices())
     assert bench.is_long
     start_us, end_us = bench.first_clip_us()

@@ -6,7 +6,7 @@ import importlib.util
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from pipeline.errors import SpinscopeError
+from spinscope.pipeline.errors import SpinscopeError
 
 STATIC = Path(__file__).parent / "static"
 CLASS = "\nvar WebViewer = class {"

@@ -7,9 +7,9 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from app.session import PRESETS
-from pipeline.chain import Parameters
-from pipeline.errors import ParameterError
+from spinscope.app.session import PRESETS
+from spinscope.pipeline.chain import Parameters
+from spinscope.pipeline.errors import ParameterError
 
 from .controls import setup_of
 

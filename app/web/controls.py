@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from pipeline.chain import STAGES, Parameters
-from pipeline.parameters import Tunable
+from spinscope.pipeline.chain import STAGES, Parameters
+from spinscope.pipeline.parameters import Tunable
 
 # How a group of parameters is called where its own name says too little.
 TITLES = {

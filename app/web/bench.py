@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.session import Choices, Session
-from pipeline.chain import STAGES, Chain, EventSource, Parameters, Source, Tick
-from pipeline.errors import ParameterError
-from pipeline.results import Packet, Truth
+from spinscope.app.session import Choices, Session
+from spinscope.pipeline.chain import STAGES, Chain, EventSource, Parameters, Source, Tick
+from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.results import Packet, Truth
 
 SUFFIXES = (".h5", ".hdf5", ".raw", ".dat", ".npz")  # of recordings that are read
 # Takes longest, and no other stage reads it: computed last, or not at all where nobody asks for spins.

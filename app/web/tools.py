@@ -11,10 +11,10 @@ from typing import Any
 from fastapi import FastAPI, HTTPException, Response
 from starlette.concurrency import run_in_threadpool
 
-from pipeline.biases import BiasParameters, read_biases, write_biases
-from pipeline.chain import Parameters
-from pipeline.errors import ParameterError, SpinscopeError
-from pipeline.stages.fixed_ball import find_fixed_ball
+from spinscope.pipeline.biases import BiasParameters, read_biases, write_biases
+from spinscope.pipeline.chain import Parameters
+from spinscope.pipeline.errors import ParameterError, SpinscopeError
+from spinscope.pipeline.stages.fixed_ball import find_fixed_ball
 
 from . import biases, curve, exports, search
 from .bench import Bench, Clip

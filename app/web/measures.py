@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.session import Session
-from app.words import Kind, kind_of_spin, km_h, rpm
-from pipeline.chain import Tick
-from pipeline.results import SpinEstimate
-from pipeline.shots import Shot
+from spinscope.app.session import Session
+from spinscope.app.words import Kind, kind_of_spin, km_h, rpm
+from spinscope.pipeline.chain import Tick
+from spinscope.pipeline.results import SpinEstimate
+from spinscope.pipeline.shots import Shot
 
 Floats = NDArray[np.float64]
 

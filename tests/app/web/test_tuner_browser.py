@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 import pytest
 
-from app.simulate import simulate_to_file
-from pipeline.chain import STAGES
+from spinscope.app.simulate import simulate_to_file
+from spinscope.pipeline.chain import STAGES
 
 from .conftest import Served, served
 

@@ -12,15 +12,17 @@ import httpx
 import pytest
 from click.testing import CliRunner
 
-from app.cli import cli
-from app.session import DEFAULT_SAMPLE, Choices
+from spinscope.app.cli import cli
+from spinscope.app.session import DEFAULT_SAMPLE, Choices
 
 
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
     """What the command line asks the tuner to serve, instead of serving it."""
     found: list[tuple[Any, ...]] = []
-    monkeypatch.setattr("app.tuner.serve", lambda *given, **named: found.append((*given, named["open_browser"])))
+    monkeypatch.setattr(
+        "spinscope.app.web.serve", lambda *given, **named: found.append((*given, named["open_browser"]))
+    )
     return found
 
 

@@ -11,8 +11,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
-from app.viewer.tuning import Drawings, compared, note_with_a, note_without_a, rrd_bytes
-from pipeline.chain import STAGES, Parameters, Tick
+from spinscope.app.viewer.tuning import Drawings, compared, note_with_a, note_without_a, rrd_bytes
+from spinscope.pipeline.chain import STAGES, Parameters, Tick
 
 from .bench import LATE, Bench, Clip
 from .jobs import Job, fault

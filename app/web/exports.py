@@ -12,9 +12,9 @@ from typing import Any
 import cv2
 import numpy as np
 
-from app.analyze import report
-from app.viewer import save
-from pipeline.events import EventBatch
+from spinscope.app.analyze import report
+from spinscope.app.viewer import save
+from spinscope.pipeline.events import EventBatch
 
 from .runs import Finished
 

@@ -1,5 +1,0 @@
-"""`python -m app` is `spinscope`."""
-
-from .cli import main
-
-main()
