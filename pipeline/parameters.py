@@ -7,13 +7,13 @@ A stage's parameters are one frozen, keyword-only dataclass whose fields are mad
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from .errors import ParameterError
+from .extensions import did_you_mean
 
 Group = TypeVar("Group", bound="ParameterGroup")
 
@@ -146,7 +146,7 @@ class ParameterGroup:
         known = self.tunables()
         for name in values:
             if name not in known:
-                raise ParameterError(f"{self.group_name()}.{name} is unknown{_did_you_mean(name, known)}")
+                raise ParameterError(f"{self.group_name()}.{name} is unknown{did_you_mean(name, known)}")
         return dataclasses.replace(self, **values)
 
     def as_dict(self) -> dict[str, Any]:
@@ -163,7 +163,7 @@ class ParameterSet:
     def group(self, name: str) -> ParameterGroup:
         """One group by name; raises ParameterError when there is none."""
         if name not in self.__dataclass_fields__:
-            raise ParameterError(f"there is no stage {name!r}{_did_you_mean(name, self.__dataclass_fields__)}")
+            raise ParameterError(f"there is no stage {name!r}{did_you_mean(name, self.__dataclass_fields__)}")
         group: ParameterGroup = getattr(self, name)
         return group
 
@@ -213,10 +213,3 @@ def _parsed(text: str) -> Any:
             return float(text)
         except ValueError:
             return text
-
-
-def _did_you_mean(name: str, known: Sequence[str] | Mapping[str, Any]) -> str:
-    close = difflib.get_close_matches(name, list(known), n=1)
-    if close:
-        return f": did you mean {close[0]}?"
-    return f"; there are {', '.join(known)}"
