@@ -12,9 +12,9 @@ from typing import Any
 import click
 
 from spinscope.pipeline.errors import ParameterError, SpinscopeError
-from spinscope.pipeline.methods import METHODS
+from spinscope.pipeline.registry import methods
+from spinscope.pipeline.session import DEFAULT_SAMPLE, Choices, Session
 
-from .session import DEFAULT_SAMPLE, Choices, Session
 from .simulate import KINDS, SimulateParameters
 from .terminal import ProgressBar, announce_compilation, note, print_reports
 
@@ -162,7 +162,7 @@ def info(recording: Path, sensor: tuple[int, int] | None, output: str | None) ->
 )
 @click.option(
     "--method",
-    type=click.Choice((*METHODS, "all")),
+    type=click.Choice((*(method.name for method in methods()), "all")),
     default="all",
     show_default=True,
     help="Which estimates of the spin to report; only what they need is run.",
@@ -364,15 +364,15 @@ def _view(recording: Path, save: Path | None, native: bool, layout: str, choices
     with ProgressBar() as bar:
         session = Session.open(recording, choices, bar)
         session = session.clip_for_viewing(bar)
-        ticks, log = session.all_ticks(bar)
+        result = session.estimate_keeping_ticks(bar)
         for warning in session.warnings:
             note(f"warning: {warning}")
         if save:
-            viewer.save(session, ticks, log.shots, save, layout=layout, no_shot_reason=log.no_shot_reason)
+            viewer.save(result, save, layout=layout)
     if save:
         note(f"saved {save} ({save.stat().st_size / 1e6:.1f} MB): `uv run rerun {save}` opens it")
     else:
-        viewer.show(session, ticks, log.shots, layout=layout, native=native, no_shot_reason=log.no_shot_reason)
+        viewer.show(result, layout=layout, native=native)
 
 
 def _join_fixed_ball(arguments: list[str]) -> list[str]:

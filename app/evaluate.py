@@ -20,11 +20,11 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table as ScreenTable
 
-from spinscope.pipeline.chain import Parameters
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.evaluation import SUITES, Bench, Report, Row, evaluate, executor
 from spinscope.pipeline.evaluation.figures import draw
 from spinscope.pipeline.evaluation.work import write_whole
+from spinscope.pipeline.registry import Parameters
 
 Progress = Callable[[float, str], None]
 WIDE = ("picture",)  # columns that no table of text should hold

@@ -8,8 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from spinscope.pipeline.recordings import RecordingInfo, open_recording, summary
-
-from .session import Progress
+from spinscope.pipeline.session import Progress
 
 SHOWN = 60  # characters of an attribute; a simulation's scene is a page long
 

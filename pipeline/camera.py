@@ -147,12 +147,3 @@ def _set_in_space(rays: Floats, sizes: Floats, ball_radius_m: float) -> None:
             u -= ((u + wide) * u * u - g4 * (1 + u)) / ((3 * u + 2 * wide) * u - g4)
         z_m = ball_radius_m * math.sqrt((1 + u) / u)
         rays[i, 0], rays[i, 1], rays[i, 2] = x / (1 + u) * z_m, y / (1 + u) * z_m, z_m
-
-
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """What stands around the pipeline and does not change within a recording: camera, ball, highest spin asked for."""
-
-    camera: Camera
-    ball_radius_m: float
-    max_spin_rps: float

@@ -1,93 +1,122 @@
 """The chain of stages over packets: one mechanism for batch, live and tuning.
 
 recording | camera | simulator -> packets of one tick
-    -> filter -> surface -> track -> logo -> rate -> flow -> spin -> contrast
+    -> per recording: filter -> surface -> track
+    -> per ball in flight: logo -> rate -> flow -> triplet, normal_flow -> contrast
 
 A column is one stage's results so far plus the state to go on. Its key is the source's identity and the chain of
 (stage, parameter values) up to it, compared by value: a changed parameter re-runs its stage and those that read
-it, nothing else, and going back to earlier values finds their columns still there.
+it, nothing else, and going back to earlier values finds their columns still there. Stages of one ball have a column
+for each shot.
 """
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Collection, Hashable, Iterator
+from collections.abc import Callable, Collection, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from types import ModuleType
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
-from .camera import BallParameters, Camera, CameraParameters, Setting
+from .camera import Camera
 from .errors import ParameterError
 from .events import EventBatch
-from .methods import best_of
-from .parameters import ParameterSet
-from .results import Packet, SpinEstimate, nbytes
-from .stages import contrast, filter, flow, logo, rate, spin, surface, track
+from .registry import STAGES, Parameters, methods, needed_stages, trusted_method
+from .results import MethodResult, Packet, SpinEstimate, nbytes
+from .stage import Context, Stage
 
-STAGES: dict[str, ModuleType] = {
-    "filter": filter,
-    "surface": surface,
-    "track": track,
-    "logo": logo,
-    "rate": rate,
-    "flow": flow,
-    "spin": spin,
-    "contrast": contrast,
-}
+if TYPE_CHECKING:
+    from .spin.contrast.stage import ContrastResult
+    from .stages.filter import FilterResult
+    from .stages.flow import FlowResult
+    from .stages.logo import LogoResult
+    from .stages.rate import RateResult
+    from .stages.surface import SurfaceResult
+    from .stages.track import BallTrack, TrackResult
+
 CACHE_BYTES = 2 << 30
-COLUMNS_MOST = 10_000
-TICKS_MAX = 4_000_000  # 5.5 hours at 200 Hz; more is a damaged clock, not a recording
+MAX_COLUMNS = 10_000
+MAX_TICKS = 4_000_000  # 5.5 hours at 200 Hz; more is a damaged clock, not a recording
 
 
-@dataclass(frozen=True, kw_only=True)
-class Parameters(ParameterSet):
-    """Everything that can be set, by stage; the defaults are ours."""
+@dataclass(frozen=True, eq=False)
+class BallTick:
+    """Results of one ball in one tick: its track, and by name those of the stages of one ball."""
 
-    camera: CameraParameters = CameraParameters()
-    ball: BallParameters = BallParameters()
-    filter: filter.FilterParameters = filter.FilterParameters()
-    surface: surface.SurfaceParameters = surface.SurfaceParameters()
-    track: track.TrackParameters = track.TrackParameters()
-    logo: logo.LogoParameters = logo.LogoParameters()
-    rate: rate.RateParameters = rate.RateParameters()
-    flow: flow.FlowParameters = flow.FlowParameters()
-    spin: spin.SpinParameters = spin.SpinParameters()
-    contrast: contrast.ContrastParameters = contrast.ContrastParameters()
+    track: BallTrack
+    results: Mapping[str, Any]
+
+    @cached_property
+    def estimates(self) -> dict[str, SpinEstimate]:
+        """Spin estimates from the present shot so far, by method, of the methods that were run."""
+        return {method.name: self.results[method.name].estimate for method in methods() if method.name in self.results}
+
+    @cached_property
+    def best(self) -> str | None:
+        """Method whose estimate is trusted, None where none is."""
+        return trusted_method(self.estimates)
 
 
 @dataclass(frozen=True, eq=False)
 class Tick:
-    """All stages' results of one tick; contrast is None where the run was told to leave it out."""
+    """Results of one tick: attributes by stage name, of the stages that were run.
+
+    Results of one ball are those of the ball that the detail views follow, the first one; without a ball they say why.
+
+    Attributes
+    ----------
+    packet : Packet
+        The tick's events.
+    results : Mapping[str, Any]
+        By name: the stages of the recording, and those of one ball for the followed ball, or for no ball.
+    balls : tuple of BallTick
+        Every ball in flight.
+    """
 
     packet: Packet
-    filter: filter.FilterResult
-    surface: surface.SurfaceResult
-    track: track.TrackResult
-    logo: logo.LogoResult
-    rate: rate.RateResult
-    flow: flow.FlowResult
-    spin: spin.SpinResult
-    contrast: contrast.ContrastResult | None
+    results: Mapping[str, Any]
+    balls: tuple[BallTick, ...]
+
+    if TYPE_CHECKING:  # results of the stages that ship; no fields, and not the only ones
+        filter: ClassVar[FilterResult]
+        surface: ClassVar[SurfaceResult]
+        track: ClassVar[TrackResult]
+        logo: ClassVar[LogoResult]
+        rate: ClassVar[RateResult]
+        flow: ClassVar[FlowResult]
+        triplet: ClassVar[MethodResult]
+        normal_flow: ClassVar[MethodResult]
+        contrast: ClassVar[ContrastResult]
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        try:
+            return self.results[name]
+        except KeyError:
+            raise AttributeError(f"{name} is not among the targets of this run: {', '.join(self.results)}") from None
+
+    def get(self, name: str) -> Any:
+        """Result of a stage, None where it was not run."""
+        return self.results.get(name)
 
     @cached_property
     def estimates(self) -> dict[str, SpinEstimate]:
-        """Every method's estimate from the present shot so far, by name."""
-        own = {} if self.contrast is None else {contrast.METHOD: self.contrast.estimate}
-        return {**self.spin.estimates, **own}
+        """Spin estimates of the followed ball from the present shot so far, by method, of the methods that were run."""
+        return {method.name: self.results[method.name].estimate for method in methods() if method.name in self.results}
 
     @cached_property
     def best(self) -> str | None:
-        """The method whose answer is trusted, None where none is."""
-        return best_of(self.estimates)
+        """Method whose estimate is trusted, None where none is."""
+        return trusted_method(self.estimates)
 
 
-class Source(Protocol):
-    """Where events come from: a recording, a camera or a simulation."""
+class EventSource(Protocol):
+    """Origin of events: a recording, a camera or a simulation."""
 
     @property
     def identity(self) -> Hashable:
-        """What tells this source from any other, by content."""
+        """Identity of the source by content: no other has an equal one."""
 
     @property
     def width_px(self) -> int:
@@ -114,8 +143,8 @@ class Source(Protocol):
 
 
 @dataclass(frozen=True)
-class EventSource:
-    """Events in memory."""
+class EventsInMemory:
+    """Source whose events are all in memory."""
 
     identity: Hashable
     events: EventBatch
@@ -132,14 +161,23 @@ class EventSource:
 
 @dataclass(slots=True, eq=False)
 class _Column:
-    """One stage's results from the first tick on; `results` lacks what a run was told to forget.
+    """One stage's results, of the whole recording or of one shot, from tick number `first` on.
 
-    making : held while the next result is made: another thread that wants it waits for it
-    is_kept : whether all results so far are there
-    fault : what a step raised; the state may be half way into its tick, so that no other run may go on from it
+    Attributes
+    ----------
+    results : list
+        Results in order; lacks what a run was told to forget.
+    making : Lock
+        Held while the next result is made: another thread that wants it waits for it.
+    is_kept : bool
+        Whether all results so far are there.
+    fault : BaseException, optional
+        Raised by a step; the state may be half way into its tick, so that no other run may go on from it.
     """
 
+    key: Hashable
     state: Any
+    first: int
     making: threading.Lock = field(default_factory=threading.Lock)
     results: list[Any] = field(default_factory=list)
     is_kept: bool = True
@@ -149,105 +187,134 @@ class _Column:
 
 
 class Chain:
-    """Runs the stages over one source and keeps every stage's column.
+    """Runs the stages over one source and keeps every stage's columns.
 
     Several threads may run it at once: each stage's next result is made by whichever wants it first. Runs that forget
     have their chain to themselves.
 
-    budget_bytes, most_columns : the columns that were not used for longest are dropped when all together hold more
-        bytes than this, or are more
-    clock : reads seconds; when given, `seconds` adds up what each stage took
+    Parameters
+    ----------
+    source : EventSource
+        The events.
+    budget_bytes, max_columns : int
+        The columns that were not used for longest are dropped when all together hold more bytes than this, or are
+        more.
+    clock : callable, optional
+        Reads seconds; when given, `seconds` adds up what each stage took.
     """
 
     def __init__(
         self,
-        source: Source,
+        source: EventSource,
         *,
         budget_bytes: int = CACHE_BYTES,
-        most_columns: int = COLUMNS_MOST,
+        max_columns: int = MAX_COLUMNS,
         clock: Callable[[], float] | None = None,
     ) -> None:
         self.source = source
-        self.seconds = dict.fromkeys(STAGES, 0.0)
-        self._budget_bytes, self._most_columns = budget_bytes, most_columns
+        self.seconds = dict.fromkeys(STAGES.names, 0.0)
+        self._budget_bytes, self._max_columns = budget_bytes, max_columns
         self._clock = clock
         self._columns: dict[Hashable, _Column] = {}
         self._uses = 0
         self._lock = threading.Lock()  # for the columns as a whole
 
     def tick_count(self, parameters: Parameters) -> int:
-        """How many ticks the source holds so far, the last one perhaps cut short by the source's end."""
+        """Number of ticks that the source holds so far, the last one perhaps cut short by the source's end."""
         tick_us = parameters.track.tick_us
         first, last = self.source.start_us // tick_us, self.source.end_us // tick_us
         if not self.source.growing and self.source.end_us % tick_us:
             last += 1  # the last tick, cut short by the end of the recording
-        if last - first > TICKS_MAX:
+        if last - first > MAX_TICKS:
             raise ParameterError(
                 f"the events span {(self.source.end_us - self.source.start_us) / 1e6:.0f} s, that is "
                 f"{last - first} ticks of {tick_us} us: choose a part with --window START_US END_US"
             )
         return max(0, last - first)
 
-    def setting(self, parameters: Parameters) -> Setting:
-        """The camera, the ball and the highest spin that these parameters mean on this sensor."""
-        return Setting(
-            Camera.of(parameters.camera, self.source.width_px, self.source.height_px),
+    def camera(self, parameters: Parameters) -> Camera:
+        """The camera of these parameters on the source's sensor."""
+        return Camera.of(parameters.camera, self.source.width_px, self.source.height_px)
+
+    def context(self, parameters: Parameters, stage: Stage) -> Context:
+        """What a stage is started with: camera, ball, and the parameters of other groups that it declares."""
+        return Context(
+            self.camera(parameters),
             parameters.ball.diameter_mm / 2000.0,
-            parameters.spin.max_spin_rps,
+            {name: parameters.value(name) for name in stage.reads},
         )
+
+    def start(self, parameters: Parameters, stage: Stage) -> Any:
+        """Fresh state of a stage; raises ParameterError where values do not go together."""
+        return stage.start(parameters.group(stage.group), self.context(parameters, stage))
+
+    def check(self, parameters: Parameters) -> None:
+        """Raise ParameterError where values do not go together."""
+        for stage in STAGES:
+            self.start(parameters, stage)
 
     def run(
         self,
         parameters: Parameters,
+        targets: Collection[str] | None = None,
         *,
         ticks: int | None = None,
         forget: Collection[str] = (),
-        without: Collection[str] = (),
         together: int = 1,
         seconds: dict[str, float] | None = None,
     ) -> Iterator[Tick]:
-        """Yield the first `ticks` ticks (all there are so far by default), computing only what is not yet known.
+        """Yield tick by tick, computing only what is wanted and not yet known.
 
-        Stop iterating to abandon the run: everything computed so far stays. Results of stages named in `forget`
-        are not kept beyond their tick (full frames of a long recording would not fit). Stages named in `without`,
-        which no other stage may read, are not run: their results are None, and what was known of them stays.
+        Stop iterating to abandon the run: everything computed so far stays.
 
-        together : how many ticks a stage works through before the next stage has them. One by one each tick comes as
-            soon as it can; several at a time every stage finds its code and memory in the processor's caches.
-        seconds : where to add up what each stage takes in this run, if not in the chain's own
+        Parameters
+        ----------
+        parameters : Parameters
+            Values of all stages.
+        targets : collection of str, optional
+            Names of the stages whose results are wanted; what they need runs, nothing else. All by default.
+        ticks : int, optional
+            Number of ticks; all there are so far by default.
+        forget : collection of str
+            Stages whose results are not kept beyond their tick (full frames of a long recording would not fit).
+        together : int
+            Ticks that a stage works through before the next stage has them. One by one each tick comes as soon as it
+            can; several at a time every stage finds its code and memory in the processor's caches.
+        seconds : dict, optional
+            Where to add up what each stage takes in this run, if not in the chain's own.
+
+        Yields
+        ------
+        Tick
+
+        Raises
+        ------
+        ParameterError
+            For an unknown target, or values that do not go together.
         """
-        setting = self.setting(parameters)
+        stages = needed_stages(STAGES.names if targets is None else targets)
         keys = self.keys(parameters)
-        columns = {name: self._column(keys[name], name, parameters, setting) for name in STAGES if name not in without}
+        run = _Run(self, parameters, keys, set(forget), self.seconds if seconds is None else seconds)
+        of_recording = [(stage, run.column(stage)) for stage in stages if stage.scope == "recording"]
+        of_ball = [stage for stage in stages if stage.scope == "ball"]
         count = self.tick_count(parameters)
         count = count if ticks is None else min(ticks, count)
         for first in range(0, count, together):
-            rows: list[dict[str, Any]] = [
-                {"packet": self._packet(parameters.track.tick_us, index), **dict.fromkeys(without)}
+            rows = [
+                {"packet": self._packet(parameters.track.tick_us, index)}
                 for index in range(first, min(first + together, count))
             ]
-            for name, column in columns.items():
+            for stage, column in of_recording:
                 for index, results in enumerate(rows, first):
-                    with column.making:
-                        if index < len(column.results):
-                            results[name] = column.results[index]
-                            continue
-                        if column.fault is not None:
-                            raise column.fault
-                        try:
-                            results[name] = self._step(name, parameters, column, results, seconds)
-                        except BaseException as error:
-                            column.fault = error
-                            with self._lock:
-                                self._columns.pop(keys[name], None)
-                            raise
-                        if name in forget:
-                            column.is_kept = False
-                        else:
-                            column.bytes += nbytes(results[name])
-                            column.results.append(results[name])
-            yield from (Tick(**results) for results in rows)
-            self._keep_budget(set(keys.values()))
+                    results[stage.name] = run.result(stage, column, index, results)
+            balls = [run.balls_of(index, results) for index, results in enumerate(rows, first)]
+            for stage in of_ball:
+                for index, flying in enumerate(balls, first):
+                    for shot, results in flying.items():
+                        results[stage.name] = run.result(stage, run.column(stage, shot, index), index, results)
+            for results, flying in zip(rows, balls, strict=True):
+                yield run.tick(of_ball, results, list(flying.values()))
+            self._keep_budget(run.columns_in_use)
 
     def _packet(self, tick_us: int, index: int) -> Packet:
         number = self.source.start_us // tick_us + index
@@ -262,48 +329,118 @@ class Chain:
         keys: dict[str, Hashable] = {
             "packet": (self.source.identity, parameters.track.tick_us, parameters.camera, parameters.ball)
         }
-        for name, stage in STAGES.items():
-            also = tuple(getattr(parameters.group(group), item) for group, item in getattr(stage, "ALSO", ()))
-            keys[name] = (name, parameters.group(name), also, tuple(keys[other] for other in stage.INPUTS))
+        for stage in STAGES:
+            read = tuple(parameters.value(name) for name in stage.reads)
+            inputs = tuple(keys["track" if name == "ball" else name] for name in stage.inputs)
+            keys[stage.name] = (stage.name, parameters.group(stage.group), read, inputs)
         del keys["packet"]
         return keys
 
     def knows(self, parameters: Parameters, name: str) -> bool:
         """Whether a stage's results of every tick so far are kept."""
+        keys, count = self.keys(parameters), self.tick_count(parameters)
         with self._lock:
-            column = self._columns.get(self.keys(parameters)[name])
-        return column is not None and len(column.results) >= self.tick_count(parameters)
-
-    def _column(self, key: Hashable, name: str, parameters: Parameters, setting: Setting) -> _Column:
-        with self._lock:
-            column = self._columns.get(key)
-            if column is None or not column.is_kept:
-                column = self._columns[key] = _Column(STAGES[name].start(parameters.group(name), setting))
-            self._uses += 1
-            column.last_use = self._uses
-            return column
-
-    def _step(
-        self,
-        name: str,
-        parameters: Parameters,
-        column: _Column,
-        results: dict[str, Any],
-        seconds: dict[str, float] | None,
-    ) -> Any:
-        stage, seconds = STAGES[name], self.seconds if seconds is None else seconds
-        begin = self._clock() if self._clock else 0.0
-        result = stage.step(parameters.group(name), column.state, *(results[other] for other in stage.INPUTS))
-        if self._clock:
-            seconds[name] += self._clock() - begin
-        return result
+            column = self._columns.get((keys["track" if STAGES[name].scope == "ball" else name], None))
+            if column is None or len(column.results) < count:
+                return False
+            if STAGES[name].scope == "recording":
+                return True
+            wanted: dict[int, int] = {}  # results of each shot
+            for track in column.results[:count]:
+                for ball in track.balls:
+                    wanted[ball.shot] = wanted.get(ball.shot, 0) + 1
+            kept = {shot: self._columns.get((keys[name], shot)) for shot in wanted}
+        return all(shot is not None and len(shot.results) >= wanted[number] for number, shot in kept.items())
 
     def _keep_budget(self, in_use: set[Hashable]) -> None:
         with self._lock:
             total = sum(column.bytes for column in self._columns.values())
-            if total <= self._budget_bytes and len(self._columns) <= self._most_columns:
+            if total <= self._budget_bytes and len(self._columns) <= self._max_columns:
                 return  # comparing the keys of all columns would take longer than a quick tick
             for key in sorted(self._columns.keys() - in_use, key=lambda k: self._columns[k].last_use):
-                if total <= self._budget_bytes and len(self._columns) <= self._most_columns:
+                if total <= self._budget_bytes and len(self._columns) <= self._max_columns:
                     break
                 total -= self._columns.pop(key).bytes
+
+
+class _Run:
+    """One run of a chain: its columns, and how their next results are made."""
+
+    def __init__(
+        self,
+        chain: Chain,
+        parameters: Parameters,
+        keys: dict[str, Hashable],
+        forget: set[str],
+        seconds: dict[str, float],
+    ) -> None:
+        self._chain, self._parameters, self._keys = chain, parameters, keys
+        self._forget, self._seconds = forget, seconds
+        self._columns: dict[tuple[str, int | None], _Column] = {}
+
+    @property
+    def columns_in_use(self) -> set[Hashable]:
+        return {column.key for column in self._columns.values()}
+
+    def column(self, stage: Stage, shot: int | None = None, first: int = 0) -> _Column:
+        """The stage's column, of a shot for stages of one ball; begun at tick number `first` when there is none."""
+        column = self._columns.get((stage.name, shot))
+        if column is not None:
+            return column
+        chain, key = self._chain, (self._keys[stage.name], shot)
+        with chain._lock:
+            column = chain._columns.get(key)
+            if column is None or not column.is_kept:
+                column = chain._columns[key] = _Column(key, chain.start(self._parameters, stage), first)
+            chain._uses += 1
+            column.last_use = chain._uses
+        self._columns[stage.name, shot] = column
+        return column
+
+    def result(self, stage: Stage, column: _Column, index: int, inputs: Mapping[str, Any]) -> Any:
+        """The stage's result of tick number `index`, made from its inputs unless it is known."""
+        with column.making:
+            if index - column.first < len(column.results):
+                return column.results[index - column.first]
+            if column.fault is not None:
+                raise column.fault
+            try:
+                result = self._step(stage, column.state, inputs)
+            except BaseException as error:
+                column.fault = error
+                with self._chain._lock:
+                    self._chain._columns.pop(column.key, None)
+                raise
+            if stage.name in self._forget:
+                column.is_kept = False
+            else:
+                column.bytes += nbytes(result)
+                column.results.append(result)
+        return result
+
+    def _step(self, stage: Stage, state: Any, inputs: Mapping[str, Any]) -> Any:
+        clock = self._chain._clock
+        begin = clock() if clock else 0.0
+        group = self._parameters.group(stage.group)
+        result = stage.step(group, state, *(inputs[name] for name in stage.inputs))
+        if clock:
+            self._seconds[stage.name] = self._seconds.get(stage.name, 0.0) + clock() - begin
+        return result
+
+    def balls_of(self, index: int, results: Mapping[str, Any]) -> dict[int, dict[str, Any]]:
+        """Inputs of the stages of one ball, by shot."""
+        track = results.get("track")
+        return {ball.shot: {**results, "ball": ball} for ball in track.balls} if track is not None else {}
+
+    def tick(self, of_ball: list[Stage], results: dict[str, Any], balls: list[dict[str, Any]]) -> Tick:
+        """The tick with all results."""
+        packet = results.pop("packet")
+        names = [stage.name for stage in of_ball]
+        flying = tuple(BallTick(ball["ball"], {name: ball[name] for name in names}) for ball in balls)
+        if flying:
+            results.update(flying[0].results)
+        else:
+            for stage in of_ball:
+                assert stage.absent is not None, stage.name
+                results[stage.name] = stage.absent(self._parameters.group(stage.group), results["track"].reason)
+        return Tick(packet, results, flying)

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from .errors import ParameterError
 from .extensions import did_you_mean
@@ -124,7 +124,15 @@ def _field(declared: Tunable) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterGroup:
-    """Base of one stage's parameters; checks every field when made. Compared and hashed by value."""
+    """Base of one stage's parameters; checks every field when made. Compared and hashed by value.
+
+    Attributes
+    ----------
+    renamed : dict of str to str
+        Former names of fields and the present ones: presets and links of earlier versions are still read.
+    """
+
+    renamed: ClassVar[dict[str, str]] = {}
 
     def __post_init__(self) -> None:
         for name, declared in self.tunables().items():
@@ -141,13 +149,17 @@ class ParameterGroup:
         """Every field's declaration, in order."""
         return {field.name: field.metadata["tunable"] for field in dataclasses.fields(cls)}
 
-    def with_values(self: Group, values: Mapping[str, Any]) -> Group:
-        """A copy with some fields changed; raises ParameterError for an unknown field."""
-        known = self.tunables()
-        for name in values:
-            if name not in known:
+    def with_values(self: Group, values: Mapping[str, Any], on_rename: Callable[[str], None] | None = None) -> Group:
+        """A copy with some fields changed; see `ParameterSet.with_values`."""
+        known, changed = self.tunables(), {}
+        for name, value in values.items():
+            new_name = self.renamed.get(name, name)
+            if new_name not in known:
                 raise ParameterError(f"{self.group_name()}.{name} is unknown{did_you_mean(name, known)}")
-        return dataclasses.replace(self, **values)
+            if new_name != name and on_rename is not None:
+                on_rename(f"{self.group_name()}.{name} is now called {self.group_name()}.{new_name}")
+            changed[new_name] = value
+        return dataclasses.replace(self, **changed)
 
     def as_dict(self) -> dict[str, Any]:
         """Field names and values, ready for JSON or TOML (tuples as lists)."""
@@ -156,41 +168,100 @@ class ParameterGroup:
         }
 
 
-@dataclass(frozen=True, kw_only=True)
 class ParameterSet:
-    """Base of a whole program's parameters: one ParameterGroup a field."""
+    """Immutable base of a whole program's parameters: one ParameterGroup for each name of `group_types`.
+
+    Groups are attributes: `parameters.track.tick_us`. Compared and hashed by value.
+    """
+
+    def __init__(self, **groups: ParameterGroup) -> None:
+        for name in groups:
+            self._type_of(name)
+        self._groups = {name: groups.get(name) or made() for name, made in self.group_types().items()}
+
+    @classmethod
+    def group_types(cls) -> dict[str, type[ParameterGroup]]:
+        """Class of each group by name, in the order in which people see them."""
+        raise NotImplementedError
+
+    @classmethod
+    def _type_of(cls, name: str) -> type[ParameterGroup]:
+        types = cls.group_types()
+        if name not in types:
+            raise ParameterError(f"there is no stage {name!r}{did_you_mean(name, types)}")
+        return types[name]
 
     def group(self, name: str) -> ParameterGroup:
         """One group by name; raises ParameterError when there is none."""
-        if name not in self.__dataclass_fields__:
-            raise ParameterError(f"there is no stage {name!r}{did_you_mean(name, self.__dataclass_fields__)}")
-        group: ParameterGroup = getattr(self, name)
-        return group
+        return self._groups.get(name) or self._type_of(name)()  # a stage registered since has its defaults
 
-    def with_values(self: SetType, values: Mapping[str, Any]) -> SetType:
-        """A copy with {stage: {field: value}} changed; raises ParameterError for anything unknown."""
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_") or name not in self.group_types():
+            raise AttributeError(name)
+        return self.group(name)
+
+    def with_groups(self: SetType, **groups: ParameterGroup) -> SetType:
+        """A copy with whole groups exchanged."""
+        return type(self)(**{**self._groups, **groups})
+
+    def with_values(
+        self: SetType, values: Mapping[str, Any], on_rename: Callable[[str], None] | None = None
+    ) -> SetType:
+        """A copy with {group: {field: value}} changed.
+
+        Parameters
+        ----------
+        values : Mapping
+            Values by group and field; fields under a former name are taken, too.
+        on_rename : callable, optional
+            Told of every former name in one sentence.
+
+        Raises
+        ------
+        ParameterError
+            For an unknown name, or a value that is not allowed.
+        """
         changed = {}
         for name, fields in values.items():
             group = self.group(name)
             if not isinstance(fields, Mapping):
                 raise ParameterError(f"{name} = {fields!r} is not a table of fields: write {name}.field = value")
-            changed[name] = group.with_values(fields)
-        return dataclasses.replace(self, **changed)
+            changed[name] = group.with_values(fields, on_rename)
+        return self.with_groups(**changed)
 
-    def with_assignments(self: SetType, assignments: Sequence[str]) -> SetType:
-        """A copy with `stage.field=value` texts applied in order, as `--set` takes them."""
+    def with_assignments(
+        self: SetType, assignments: Sequence[str], on_rename: Callable[[str], None] | None = None
+    ) -> SetType:
+        """A copy with `group.field=value` texts applied in order, as `--set` takes them; see `with_values`."""
         result = self
         for text in assignments:
             target, equals, value = text.partition("=")
             stage, dot, name = target.strip().partition(".")
             if not (equals and dot and stage and name):
                 raise ParameterError(f"{text!r} is not of the form stage.field=value, like logo.pad_px=3")
-            result = result.with_values({stage: {name: value.strip()}})
+            result = result.with_values({stage: {name: value.strip()}}, on_rename)
         return result
 
+    def value(self, name: str) -> Any:
+        """Value of `group.field`."""
+        group, _, field = name.partition(".")
+        return getattr(self.group(group), field)
+
     def as_dict(self) -> dict[str, dict[str, Any]]:
-        """{stage: {field: value}}."""
-        return {field.name: getattr(self, field.name).as_dict() for field in dataclasses.fields(self)}
+        """{group: {field: value}}."""
+        return {name: self.group(name).as_dict() for name in self.group_types()}
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ParameterSet) and self._values() == other._values()
+
+    def __hash__(self) -> int:
+        return hash(self._values())
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{name}={self.group(name)!r}' for name in self.group_types())})"
+
+    def _values(self) -> tuple[ParameterGroup, ...]:
+        return tuple(self.group(name) for name in self.group_types())
 
 
 SetType = TypeVar("SetType", bound=ParameterSet)

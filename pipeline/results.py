@@ -90,6 +90,25 @@ class SpinEstimate:
         across = float(np.trace(self.covariance_rps2) - axis @ self.covariance_rps2 @ axis)
         return min(math.degrees(math.sqrt(max(across, 0.0)) / magnitude), 180.0)
 
+    def to_dict(self) -> dict[str, Any]:
+        """The estimate as `spinscope analyze` writes it, ready for JSON."""
+        return {
+            "status": self.status,
+            "reason": self.reason,
+            "vector_rps": None if self.vector_rps is None else self.vector_rps.tolist(),
+            "magnitude_rps": self.magnitude_rps,
+            "magnitude_std_rps": self.magnitude_std_rps,
+            "axis": None if self.axis is None else self.axis.tolist(),
+            "axis_std_deg": self.axis_std_deg,
+        }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MethodResult:
+    """Result of a spin method that has no more to show than its estimate from the present shot so far."""
+
+    estimate: SpinEstimate
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Truth:

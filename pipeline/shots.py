@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .camera import Camera
 from .chain import Tick
-from .methods import best_of
+from .registry import trusted_method
 from .results import SpinEstimate, Truth
-from .stages.track import TrackResult
+from .stages.track import BallTrack
 
 Floats = NDArray[np.float64]
 
@@ -20,24 +23,22 @@ Floats = NDArray[np.float64]
 class Shot:
     """One ball from the tick in which it was found to the last tick in which it was there.
 
-    number : counts from 0 in the order of time
     start_us, end_us : time of the first packet's start and the last one's end (file time)
     t_us : (n,) float64, scene time of each tick's state
     state : (n, 5) float64, [x_px, y_px, vx_px_s, vy_px_s, radius_px]: the causal filter's values
     std : (n, 5) float64, their 1 sigma
     measured : (n,) bool, whether a circle was measured in the tick (else the filter coasted)
-    logo_events : number of events inside the circle less pad
+    logo_events : number of events inside the circle less pad; None where the logo was not asked for
     estimates : the spin by method, from the whole shot; best : the method that is trusted, None where none is
     """
 
-    number: int
     start_us: int
     end_us: int
     t_us: Floats
     state: Floats
     std: Floats
     measured: NDArray[np.bool_]
-    logo_events: int
+    logo_events: int | None
     estimates: dict[str, SpinEstimate]
     best: str | None
 
@@ -57,6 +58,29 @@ class Shot:
         slope: Floats = np.polynomial.polynomial.polyfit(seconds, positions, 1)[1]
         return slope
 
+    def to_dict(self, camera: Camera, ball_radius_m: float) -> dict[str, Any]:
+        """The shot as `spinscope analyze` writes it, ready for JSON."""
+        velocity = self.velocity_m_s(camera, ball_radius_m)
+        names = ("x_px", "y_px", "vx_px_s", "vy_px_s", "radius_px")
+        track = dict(zip(names, self.state.T.tolist(), strict=True))
+        std = dict(zip(names, self.std.T.tolist(), strict=True))
+        return {
+            "start_us": self.start_us,
+            "end_us": self.end_us,
+            "track": {
+                "t_us": self.t_us.tolist(),
+                **{name: track[name] for name in ("x_px", "y_px", "radius_px", "vx_px_s", "vy_px_s")},
+                "x_std_px": std["x_px"],
+                "y_std_px": std["y_px"],
+                "radius_std_px": std["radius_px"],
+                "measured": self.measured.astype(int).tolist(),
+            },
+            "speed_m_s": None if velocity is None else math.sqrt(float(velocity @ velocity)),
+            "logo_events": self.logo_events,
+            "spin": {name: estimate.to_dict() for name, estimate in self.estimates.items()},
+            "best": self.best,
+        }
+
     def error_against(self, truth: Truth, method: str) -> tuple[float, float] | None:
         """(magnitude error in rps, signed-axis error in degrees) of one method; None where it refused."""
         estimate = self.estimates[method]
@@ -69,65 +93,83 @@ class Shot:
         return abs(float(np.linalg.norm(estimate.vector_rps)) - magnitude), float(np.degrees(np.arccos(cosine)))
 
 
-@dataclass(slots=True)
 class ShotLog:
-    """Gathers shots from ticks in order of time, keeping of each tick only what a shot needs.
+    """Shots gathered from ticks in order of time, keeping of each tick only what a shot needs.
 
     A ball that was followed for a single tick of several, before a faster one took over, is no shot.
-
-    shots : the shots that have ended
     """
 
-    shots: list[Shot] = field(default_factory=list)
-    _last_reason: str | None = None
-    _ticks: int = 0
-    _rows: list[_Row] = field(default_factory=list)
+    def __init__(self) -> None:
+        self._ended: list[Shot] = []
+        self._flying: dict[int, list[_Row]] = {}
+        self._last_reason: str | None = None
+        self._tick_count = 0
+
+    @classmethod
+    def of(cls, ticks: Iterable[Tick]) -> ShotLog:
+        """The shots of all these ticks, the last ones ended."""
+        log = cls()
+        for tick in ticks:
+            log.add(tick)
+        log.close()
+        return log
 
     def add(self, tick: Tick) -> None:
         """Take the next tick."""
-        self._ticks += 1
-        if self._rows and tick.track.shot != self._rows[-1].track.shot:
-            self.close()
-        if tick.track.has_ball:
-            self._rows.append(
-                _Row(tick.packet.start_us, tick.packet.end_us, tick.track, len(tick.logo.events), tick.estimates)
-            )
-        elif tick.track.reason:
+        self._tick_count += 1
+        balls = {ball.track.shot: ball for ball in tick.balls}
+        for shot in self._flying.keys() - balls.keys():
+            self._end(shot)
+        for shot, ball in balls.items():
+            logo = ball.results.get("logo")
+            logo_events = None if logo is None else len(logo.events)
+            row = _Row(tick.packet.start_us, tick.packet.end_us, ball.track, logo_events, ball.estimates)
+            self._flying.setdefault(shot, []).append(row)
+        if not balls and tick.track.reason:
             self._last_reason = tick.track.reason
+
+    def close(self) -> None:
+        """End the shots that are still in flight."""
+        for shot in list(self._flying):
+            self._end(shot)
+
+    @property
+    def shots(self) -> list[Shot]:
+        """The shots that have ended, in order of their start."""
+        return sorted(self._ended, key=lambda shot: shot.start_us)
 
     @property
     def no_shot_reason(self) -> str | None:
         """Why there are no shots, in words; None when there are some."""
-        return None if self.shots else self._last_reason or "no ball, because there are no events"
+        return None if self._ended else self._last_reason or "no ball, because there are no events"
 
-    def close(self) -> None:
-        """End the present shot, if there is one."""
-        if len(self._rows) > 1 or (self._rows and self._ticks == 1):
-            self.shots.append(_shot(len(self.shots), self._rows))
-        elif self._rows:
+    def _end(self, shot: int) -> None:
+        rows = self._flying.pop(shot)
+        if len(rows) > 1 or self._tick_count == 1:
+            self._ended.append(_shot(rows))
+        else:
             self._last_reason = "no shot: a ball was seen for a single tick only"
-        self._rows = []
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Row:
     start_us: int
     end_us: int
-    track: TrackResult
-    logo_events: int
+    track: BallTrack
+    logo_events: int | None
     estimates: dict[str, SpinEstimate]
 
 
-def _shot(number: int, rows: list[_Row]) -> Shot:
+def _shot(rows: list[_Row]) -> Shot:
+    events = [row.logo_events for row in rows if row.logo_events is not None]
     return Shot(
-        number=number,
         start_us=rows[0].start_us,
         end_us=rows[-1].end_us,
         t_us=np.array([row.track.t_us for row in rows]),
         state=np.array([row.track.mean for row in rows]),
         std=np.array([np.sqrt(np.diag(row.track.covariance)) for row in rows]),
         measured=np.array([row.track.measured is not None for row in rows]),
-        logo_events=sum(row.logo_events for row in rows),
+        logo_events=sum(events) if events else None,
         estimates=rows[-1].estimates,
-        best=best_of(rows[-1].estimates),
+        best=trusted_method(rows[-1].estimates),
     )

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spinscope.pipeline.camera import Camera, CameraParameters, Setting
+from spinscope.pipeline.camera import Camera, CameraParameters
 from spinscope.pipeline.events import EventBatch
-from spinscope.pipeline.results import Packet, SpinEstimate
-from spinscope.pipeline.stages import flow, logo, rate, spin
+from spinscope.pipeline.results import Circle, Packet, SpinEstimate
+from spinscope.pipeline.spin import normal_flow, triplet
+from spinscope.pipeline.spin.parameters import SpinParameters
+from spinscope.pipeline.stage import Context
+from spinscope.pipeline.stages import flow, logo, rate
 from spinscope.pipeline.stages.filter import FilterResult
-from spinscope.pipeline.stages.track import TrackResult
+from spinscope.pipeline.stages.track import BallTrack, TrackResult
 
 Floats = NDArray[np.float64]
 
 CAMERA = Camera.of(CameraParameters(), 1280, 720)
-SETTING = Setting(CAMERA, 0.02, 150.0)
+CONTEXT = Context(CAMERA, 0.02, {"spin.max_spin_rps": 150.0})
 STEP_US = 20
 DEAD_US = 2000  # a pixel reports an edge once
 RINGS = ((-0.5, 0.0, 0.18), (0.0, 0.0, 0.25), (0.0, 0.0, 0.12), (0.5, 0.1, 0.2))  # along, across, radius (rad)
@@ -59,7 +64,7 @@ def spinning_ball(
     centre_m: tuple[float, float, float] = (0.0, 0.0, 2.0),
     velocity_m_s: tuple[float, float, float] = (0.0, 0.0, 0.0),
     duration_us: int = 50_000,
-    setting: Setting = SETTING,
+    context: Context = CONTEXT,
 ) -> EventBatch:
     """Events where the rings' edges pass the middle of a pixel: OFF where a ring arrives, ON where it leaves.
 
@@ -71,10 +76,10 @@ def spinning_ball(
     found = []
     for now_us, rotation in zip(t_us, turn, strict=True):
         e, n = points @ rotation.T, outward @ rotation.T
-        place = np.array(centre_m) + np.array(velocity_m_s) * now_us * 1e-6 + setting.ball_radius_m * e
+        place = np.array(centre_m) + np.array(velocity_m_s) * now_us * 1e-6 + context.ball_radius_m * e
         motion = np.cross(2 * np.pi * np.asarray(spin_rps), e)
         sense = np.sum(motion * n, axis=1) / np.linalg.norm(motion, axis=1)
-        pixel = setting.camera.project(place)
+        pixel = context.camera.project(place)
         near = np.abs(pixel - np.round(pixel)).max(axis=1) < 0.2
         seen = (np.sum(e * place, axis=1) < 0) & (np.abs(sense) > 0.2) & near
         x, y = np.round(pixel[seen]).astype(np.int64).T
@@ -90,28 +95,41 @@ def spinning_ball(
     )
 
 
-def known_track(
+def known_ball(
     end_us: int,
     *,
     centre_m: tuple[float, float, float] = (0.0, 0.0, 2.0),
     velocity_m_s: tuple[float, float, float] = (0.0, 0.0, 0.0),
     std_px: float = 0.2,
     tick_us: int = 5000,
-    setting: Setting = SETTING,
-) -> TrackResult:
+    context: Context = CONTEXT,
+) -> BallTrack:
     """The ball at the end of a tick, known exactly, without latency."""
     there = np.array(centre_m) + np.array(velocity_m_s) * np.array([[end_us - tick_us], [end_us]]) * 1e-6
-    x, y, radius = setting.camera.silhouette(there, setting.ball_radius_m)
+    x, y, radius = context.camera.silhouette(there, context.ball_radius_m)
     per_s = 1e6 / tick_us
     mean = np.array([x[1], y[1], (x[1] - x[0]) * per_s, (y[1] - y[0]) * per_s, radius[1]])
     covariance = np.diag([std_px**2, std_px**2, 50.0**2, 50.0**2, std_px**2])
-    return TrackResult("tracking", None, 0, float(end_us), 0.0, mean, covariance, None, None)
+    return BallTrack(0, float(end_us), 0.0, mean, covariance, Circle(x[1], y[1], radius[1], 1.0))
+
+
+def track_with(ball: BallTrack) -> TrackResult:
+    """A tracker's result with this ball alone."""
+    return TrackResult("tracking", None, ball.t_us, (ball,), None)
+
+
+def known_track(end_us: int, **options: Any) -> TrackResult:
+    """The tracker's result with the ball of `known_ball`."""
+    return track_with(known_ball(end_us, **options))
 
 
 def no_track(end_us: int) -> TrackResult:
-    return TrackResult(
-        "searching", "no ball", None, float(end_us), 0.0, np.full(5, np.nan), np.full((5, 5), np.nan), None, None
-    )
+    return TrackResult("searching", "no ball", float(end_us), (), None)
+
+
+def of_shot(track: TrackResult, shot: int) -> TrackResult:
+    """The same ball as another shot's."""
+    return replace(track, balls=tuple(replace(ball, shot=shot) for ball in track.balls))
 
 
 def packets(events: EventBatch, tick_us: int = 5000, until_us: int | None = None) -> Iterator[Packet]:
@@ -121,29 +139,42 @@ def packets(events: EventBatch, tick_us: int = 5000, until_us: int | None = None
         yield Packet(index, start_us, end_us, events.between(start_us, end_us))
 
 
+AfterTrack = tuple[logo.LogoResult, rate.RateResult, flow.FlowResult, dict[str, SpinEstimate]]
+
+
 def after_track(
     ticks: list[tuple[Packet, TrackResult]],
     *,
-    parameters: spin.SpinParameters | None = None,
+    parameters: SpinParameters | None = None,
     flow_parameters: flow.FlowParameters | None = None,
-    setting: Setting = SETTING,
-) -> list[tuple[logo.LogoResult, rate.RateResult, flow.FlowResult, spin.SpinResult]]:
-    """What the stages after the track make of these packets and tracks."""
+    context: Context = CONTEXT,
+) -> list[AfterTrack]:
+    """What the stages of one ball make of these packets and tracks, but for contrast."""
     groups = (
         # The pad of a ball that flies, though these may stay; the tracks given know the logo's own latency.
         logo.LogoParameters(fixed_pad_px=2.5, delay_us=0.0),
         rate.RateParameters(),
         flow_parameters or flow.FlowParameters(),
-        parameters or spin.SpinParameters(),
+        parameters or SpinParameters(),
     )
-    logo_state, rate_state = logo.start(groups[0], setting), rate.start(groups[1], setting)
-    flow_state, spin_state = flow.start(groups[2], setting), spin.start(groups[3], setting)
-    results = []
+    stages = ((logo, 0), (rate, 1), (flow, 2), (triplet, 3), (normal_flow, 3))
+    shot, results = None, []
     for packet, track in ticks:
-        seen = logo.step(groups[0], logo_state, packet, FilterResult(packet.events, packet.events), track)
-        rhythm = rate.step(groups[1], rate_state, packet, track, seen)
-        moved = flow.step(groups[2], flow_state, packet, track, seen, rhythm)
-        results.append((seen, rhythm, moved, spin.step(groups[3], spin_state, packet, track, seen, rhythm, moved)))
+        ball = track.ball
+        if ball is None:
+            seen, rhythm, moved, *spins = (stage.absent(groups[at], track.reason or "no ball") for stage, at in stages)
+            shot = None
+        else:
+            if ball.shot != shot:
+                shot, states = ball.shot, [stage.start(groups[at], context) for stage, at in stages]
+            seen = logo.step(groups[0], states[0], packet, FilterResult(packet.events, packet.events), ball)
+            rhythm = rate.step(groups[1], states[1], packet, seen)
+            moved = flow.step(groups[2], states[2], packet, ball, seen, rhythm)
+            spins = [
+                triplet.step(groups[3], states[3], packet, moved, rhythm),
+                normal_flow.step(groups[3], states[4], packet, seen, moved, rhythm),
+            ]
+        results.append((seen, rhythm, moved, {spin.estimate.method: spin.estimate for spin in spins}))
     return results
 
 

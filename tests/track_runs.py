@@ -10,9 +10,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from spinscope.pipeline.camera import Camera, CameraParameters, Setting
+from spinscope.pipeline.camera import Camera, CameraParameters
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.results import Packet, Truth
+from spinscope.pipeline.stage import Context
 from spinscope.pipeline.stages import filter, surface, track
 from spinscope.pipeline.stages.filter import FilterParameters, FilterResult
 from spinscope.pipeline.stages.surface import SurfaceParameters, SurfaceResult
@@ -32,18 +33,18 @@ def sample(name: str) -> tuple[EventBatch, Truth]:
     return EventBatch.checked(t, x, y, p == 1, width_px=WIDTH, height_px=HEIGHT), truth
 
 
-def setting(width_px: int = WIDTH, height_px: int = HEIGHT, focal_length_mm: float = 8.0) -> Setting:
+def setting(width_px: int = WIDTH, height_px: int = HEIGHT, focal_length_mm: float = 8.0) -> Context:
     optics = CameraParameters(focal_length_mm=focal_length_mm)
-    return Setting(Camera.of(optics, width_px, height_px), 0.02, 150.0)
+    return Context(Camera.of(optics, width_px, height_px), 0.02, {"spin.max_spin_rps": 150.0})
 
 
-PAPERS_SETTING = setting()
+PAPER_CONTEXT = setting()
 
 
 def inputs(
     events: EventBatch,
     tick_us: int = 5000,
-    place: Setting = PAPERS_SETTING,
+    place: Context = PAPER_CONTEXT,
     surface_mode: str = "stc_cut_trail",
 ) -> Inputs:
     """Packets with their filtered events and surfaces, from the tick of the first event to that of the last."""
@@ -58,7 +59,7 @@ def inputs(
     return rows
 
 
-def run(rows: Inputs, parameters: TrackParameters | None = None, place: Setting = PAPERS_SETTING) -> list[TrackResult]:
+def run(rows: Inputs, parameters: TrackParameters | None = None, place: Context = PAPER_CONTEXT) -> list[TrackResult]:
     tick_us = rows[0][0].end_us - rows[0][0].start_us
     parameters = parameters or TrackParameters(tick_us=tick_us)
     state = track.start(parameters, place)

@@ -5,10 +5,23 @@ the top level, and the links beside this file show linters and type checkers the
 """
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 _here = Path(__file__).parent
 if _here.parent.name == ".package":
     __path__.insert(0, str(_here.parents[1]))  # the folders themselves: links need rights that Windows may withhold
 
-from spinscope.pipeline import *  # noqa: E402, F403
-from spinscope.pipeline import __all__ as __all__  # noqa: E402
+from spinscope import pipeline  # noqa: E402
+
+if TYPE_CHECKING:
+    from spinscope.pipeline import *  # noqa: F403
+
+__all__ = pipeline.__all__
+
+
+def __getattr__(name: str) -> Any:
+    return getattr(pipeline, name)
+
+
+def __dir__() -> list[str]:
+    return [*globals(), *pipeline.__all__]

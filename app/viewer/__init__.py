@@ -7,39 +7,31 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from spinscope.pipeline.chain import Tick
 from spinscope.pipeline.errors import SpinscopeError
-from spinscope.pipeline.shots import Shot
 
 if TYPE_CHECKING:
-    from ..session import Session
+    from spinscope.pipeline.session import Result
 
 LAYOUTS = ("all", "tracker", "logo", "spin", "coach")
 
 
 def save(
-    session: Session,
-    ticks: Sequence[Tick],
-    shots: Sequence[Shot],
+    result: Result,
     path: Path,
     layout: str = "all",
-    *,
-    no_shot_reason: str | None = None,
 ) -> None:
     """Write the run as an .rrd file with its layouts in it; the file appears whole or not at all.
 
     layout : which tab is in front (LAYOUTS)
-    no_shot_reason : why there is no shot, in words, when there is none
     Raises RecordingError when the file cannot be written.
     """
     from .recorded import write_rrd
-    from .run import Run
+    from .run import ViewedRun
 
-    write_rrd(Run.of(session, ticks, shots, no_shot_reason), path, layout)
+    write_rrd(ViewedRun.of(result), path, layout)
 
 
 def require_display() -> None:
@@ -53,21 +45,18 @@ def require_display() -> None:
 
 
 def show(
-    session: Session,
-    ticks: Sequence[Tick],
-    shots: Sequence[Shot],
+    result: Result,
     layout: str = "all",
     *,
     native: bool = False,
-    no_shot_reason: str | None = None,
 ) -> None:
     """Show the run until Ctrl-C: in the browser, or in Rerun's own window until that is closed.
 
     Raises SpinscopeError when there is no display for the window, or no free port for the browser.
     """
-    from .run import Run
+    from .run import ViewedRun
 
-    run = Run.of(session, ticks, shots, no_shot_reason)
+    run = ViewedRun.of(result)
     if native:
         from .native import show_native
 

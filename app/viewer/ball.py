@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from . import entities as at
 from .rerun_api import Chunk, columns_at, once, styled
-from .run import Run, shot_starts, shown_estimate, vector_of
+from .run import ViewedRun, shot_starts, shown_estimate, vector_of
 from .still import sphere
 
 Floats = NDArray[np.float64]
@@ -21,13 +21,13 @@ EYE = np.array([0.0, np.sin(TILT), -np.cos(TILT)])
 RING_RADII, RING_POINTS = 1.18, 51  # of the ring that shows which way the ball turns
 
 
-def ball_chunks(run: Run) -> list[Chunk]:
+def ball_chunks(run: ViewedRun) -> list[Chunk]:
     """Everything in space but the paint on the ball."""
     chunks = [_mesh(run), *_motion(run), *_arrows(run), *_ring(run), *_path(run), *_axes(run)]
     return [once(at.WORLD, rr.ViewCoordinates.RDF), *chunks]
 
 
-def _mesh(run: Run) -> Chunk:
+def _mesh(run: ViewedRun) -> Chunk:
     """The sphere, in the body frame."""
     longitudes, latitudes = np.linspace(-np.pi, np.pi, 65), np.linspace(-np.pi / 2, np.pi / 2, 33)
     normals = sphere(longitudes[None, :], latitudes[:, None]).reshape(-1, 3)
@@ -48,7 +48,7 @@ def _mesh(run: Run) -> Chunk:
     )
 
 
-def _motion(run: Run) -> list[Chunk]:
+def _motion(run: ViewedRun) -> list[Chunk]:
     """Place and attitude of the ball between the ticks: carried on from the last tick, as a robot would have it."""
     times, places, quaternions = [], [], []
     for index, (tick, start_us) in enumerate(zip(run.ticks, shot_starts(run), strict=True)):
@@ -80,7 +80,7 @@ def _turned_by(spin_rps: Floats, seconds: Floats) -> Floats:
     return np.column_stack([np.sin(half)[:, None] * axis, np.cos(half)])
 
 
-def _arrows(run: Run) -> list[Chunk]:
+def _arrows(run: ViewedRun) -> list[Chunk]:
     """A thin arrow a method, out of the ball's surface along its axis, and the truth's; the shown one thick."""
     chunks: list[Chunk] = []
     for method in run.methods:
@@ -93,7 +93,7 @@ def _arrows(run: Run) -> list[Chunk]:
     return [*chunks, *_arrow(run, at.SPIN_SHOWN, shown, at.RING_COLOUR, 0.06)]
 
 
-def _arrow(run: Run, entity: str, vectors: list[Floats], colour: at.Colour, thickness: float) -> list[Chunk]:
+def _arrow(run: ViewedRun, entity: str, vectors: list[Floats], colour: at.Colour, thickness: float) -> list[Chunk]:
     spins = np.array(vectors).reshape(-1, 3)
     magnitudes = np.linalg.norm(spins, axis=1)
     known = magnitudes > 0
@@ -107,7 +107,7 @@ def _arrow(run: Run, entity: str, vectors: list[Floats], colour: at.Colour, thic
     return [styled(entity, rr.Arrows3D, **look), columns_at(entity, run.times_us, columns, [0, *known.astype(int)])]
 
 
-def _ring(run: Run) -> list[Chunk]:
+def _ring(run: ViewedRun) -> list[Chunk]:
     """Most of a circle around the shown axis, ending in an arrow: which way the ball turns."""
     spins = np.array([vector_of(shown_estimate(tick)[0]) for tick in run.ticks])
     magnitudes = np.linalg.norm(spins, axis=1)
@@ -137,7 +137,7 @@ def _around(axes: Floats) -> Floats:
     return RING_RADII * ring
 
 
-def _path(run: Run) -> list[Chunk]:
+def _path(run: ViewedRun) -> list[Chunk]:
     """The way flown so far, a piece a tick (the view shows all pieces up to the playhead); the truth dashed."""
     chunks = [styled(at.PATH, rr.LineStrips3D, colors=at.PATH_COLOUR, radii=-2.0)]
     if run.fixed or not run.has_ball.any():
@@ -155,7 +155,7 @@ def _path(run: Run) -> list[Chunk]:
     return chunks
 
 
-def _axes(run: Run) -> list[Chunk]:
+def _axes(run: ViewedRun) -> list[Chunk]:
     """The camera frame's directions, 0.1 m long, beside the path."""
     low, high = path_bounds_m(run)
     corner = np.array([low[0] - 0.25, (low[1] + high[1]) / 2, high[2]])
@@ -169,7 +169,7 @@ def _axes(run: Run) -> list[Chunk]:
     return [once(at.AXES, arrows)]
 
 
-def path_bounds_m(run: Run) -> tuple[Floats, Floats]:
+def path_bounds_m(run: ViewedRun) -> tuple[Floats, Floats]:
     """Opposite corners of the box around all places of the ball, camera frame; 0.1 m wide at least."""
     if not run.has_ball.any():
         return np.array([-0.4, -0.3, 1.9]), np.array([0.4, 0.3, 2.1])

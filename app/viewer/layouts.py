@@ -13,7 +13,7 @@ from . import LAYOUTS
 from . import entities as at
 from .ball import EYE, path_bounds_m
 from .plots import true_state
-from .run import Run
+from .run import ViewedRun
 from .summary import CARD_PX
 
 Floats = NDArray[np.float64]
@@ -29,7 +29,7 @@ NAMES = {
 }
 
 
-def blueprint(run: Run, layout: str, *, is_lasting: bool = False) -> rrb.Blueprint:
+def blueprint(run: ViewedRun, layout: str, *, is_lasting: bool = False) -> rrb.Blueprint:
     """All tabs, with the one of `layout` (a key of NAMES) in front. Played over and over is the first shot.
 
     is_lasting : other recordings are to be shown with it: all of each is played, for the viewer forgets the selection
@@ -56,7 +56,7 @@ def blueprint(run: Run, layout: str, *, is_lasting: bool = False) -> rrb.Bluepri
     )
 
 
-def _all(run: Run) -> rrb.Container:
+def _all(run: ViewedRun) -> rrb.Container:
     return rrb.Vertical(
         rrb.Horizontal(_events(run), _surface(run), _close_up(run), _space(run), column_shares=[4, 4, 3, 3]),
         rrb.Horizontal(
@@ -72,7 +72,7 @@ def _all(run: Run) -> rrb.Container:
     )
 
 
-def _tracker(run: Run) -> rrb.Container:
+def _tracker(run: ViewedRun) -> rrb.Container:
     colours = "Surface: Hough yellow, refined orange, Kalman green"
     if run.truth is not None:
         colours += ", truth violet"
@@ -89,7 +89,7 @@ def _tracker(run: Run) -> rrb.Container:
     )
 
 
-def _logo(run: Run) -> rrb.Container:
+def _logo(run: ViewedRun) -> rrb.Container:
     return rrb.Horizontal(
         rrb.Vertical(_logo_events(run), _close_up(run)),
         rrb.Vertical(_flow(run), _still()),
@@ -99,7 +99,7 @@ def _logo(run: Run) -> rrb.Container:
     )
 
 
-def _spin(run: Run) -> rrb.Container:
+def _spin(run: ViewedRun) -> rrb.Container:
     plots = [_magnitude(run), _parts(run)]
     if run.truth is not None:
         plots.append(_axis_error())
@@ -113,7 +113,7 @@ def _spin(run: Run) -> rrb.Container:
     )
 
 
-def _coach(run: Run) -> rrb.Container:
+def _coach(run: ViewedRun) -> rrb.Container:
     return rrb.Horizontal(
         _ball(run, "Ball and spin", [at.SPIN_SHOWN]),
         rrb.Vertical(_card(), _space(run, "Flight", [at.AXES, at.TRUE_PATH, at.SPIN_SHOWN]), row_shares=[3, 2]),
@@ -122,7 +122,7 @@ def _coach(run: Run) -> rrb.Container:
     )
 
 
-def _image_view(run: Run, name: str, contents: list[str]) -> rrb.Spatial2DView:
+def _image_view(run: ViewedRun, name: str, contents: list[str]) -> rrb.Spatial2DView:
     width, height = run.camera.width_px, run.camera.height_px
     bounds = rrb.VisualBounds2D(x_range=[-0.5, width - 0.5], y_range=[-0.5, height - 0.5])
     return rrb.Spatial2DView(
@@ -130,7 +130,7 @@ def _image_view(run: Run, name: str, contents: list[str]) -> rrb.Spatial2DView:
     )
 
 
-def _ball_view(run: Run, name: str, contents: list[str], radii: float) -> rrb.Spatial2DView:
+def _ball_view(run: ViewedRun, name: str, contents: list[str], radii: float) -> rrb.Spatial2DView:
     """A view that moves with the ball and shows that many radii around it."""
     half = radii * run.largest_radius_px
     bounds = rrb.VisualBounds2D(x_range=[-half, half], y_range=[-half, half])
@@ -142,24 +142,24 @@ def _ball_view(run: Run, name: str, contents: list[str], radii: float) -> rrb.Sp
 CIRCLES = [at.HOUGH, at.MEASURED, at.KALMAN, at.TRUE_CIRCLE]
 
 
-def _events(run: Run) -> rrb.View:
+def _events(run: ViewedRun) -> rrb.View:
     return _image_view(run, "Raw events: ON red, OFF blue", [at.FRAME, at.EVENTS])
 
 
-def _surface(run: Run, name: str = "Surface: Hough yellow, Kalman green") -> rrb.View:
+def _surface(run: ViewedRun, name: str = "Surface: Hough yellow, Kalman green") -> rrb.View:
     return _image_view(run, name, [at.FRAME, at.SURFACE, *CIRCLES])
 
 
-def _close_up(run: Run) -> rrb.View:
+def _close_up(run: ViewedRun) -> rrb.View:
     return _ball_view(run, "Surface around the ball", [at.SURFACE, *CIRCLES], 2.4)
 
 
-def _logo_events(run: Run) -> rrb.View:
+def _logo_events(run: ViewedRun) -> rrb.View:
     contents = [at.BALL_CENTRE, at.LOGO, at.LOGO_OUTLINE, at.LOGO_MASK]
     return _ball_view(run, "Logo events in the ball's frame", contents, 1.25)
 
 
-def _flow(run: Run) -> rrb.View:
+def _flow(run: ViewedRun) -> rrb.View:
     speed = "" if run.fast_flow_px_s is None else f": full colour = {run.fast_flow_px_s:,.0f} px/s"
     view = _ball_view(run, f"Flow{speed}", [at.FLOW, at.LOGO_OUTLINE, at.FLOW_WHEEL], 1.25)
     radius = run.largest_radius_px
@@ -214,7 +214,7 @@ def _status() -> rrb.View:
     )
 
 
-def _state_plot(run: Run, name: str) -> rrb.View:
+def _state_plot(run: ViewedRun, name: str) -> rrb.View:
     column = at.QUANTITIES.index(name)
     titles = {"x": "x", "y": "y", "vx": "Velocity x", "vy": "Velocity y", "radius": "Radius"}
     deviation = np.sqrt(run.variances[:, column])
@@ -226,11 +226,11 @@ def _state_plot(run: Run, name: str) -> rrb.View:
     return _plot(f"{at.PLOT}/{name}", f"{titles[name]} [{at.UNITS[column]}]", _range(np.concatenate(values)))
 
 
-def _state_tabs(run: Run) -> rrb.Container:
+def _state_tabs(run: ViewedRun) -> rrb.Container:
     return rrb.Tabs(*(_state_plot(run, name) for name in at.QUANTITIES), active_tab=0)
 
 
-def _residual(run: Run, name: str) -> rrb.View:
+def _residual(run: ViewedRun, name: str) -> rrb.View:
     column = at.QUANTITIES.index(name)
     deviation, mean = np.sqrt(run.variances[:, column]), run.means[:, column]
     values = [deviation, -deviation]
@@ -240,23 +240,23 @@ def _residual(run: Run, name: str) -> rrb.View:
     return _plot(f"{at.RESIDUAL}/{name}", f"{name} less Kalman [px]", _range(np.concatenate(values)))
 
 
-def _event_count(run: Run) -> rrb.View:
+def _event_count(run: ViewedRun) -> rrb.View:
     rates = [len(t.packet.events) / (t.packet.end_us - t.packet.start_us) for t in run.ticks]
     return _plot(at.EVENT_COUNT, "Event rate [Mev/s]", _range(np.array([0.0, *rates])), legend=True)
 
 
-def _rate(run: Run, legend: bool = True) -> rrb.View:
+def _rate(run: ViewedRun, legend: bool = True) -> rrb.View:
     rates = [0.0, *(tick.rate.rate_hz.max(initial=0.0) / 1e3 for tick in run.ticks)]
     return _plot(at.RATE, "Logo's event rate [kev/s], average yellow", _range(np.array(rates)), legend)
 
 
-def _rhythm(run: Run) -> rrb.View:
+def _rhythm(run: ViewedRun) -> rrb.View:
     rates = [tick.rate.smooth_hz / 1e3 for tick in run.ticks]
     name = "Rhythm of the rate [kev/s] and its falling zero crossings"
     return _plot(at.RHYTHM, name, _range(np.concatenate(rates)), legend=True)
 
 
-def _magnitude(run: Run) -> rrb.View:
+def _magnitude(run: ViewedRun) -> rrb.View:
     values = [e.magnitude_rps for tick in run.ticks for e in tick.estimates.values()]
     values += [tick.rate.spin_rps for tick in run.ticks]
     known = np.array([value for value in values if value is not None])
@@ -266,7 +266,7 @@ def _magnitude(run: Run) -> rrb.View:
     return _plot(at.SPIN_MAGNITUDE, "Spin [rps] ± 1σ", (0.0, top), corner="RightBottom")
 
 
-def _parts(run: Run) -> rrb.View:
+def _parts(run: ViewedRun) -> rrb.View:
     trusted = [t.estimates[t.best].vector_rps for t in run.ticks if t.best is not None]
     y_range = _range(np.concatenate([np.zeros(1), *(vector for vector in trusted if vector is not None)]))
     return _plot(at.SPIN_PARTS, "Trusted spin vector, camera frame [rps]", y_range, legend=True)
@@ -295,7 +295,7 @@ def _range(values: Floats) -> tuple[float, float] | None:
     return low - spare, high + spare
 
 
-def _ball(run: Run, name: str = "Ball, logo painted on", arrows: list[str] | None = None) -> rrb.View:
+def _ball(run: ViewedRun, name: str = "Ball, logo painted on", arrows: list[str] | None = None) -> rrb.View:
     """The ball from close by, from above the line of sight; moving along with it. Without `arrows`: all of them."""
     shown = arrows or [at.SPIN_SHOWN, f"{at.SPIN_ARROWS}/**"]
     eye = _tilted(np.zeros(3), 5.5 * run.ball_radius_m)
@@ -310,7 +310,7 @@ def _ball(run: Run, name: str = "Ball, logo painted on", arrows: list[str] | Non
     )
 
 
-def _space(run: Run, name: str = "Flight path, grid 0.1 m", without: list[str] | None = None) -> rrb.View:
+def _space(run: ViewedRun, name: str = "Flight path, grid 0.1 m", without: list[str] | None = None) -> rrb.View:
     """The flight from above, tilted: right is the image's right, near is the image's lower edge."""
     hidden = [f"- {path}" for path in (f"{at.SPIN_ARROWS}/**", *(without or []))]
     low, high = path_bounds_m(run)

@@ -13,13 +13,13 @@ from ..terminal import note
 from . import require_display
 from .recorded import write_rrd
 from .rerun_api import place_playhead, program, quiet_environment
-from .run import Run
+from .run import ViewedRun
 from .web import HOST, free_ports
 
 START_S = 30.0  # patience until the window has read the recording
 
 
-def show_native(run: Run, layout: str, *, window: tuple[str, ...] = ()) -> None:
+def show_native(run: ViewedRun, layout: str, *, window: tuple[str, ...] = ()) -> None:
     """Show the run in a window and wait until it is closed or Ctrl-C is pressed.
 
     window : more arguments for Rerun's program
@@ -56,7 +56,7 @@ def show_native(run: Run, layout: str, *, window: tuple[str, ...] = ()) -> None:
         )
 
 
-def _place_playhead(run: Run, port: int, process: subprocess.Popen[bytes]) -> None:
+def _place_playhead(run: ViewedRun, port: int, process: subprocess.Popen[bytes]) -> None:
     """Put the playhead where the track starts, as soon as the window has read the recording; give up quietly."""
     deadline = time.monotonic() + START_S
     while process.poll() is None and time.monotonic() < deadline:

@@ -14,7 +14,7 @@ from spinscope.pipeline.kernels.still import CELLS, Canvas, centroid, paint, tur
 
 from . import entities as at
 from .rerun_api import Chunk, columns_at, once, styled
-from .run import Run, shot_starts, shown_estimate, vector_of
+from .run import ViewedRun, shot_starts, shown_estimate, vector_of
 from .still import MAP_PX, TEXTURE_PX, disc_directions, disc_mask, map_directions, map_frame, texture_directions
 
 Bytes = NDArray[np.uint8]
@@ -31,7 +31,7 @@ POLARITIES = np.array([at.OFF, at.ON], np.float32)
 TO_CAMERA = np.array([0.0, 0.0, -1.0])
 
 
-def painting_chunks(run: Run) -> list[Chunk]:
+def painting_chunks(run: ViewedRun) -> list[Chunk]:
     """The logo's events turned back by the estimate of the moment: on the ball's texture, on two discs, unrolled."""
     times, pictures = [np.array([run.start_us])], [[nothing[None]] for nothing in _nothing()]
     for shot in _painted_shots(run):
@@ -93,7 +93,7 @@ class _Shot:
         return direction if direction.any() else TO_CAMERA
 
 
-def _painted_shots(run: Run) -> Iterator[_Shot]:
+def _painted_shots(run: ViewedRun) -> Iterator[_Shot]:
     """Every shot with what is painted of it."""
     parts: dict[int, tuple[int, list[int]]] = {}
     for index, (tick, start_us) in enumerate(zip(run.ticks, shot_starts(run), strict=True)):

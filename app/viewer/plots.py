@@ -11,12 +11,12 @@ from spinscope.pipeline.results import Circle
 
 from . import entities as at
 from .rerun_api import Chunk, band, line, points
-from .run import Run
+from .run import ViewedRun
 
 Floats = NDArray[np.float64]
 
 
-def state_plots(run: Run) -> list[Chunk]:
+def state_plots(run: ViewedRun) -> list[Chunk]:
     """The Kalman state with its band, and what was measured as dots."""
     chunks: list[Chunk] = []
     for i, (name, unit) in enumerate(zip(at.QUANTITIES, at.UNITS, strict=True)):
@@ -37,7 +37,7 @@ def state_plots(run: Run) -> list[Chunk]:
     return chunks
 
 
-def residual_plots(run: Run) -> list[Chunk]:
+def residual_plots(run: ViewedRun) -> list[Chunk]:
     """What was measured, and the truth, less the Kalman filter's value, in its band around zero."""
     chunks: list[Chunk] = []
     for i, name in ((0, "x"), (1, "y"), (4, "radius")):
@@ -53,7 +53,7 @@ def residual_plots(run: Run) -> list[Chunk]:
     return chunks
 
 
-def rate_chunks(run: Run) -> list[Chunk]:
+def rate_chunks(run: ViewedRun) -> list[Chunk]:
     """Histogram of the event rate with its moving average, and the rhythm with its falling zero crossings."""
     t_us, curves, crossings_us = _rate_curves(run)
     zeros = np.where(np.isfinite(crossings_us), 0.0, np.nan)
@@ -66,7 +66,7 @@ def rate_chunks(run: Run) -> list[Chunk]:
     ]
 
 
-def spin_chunks(run: Run) -> list[Chunk]:
+def spin_chunks(run: ViewedRun) -> list[Chunk]:
     """Plots of each method's magnitude with its +-1 sigma, of the trusted vector, and of the axes' errors."""
     chunks: list[Chunk] = []
     for method in run.methods:
@@ -89,7 +89,7 @@ def spin_chunks(run: Run) -> list[Chunk]:
     return chunks
 
 
-def true_state(run: Run) -> Floats:
+def true_state(run: ViewedRun) -> Floats:
     """(n, 5) the truth behind the Kalman states, at the scene's time."""
     assert run.truth is not None
     t_us = np.array([tick.track.t_us for tick in run.ticks])
@@ -111,7 +111,7 @@ def _measured(circle: Circle | None, field: str, shown: bool) -> float:
     return getattr(circle, field) if circle is not None and shown else float("nan")
 
 
-def _rate_curves(run: Run) -> tuple[NDArray[np.int64], Floats, Floats]:
+def _rate_curves(run: ViewedRun) -> tuple[NDArray[np.int64], Floats, Floats]:
     """(n,) times, (n, 3) histogram, moving average and rhythm in 1000 events/s, (m,) crossings in us.
 
     Every tick tells the whole shot anew (its window's part): of each bin the latest word counts. A row of NaN
@@ -141,7 +141,7 @@ def _rate_curves(run: Run) -> tuple[NDArray[np.int64], Floats, Floats]:
     return np.concatenate(times[::-1]), np.concatenate(curves[::-1]), found if found.size else np.array([np.nan])
 
 
-def _true_spin(run: Run, spin: Floats) -> list[Chunk]:
+def _true_spin(run: ViewedRun, spin: Floats) -> list[Chunk]:
     magnitude = np.linalg.norm(spin, axis=1)
     chunks = line(f"{at.SPIN_MAGNITUDE}/truth", run.times_us, from_start(magnitude), "truth", at.TRUTH_COLOUR, 0.8)
     for method in run.methods:

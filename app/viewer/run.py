@@ -16,14 +16,14 @@ from spinscope.pipeline.results import SpinEstimate, Truth
 from spinscope.pipeline.shots import Shot
 
 if TYPE_CHECKING:
-    from ..session import Session
+    from spinscope.pipeline.session import Result
 
 Floats = NDArray[np.float64]
 Times = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Run:
+class ViewedRun:
     """Everything that is shown: a recording's ticks and shots, with the setting they were made in.
 
     name : the recording's name, for people
@@ -43,13 +43,14 @@ class Run:
     warnings: Sequence[str]
 
     @classmethod
-    def of(cls, session: Session, ticks: Sequence[Tick], shots: Sequence[Shot], no_shot_reason: str | None) -> Run:
+    def of(cls, result: Result) -> ViewedRun:
         """The run of a session."""
+        session = result.session
         return cls(
             name=session.recording.path.name,
-            ticks=ticks,
-            shots=shots,
-            no_shot_reason=no_shot_reason,
+            ticks=result.ticks,
+            shots=result.shots,
+            no_shot_reason=result.no_shot_reason,
             camera=session.camera,
             ball_radius_m=session.ball_radius_m,
             fixed=session.parameters.track.ball == "fixed",
@@ -159,7 +160,7 @@ def vector_of(estimate: SpinEstimate | None) -> Floats:
     return np.zeros(3) if estimate is None or estimate.vector_rps is None else estimate.vector_rps
 
 
-def shot_starts(run: Run) -> Iterator[int | None]:
+def shot_starts(run: ViewedRun) -> Iterator[int | None]:
     """For each tick the start of the shot it belongs to: the moment of the body frame; None without a ball."""
     shot, start_us = None, None
     for tick in run.ticks:

@@ -13,12 +13,12 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from spinscope.pipeline.stages.contrast import ContrastResult
+from spinscope.pipeline.spin.contrast.stage import ContrastResult
 
 from . import entities as at
 from .png import png
 from .rerun_api import Chunk, bars, columns_at, once, styled
-from .run import Run
+from .run import ViewedRun
 
 Floats = NDArray[np.float64]
 
@@ -39,9 +39,10 @@ MARKS: dict[str, tuple[at.Colour, float, float]] = {
 MARK_WIDTH = 0.008  # of the curve's span
 
 
-def score_chunks(run: Run) -> list[Chunk]:
+def score_chunks(run: ViewedRun) -> list[Chunk]:
     """Both pictures at every tick; empty where contrast has no best spin."""
-    results = [t.contrast if t.contrast is not None and t.contrast.magnitudes_rps.size else None for t in run.ticks]
+    found = [tick.get("contrast") for tick in run.ticks]
+    results = [result if result is not None and result.magnitudes_rps.size else None for result in found]
     spins = {
         "best": [np.empty((0, 3)) if result is None else result.best_rps[None] for result in results],
         "rivals": [np.empty((0, 3)) if result is None else result.rivals_rps for result in results],
@@ -52,7 +53,9 @@ def score_chunks(run: Run) -> list[Chunk]:
     return [*_over_magnitude(run, results, spins), *_over_axes(run, results, spins)]
 
 
-def _over_magnitude(run: Run, results: list[ContrastResult | None], spins: dict[str, list[Floats]]) -> list[Chunk]:
+def _over_magnitude(
+    run: ViewedRun, results: list[ContrastResult | None], spins: dict[str, list[Floats]]
+) -> list[Chunk]:
     """Bars over rps: the score and the marks; those below zero may have other axes."""
     curves = [(np.empty(0), np.empty(0)) if r is None else (r.magnitudes_rps, r.magnitude_scores) for r in results]
     widths = [float(x[1] - x[0]) if x.size > 1 else 1.0 for x, _ in curves]
@@ -71,7 +74,7 @@ def _over_magnitude(run: Run, results: list[ContrastResult | None], spins: dict[
 _NONE: tuple[Floats, Floats] = (np.empty(0), np.empty(0))
 
 
-def _over_axes(run: Run, results: list[ContrastResult | None], spins: dict[str, list[Floats]]) -> list[Chunk]:
+def _over_axes(run: ViewedRun, results: list[ContrastResult | None], spins: dict[str, list[Floats]]) -> list[Chunk]:
     """Two discs of axis directions: those towards the camera and those away from it, x right and y down in both."""
     times, pictures = [run.start_us], [np.full((COARSE, COARSE_WIDTH, 3), at.BACKGROUND, np.uint8)]
     last: Floats | None = None

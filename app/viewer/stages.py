@@ -20,7 +20,7 @@ from . import entities as at
 from .plots import from_start, rate_chunks, residual_plots, spin_chunks, state_plots, true_state
 from .png import png
 from .rerun_api import Chunk, columns_at, line, once, states, styled
-from .run import Run
+from .run import ViewedRun
 
 Floats = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ WHEEL_PX = 128
 DASHES = 12
 
 
-def filter_chunks(run: Run) -> list[Chunk]:
+def filter_chunks(run: ViewedRun) -> list[Chunk]:
     """Raw events in the colours of their polarity, dimmed where the surface's filter took them out."""
     total = sum(len(tick.packet.events) for tick in run.ticks)
     keep_every = max(1, -(-total // EVENTS_SHOWN))
@@ -64,7 +64,7 @@ def filter_chunks(run: Run) -> list[Chunk]:
     ]
 
 
-def surface_chunks(run: Run) -> list[Chunk]:
+def surface_chunks(run: ViewedRun) -> list[Chunk]:
     """The surface as it was searched, whole, in its own pixels."""
     blank = np.zeros((run.camera.height_px, run.camera.width_px), np.uint8)
     blobs = [png(blank), *(png(tick.surface.values) for tick in run.ticks)]
@@ -77,7 +77,7 @@ def surface_chunks(run: Run) -> list[Chunk]:
     ]
 
 
-def track_chunks(run: Run) -> list[Chunk]:
+def track_chunks(run: ViewedRun) -> list[Chunk]:
     """Circles on the image, the ball's place for what moves with it, plots of the state, the tracker's status."""
     tracks = [tick.track for tick in run.ticks]
     kalman = [
@@ -99,7 +99,7 @@ def track_chunks(run: Run) -> list[Chunk]:
     return chunks
 
 
-def logo_chunks(run: Run) -> list[Chunk]:
+def logo_chunks(run: ViewedRun) -> list[Chunk]:
     """The logo's events around the ball's centre at their own time, with the outline and the mask's edge."""
     logos = [tick.logo for tick in run.ticks]
     positions = [np.stack([logo.x_px, logo.y_px], axis=1) for logo in logos]
@@ -122,7 +122,7 @@ def logo_chunks(run: Run) -> list[Chunk]:
     ]
 
 
-def flow_chunks(run: Run) -> list[Chunk]:
+def flow_chunks(run: ViewedRun) -> list[Chunk]:
     """Triplet Matching's flow in the ball's frame, hue = direction, saturation = speed; and the wheel of colours."""
     half_px, bound_px_s = int(np.ceil(1.1 * run.largest_radius_px)), run.fast_flow_px_s or 1.0
     pictures = [
@@ -147,7 +147,7 @@ def flow_chunks(run: Run) -> list[Chunk]:
     ]
 
 
-STAGES: tuple[Callable[[Run], list[Chunk]], ...] = (
+STAGES: tuple[Callable[[ViewedRun], list[Chunk]], ...] = (
     filter_chunks,
     surface_chunks,
     track_chunks,
@@ -166,7 +166,7 @@ def _keys(events: object, start_us: int) -> NDArray[np.int64]:
 
 
 def _circles(
-    run: Run, entity: str, circles: Sequence[Circle | None], colour: at.Colour, width_ui: float
+    run: ViewedRun, entity: str, circles: Sequence[Circle | None], colour: at.Colour, width_ui: float
 ) -> list[Chunk]:
     """One circle a tick or none."""
     found = [circle for circle in circles if circle is not None]
@@ -181,13 +181,13 @@ def _circles(
     ]
 
 
-def _rings(run: Run, entity: str, radii_px: Sequence[float], colour: at.Colour) -> list[Chunk]:
+def _rings(run: ViewedRun, entity: str, radii_px: Sequence[float], colour: at.Colour) -> list[Chunk]:
     """A circle around the ball's own centre while there is a ball."""
     circles = [Circle(0.0, 0.0, radius, 1.0) if np.isfinite(radius) else None for radius in radii_px]
     return _circles(run, entity, circles, colour, 0.8)
 
 
-def _ball_place(run: Run) -> Chunk:
+def _ball_place(run: ViewedRun) -> Chunk:
     """The ball's centre, from which views in the ball's frame look; the nearest known one while there is no ball."""
     known = np.flatnonzero(run.has_ball)
     places = np.full((len(run.ticks) + 1, 2), (run.camera.width_px / 2, run.camera.height_px / 2))
@@ -198,7 +198,7 @@ def _ball_place(run: Run) -> Chunk:
     return columns_at(at.BALL_PLACE, run.times_us, rr.Transform3D.columns(translation=translation))
 
 
-def _true_circle(run: Run) -> list[Chunk]:
+def _true_circle(run: ViewedRun) -> list[Chunk]:
     """The true outline, dashed."""
     state = true_state(run)
     angles = np.linspace(0, 2 * np.pi, 4 * DASHES, endpoint=False).reshape(DASHES, 4)[:, :3]

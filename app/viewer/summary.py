@@ -13,12 +13,12 @@ from PIL import Image, ImageDraw, ImageFont
 
 from spinscope.pipeline.chain import Tick
 from spinscope.pipeline.results import SpinEstimate
+from spinscope.pipeline.spin_terms import Kind, axis_words, kind_of_spin, km_h, rpm, speed_words, std_words
 
-from ..words import Kind, axis_words, kind_of_spin, km_h, rpm, speed_words, std_words
 from . import entities as at
 from .png import png
 from .rerun_api import Chunk, columns_at, once, styled
-from .run import Run, shown_estimate
+from .run import ViewedRun, shown_estimate
 
 Vector = NDArray[np.float64]
 Block = tuple[str, str]  # big letters, small print
@@ -31,7 +31,7 @@ TEXT, FAINT = 240, 150  # grey values
 SLOWEST_M_S = 0.2
 
 
-def summary_chunks(run: Run) -> list[Chunk]:
+def summary_chunks(run: ViewedRun) -> list[Chunk]:
     """The summary and the card at the start and at the end of every tick."""
     texts, cards = [_opening(run)], [(("-", "spin"), ("-", "speed"), ("No ball yet", run.no_shot_reason or ""))]
     finals = {shot.end_us: shot for shot in run.shots}
@@ -44,7 +44,7 @@ def summary_chunks(run: Run) -> list[Chunk]:
         now = _Now(run, tick, velocity, true_rps)
         if shot is not None:
             milliseconds = (shot.end_us - shot.start_us) / 1000
-            result = now.told(f"shot {shot.number + 1} of {len(run.shots)}, {milliseconds:.0f} ms")
+            result = now.told(f"shot {list(finals).index(shot.end_us) + 1} of {len(run.shots)}, {milliseconds:.0f} ms")
         if not tick.track.has_ball:
             text = _without_ball(run, tick, result)
         else:
@@ -65,7 +65,7 @@ class _Now:
     velocity_m_s : (3,) camera frame, None for a ball in place; true_rps : (3,) None where there is no truth
     """
 
-    run: Run
+    run: ViewedRun
     tick: Tick
     velocity_m_s: Vector | None
     true_rps: Vector | None
@@ -136,14 +136,14 @@ class _Now:
         )
 
 
-def _true_spins(run: Run) -> list[Vector | None]:
+def _true_spins(run: ViewedRun) -> list[Vector | None]:
     """The true spin at every tick; None where the ball does not spin or is not there."""
     if run.true_spins_rps is None:
         return [None] * len(run.ticks)
     return [spin if np.isfinite(spin).all() and spin.any() else None for spin in run.true_spins_rps]
 
 
-def _velocity_m_s(run: Run, tick: Tick) -> Vector | None:
+def _velocity_m_s(run: ViewedRun, tick: Tick) -> Vector | None:
     """The ball's velocity across the line of sight at the end of the tick; None for a ball in place or without one.
 
     The way towards the camera is left to the whole shot: in one tick the radius does not tell it.
@@ -158,7 +158,7 @@ def _velocity_m_s(run: Run, tick: Tick) -> Vector | None:
     return velocity if np.linalg.norm(velocity) >= SLOWEST_M_S else None
 
 
-def _opening(run: Run) -> str:
+def _opening(run: ViewedRun) -> str:
     """What is said before anything is known."""
     lines = ["## No ball yet", ""]
     if run.no_shot_reason:
@@ -167,7 +167,7 @@ def _opening(run: Run) -> str:
     return "\n".join([*lines, *_origin(run)])
 
 
-def _origin(run: Run) -> list[str]:
+def _origin(run: ViewedRun) -> list[str]:
     """What the run is of, and what people should know about it."""
     span = f"{run.start_us:,} to {run.end_us:,} us"
     return [
@@ -177,7 +177,7 @@ def _origin(run: Run) -> list[str]:
     ]
 
 
-def _without_ball(run: Run, tick: Tick, result: list[str]) -> list[str]:
+def _without_ball(run: ViewedRun, tick: Tick, result: list[str]) -> list[str]:
     """The last shot's result while no ball is there, or that there was none yet."""
     if result:
         return [*result, "", "---", f"Now: {tick.track.reason or 'no ball'}"]
@@ -195,7 +195,7 @@ def _magnitude(estimate: SpinEstimate) -> str:
     return f"{magnitude:.1f}" if std is None else f"{magnitude:.1f} ± {std_words(std)}"
 
 
-def _evidence(run: Run, tick: Tick) -> list[str]:
+def _evidence(run: ViewedRun, tick: Tick) -> list[str]:
     """What the answer stands on: the tracker, the logo, the rhythm."""
     rate, flow = tick.rate, tick.flow
     if rate.spin_rps is None:
@@ -217,7 +217,7 @@ def _evidence(run: Run, tick: Tick) -> list[str]:
 
 def _contrast_words(tick: Tick) -> list[str]:
     """How sharp the logo is, over which time, and how near the next best spin comes."""
-    result = tick.contrast
+    result = tick.get("contrast")
     if result is None or not np.isfinite(result.best_rps).all():
         return []
     stretch = f"from {result.start_us / 1000:.1f} to {result.end_us / 1000:.1f} ms"
@@ -228,7 +228,7 @@ def _contrast_words(tick: Tick) -> list[str]:
     return [f"Contrast {result.contrast:.2f} an event over chance, {stretch}; {rivals}.", ""]
 
 
-def _card_chunks(run: Run, cards: list[Card]) -> list[Chunk]:
+def _card_chunks(run: ViewedRun, cards: list[Card]) -> list[Chunk]:
     """The card's blocks, one below the other, each where its words change."""
     chunks = []
     for number, column in enumerate(zip(*cards, strict=True)):

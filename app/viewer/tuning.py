@@ -22,12 +22,12 @@ from .ball import ball_chunks
 from .layouts import NAMES, blueprint
 from .painting import painting_chunks
 from .rerun_api import Chunk, columns_at, once, styled
-from .run import Run
+from .run import ViewedRun
 from .score import score_chunks
 from .stages import STAGES
 from .summary import summary_chunks
 
-Drawer = Callable[[Run], list[Chunk]]
+Drawer = Callable[[ViewedRun], list[Chunk]]
 
 A = "/A"
 COMPARED = "/compare"
@@ -65,13 +65,13 @@ class Drawings:
         """End the threads."""
         self._threads.shutdown(cancel_futures=True)
 
-    def begin(self, run: Run, keys: Mapping[str, Hashable]) -> None:
+    def begin(self, run: ViewedRun, keys: Mapping[str, Hashable]) -> None:
         """Draw what is known already of a run whose last stages are still to come, while they are computed."""
         for drawer, stage, key in _wanted(run, keys):
-            if getattr(run.ticks[0], stage) is not None:
+            if run.ticks[0].get(stage) is not None:
                 self._drawn(drawer, run, key)
 
-    def chunks(self, run: Run, keys: Mapping[str, Hashable]) -> list[Chunk]:
+    def chunks(self, run: ViewedRun, keys: Mapping[str, Hashable]) -> list[Chunk]:
         """Everything there is to see of a run.
 
         keys : what each stage's results were made from; what comes from the same looks alike
@@ -94,7 +94,7 @@ class Drawings:
                 total -= self._sizes.pop(old)
                 del self._made[old]
 
-    def _drawn(self, drawer: Drawer, run: Run, key: Hashable) -> Future[list[Chunk]]:
+    def _drawn(self, drawer: Drawer, run: ViewedRun, key: Hashable) -> Future[list[Chunk]]:
         with self._lock:
             drawn = self._made.get(key)
             if drawn is None or (drawn.done() and not _is_there(drawn)):
@@ -107,10 +107,10 @@ def _is_there(drawn: Future[list[Chunk]]) -> bool:
     return drawn.done() and not drawn.cancelled() and drawn.exception() is None
 
 
-def _wanted(run: Run, keys: Mapping[str, Hashable]) -> list[tuple[Drawer, str, Hashable]]:
+def _wanted(run: ViewedRun, keys: Mapping[str, Hashable]) -> list[tuple[Drawer, str, Hashable]]:
     """Each drawer with its stage, and what tells its drawing from all others."""
     return [
-        (drawer, stage, (number, len(run.ticks), keys[stage], getattr(run.ticks[0], stage) is None))
+        (drawer, stage, (number, len(run.ticks), keys[stage], run.ticks[0].get(stage) is None))
         for number, (drawer, stage) in enumerate(DRAWERS)
     ]
 
@@ -146,7 +146,7 @@ def rrd_bytes(chunks: Sequence[Chunk], recording_id: str) -> bytes:
         return path.read_bytes()
 
 
-def layout_bytes(run: Run, tab: str) -> bytes:
+def layout_bytes(run: ViewedRun, tab: str) -> bytes:
     """The blueprint of the page's viewer: the tabs of every viewer, and one for A beside B.
 
     tab : the name of the one in front; the first one when there is none of that name
@@ -168,18 +168,18 @@ def tab_names() -> list[str]:
     return [*names[:-1], COMPARE_NAME, names[-1]]
 
 
-def note_without_a(run: Run) -> list[Chunk]:
+def note_without_a(run: ViewedRun) -> list[Chunk]:
     """What the Compare tab says while nothing is pinned."""
     text = "## Nothing to compare yet\n\nPress **Pin as A** beside the viewer, then go on turning knobs: that is B."
     return _note(run, text)
 
 
-def note_with_a(run: Run, text: str) -> list[Chunk]:
+def note_with_a(run: ViewedRun, text: str) -> list[Chunk]:
     """The Compare tab's words about A and B, and which colour is which curve."""
     return _note(run, f"{text}\n\nCurves: {COLOUR_WORDS}. A is paler.")
 
 
-def _note(run: Run, text: str) -> list[Chunk]:
+def _note(run: ViewedRun, text: str) -> list[Chunk]:
     times = run.times_us[:1]
     return [
         columns_at(COMPARED, times, rr.TextDocument.columns(text=[text])),
@@ -187,7 +187,7 @@ def _note(run: Run, text: str) -> list[Chunk]:
     ]
 
 
-def _compare(run: Run) -> rrb.Container:
+def _compare(run: ViewedRun) -> rrb.Container:
     """A's and B's pictures side by side, their curves in the same plots."""
     return rrb.Vertical(
         rrb.Horizontal(
@@ -208,7 +208,7 @@ def _compare(run: Run) -> rrb.Container:
     )
 
 
-def _picture(run: Run, prefix: str, name: str) -> rrb.View:
+def _picture(run: ViewedRun, prefix: str, name: str) -> rrb.View:
     half = 2.4 * run.largest_radius_px
     circles = [prefix + path for path in (at.SURFACE, at.HOUGH, at.MEASURED, at.KALMAN, at.TRUE_CIRCLE)]
     return rrb.Spatial2DView(

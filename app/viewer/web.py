@@ -26,7 +26,7 @@ from spinscope.pipeline.errors import SpinscopeError
 from ..terminal import note
 from .recorded import write_rrd
 from .rerun_api import VERSION, playhead_request, program, quiet_environment
-from .run import Run
+from .run import ViewedRun
 
 HOST = "127.0.0.1"
 PREFERRED_PORT = 9090
@@ -41,7 +41,7 @@ TYPES = {
 }
 
 
-def show_web(run: Run, layout: str) -> None:
+def show_web(run: ViewedRun, layout: str) -> None:
     """Serve the run until Ctrl-C, open a browser if there is one, and say in one line where it is."""
     with served(run, layout) as (server, address):
         opened = _open_browser(address)
@@ -60,7 +60,7 @@ def show_web(run: Run, layout: str) -> None:
 
 
 @contextmanager
-def served(run: Run, layout: str) -> Iterator[tuple[http.server.ThreadingHTTPServer, str]]:
+def served(run: ViewedRun, layout: str) -> Iterator[tuple[http.server.ThreadingHTTPServer, str]]:
     """A server ready to run (`serve_forever`) and its address; closed at the end."""
     files = {f"/{path.name}": path.read_bytes() for path in PAGE.iterdir()}
     files["/"] = files.pop("/index.html").replace(b"VERSION", VERSION.encode())

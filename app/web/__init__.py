@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from spinscope.app.session import Choices
+from spinscope.pipeline.session import Choices
 
 
 def serve(path: Path, choices: Choices, port: int | None, open_browser: bool) -> None:

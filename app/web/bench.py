@@ -7,25 +7,23 @@ from __future__ import annotations
 
 import dataclasses
 import threading
-import time
 from collections import OrderedDict
 from collections.abc import Collection, Hashable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spinscope.app.session import Choices, Session
-from spinscope.pipeline.chain import STAGES, Chain, EventSource, Parameters, Source, Tick
+from spinscope.pipeline.chain import Chain, Tick
 from spinscope.pipeline.errors import ParameterError
-from spinscope.pipeline.results import Packet, Truth
+from spinscope.pipeline.registry import STAGES, Parameters
+from spinscope.pipeline.results import Truth
+from spinscope.pipeline.session import Choices, Session
+from spinscope.pipeline.shots import ShotLog
 
 SUFFIXES = (".h5", ".hdf5", ".raw", ".dat", ".npz")  # of recordings that are read
-# Takes longest, and no other stage reads it: computed last, or not at all where nobody asks for spins.
-LATE = ("contrast",)
 CHAIN_BYTES = 160_000_000  # a clip's columns: eight surfaces of a flight of 100 ms
 COLUMNS_KEPT = 200  # 40 settings of the logo, whose columns are small but many
 CLIPS_KEPT = 2
@@ -72,9 +70,7 @@ class Clip:
     def check(self, parameters: Parameters) -> None:
         """Raise ParameterError where the values do not go together, or the frames would not fit in memory."""
         source, chain = self.session.source, self.session.chain
-        setting = chain.setting(parameters)
-        for name, stage in STAGES.items():
-            stage.start(parameters.group(name), setting)
+        chain.check(parameters)
         ticks = chain.tick_count(parameters)
         if ticks * source.width_px * source.height_px > MOST_FRAMES_BYTES:
             raise ParameterError(
@@ -82,18 +78,18 @@ class Clip:
                 "take a longer tick or a shorter clip"
             )
 
-    def run(self, parameters: Parameters, without: Collection[str] = ()) -> Iterator[Progressed]:
+    def run(self, parameters: Parameters, targets: Collection[str] | None = None) -> Iterator[Progressed]:
         """The clip's ticks; the run may be abandoned between two of them. Several threads may run at once.
 
-        without : stages that are left out, see Chain.run
+        targets : stages whose results are wanted, see Chain.run
         """
-        whole, took = dict.fromkeys(STAGES, 0.0), dict.fromkeys(STAGES, 0.0)
+        whole, took = dict.fromkeys(STAGES.names, 0.0), dict.fromkeys(STAGES.names, 0.0)
         try:
-            for tick in self.session.chain.run(parameters, without=without, seconds=took):
+            for tick in self.session.chain.run(parameters, targets, seconds=took):
                 for stage, seconds in took.items():
                     whole[stage] += seconds
                 yield Progressed(tick, dict(took))
-                took.update(dict.fromkeys(STAGES, 0.0))
+                took.update(dict.fromkeys(STAGES.names, 0.0))
         finally:
             self._note_costs(parameters, whole)
 
@@ -224,15 +220,7 @@ class Bench:
             return clip
 
     def _new_clip(self, start_us: int, end_us: int) -> Clip:
-        whole = self.session.source
-        if (start_us, end_us) == self.window_us:
-            source = whole
-        else:
-            identity = (self.session.recording.identity(), (start_us, end_us))
-            part = whole.events.between(start_us, end_us)
-            source = EventSource(identity, part, whole.width_px, whole.height_px, start_us, end_us)
-        chain = Chain(source, budget_bytes=CHAIN_BYTES, most_columns=COLUMNS_KEPT, clock=time.perf_counter)
-        return Clip(dataclasses.replace(self.session, source=source, chain=chain))
+        return Clip(self.session.clip(start_us, end_us, budget_bytes=CHAIN_BYTES, max_columns=COLUMNS_KEPT))
 
     def first_clip_us(self) -> tuple[int, int]:
         """Where work starts: all of a short recording, the busiest part of a long one, which mostly is a shot."""
@@ -256,38 +244,17 @@ class Bench:
 
         Runs the tracker and what it needs alone, and keeps nothing: a column of frames of 20 s would take 4 GB.
         """
-        source, tick_us = self.session.source, parameters.track.tick_us
-        chain = Chain(source)
-        count, setting = chain.tick_count(parameters), chain.setting(parameters)
-        names = ("filter", "surface", "track")
-        states = {name: STAGES[name].start(parameters.group(name), setting) for name in names}
-        self.found = []
-        shot, begin_us, last_us = None, 0, 0
-        for index in range(count):
-            packet = _packet(source, tick_us, index)
-            results: dict[str, Any] = {"packet": packet}
-            for name in names:
-                inputs = (results[other] for other in STAGES[name].INPUTS)
-                results[name] = STAGES[name].step(parameters.group(name), states[name], *inputs)
-            track = results["track"]
-            if track.shot != shot:
-                if shot is not None:
-                    self.found = [*self.found, (begin_us, last_us)]
-                shot, begin_us = track.shot, packet.start_us
-            last_us = packet.end_us
+        chain = Chain(self.session.source)
+        count, log = chain.tick_count(parameters), ShotLog()
+        for index, tick in enumerate(chain.run(parameters, ("track",), forget=STAGES.names)):
+            log.add(tick)
+            self.found = [(shot.start_us, shot.end_us) for shot in log.shots]
             yield (index + 1) / count
-        if shot is not None:
-            self.found = [*self.found, (begin_us, last_us)]
+        log.close()
+        self.found = [(shot.start_us, shot.end_us) for shot in log.shots]
 
     def around(self, start_us: int, end_us: int) -> tuple[int, int]:
         """The window to work on for a shot: with a margin, within the recording and not too long."""
         first, last = self.window_us
         begin = max(first, start_us - MARGIN_US)
         return begin, min(last, end_us + MARGIN_US, begin + self.longest_us)
-
-
-def _packet(source: Source, tick_us: int, index: int) -> Packet:
-    """The events of one tick of the grid anchored at file time 0."""
-    number = source.start_us // tick_us + index
-    start_us, end_us = number * tick_us, min((number + 1) * tick_us, source.end_us)
-    return Packet(number, start_us, end_us, source.between(start_us, end_us))

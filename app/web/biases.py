@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from spinscope.app.simulate import BIASES, DESCRIPTION, simulate_again_to_file
 from spinscope.pipeline.biases import CURVES, BiasParameters, read_biases, write_biases
-from spinscope.pipeline.chain import Parameters
 from spinscope.pipeline.errors import ParameterError, RecordingError, SpinscopeError
 from spinscope.pipeline.events import EventBatch
-from spinscope.pipeline.recordings import Recording, open_recording
+from spinscope.pipeline.recordings import open_recording
+from spinscope.pipeline.registry import Parameters
+from spinscope.pipeline.session import AnyRecording
 from spinscope.pipeline.simulator import simulate_again
 
-from .bench import LATE, SUFFIXES, Bench, Clip
+from .bench import SUFFIXES, Bench, Clip
 from .jobs import Job
 
 NOISE, HOT, EDGE, LOGO = 0, 4, 1, 2  # labels of the simulator's truth
@@ -32,7 +33,7 @@ TOGETHER = {"diff_on_off": ("diff_on", "diff_off")}
 BESIDE_PX = 3.0
 
 
-def scene_of(recording: Recording) -> dict[str, Any] | None:
+def scene_of(recording: AnyRecording) -> dict[str, Any] | None:
     """What it takes to simulate the recording again; None where it carries no scene."""
     try:
         description = json.loads(str(recording.attributes.get(DESCRIPTION, "null")))
@@ -41,7 +42,7 @@ def scene_of(recording: Recording) -> dict[str, Any] | None:
     return description if isinstance(description, dict) else None
 
 
-def state_of(recording: Recording) -> dict[str, Any]:
+def state_of(recording: AnyRecording) -> dict[str, Any]:
     """For the page: the biases' declarations and values, whether they can be changed, and if not why."""
     values, locked = None, None
     beside = recording.path.with_suffix(".bias")
@@ -175,13 +176,13 @@ def _rates(
 def _on_ball(job: Job, clip: Clip, parameters: Parameters) -> NDArray[np.bool_]:
     """Which of the clip's events lie on the tracked ball or just beside it."""
     marks = [np.empty(0, np.bool_)]
-    for step in clip.run(parameters, LATE):
+    for step in clip.run(parameters, ("track",)):
         job.check()
-        events, track = step.tick.packet.events, step.tick.track
-        if not track.has_ball:
+        events, ball = step.tick.packet.events, step.tick.track.ball
+        if ball is None:
             marks.append(np.zeros(len(events), np.bool_))
             continue
-        x, y = track.centre_px(events.t_us)
+        x, y = ball.centre_px(events.t_us)
         distance_px = np.hypot(events.x_px - x, events.y_px - y)
-        marks.append(distance_px <= track.mean[4] + BESIDE_PX)
+        marks.append(distance_px <= ball.mean[4] + BESIDE_PX)
     return np.concatenate(marks)

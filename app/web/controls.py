@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from spinscope.pipeline.chain import STAGES, Parameters
 from spinscope.pipeline.parameters import Tunable
+from spinscope.pipeline.registry import Parameters
 
 # How a group of parameters is called where its own name says too little.
 TITLES = {
@@ -18,6 +18,7 @@ TITLES = {
 # Fields that have a section of their own, after their group's.
 OWN_SECTIONS = {"surface": {"Cleaning": ("cleaning",)}}
 # What belongs to the set-up and not to the method: a preset leaves it alone unless it names it itself.
+SETUP_GROUPS = ("camera", "ball")
 SETUP = {
     "camera": None,
     "ball": None,
@@ -30,7 +31,7 @@ LOGARITHMIC_FROM = 100
 def sections() -> list[dict[str, Any]]:
     """The page's groups of controls, stage by stage and then the set-up, with all that a control needs to know."""
     parameters = Parameters()
-    groups = [*STAGES, *(name for name in parameters.as_dict() if name not in STAGES)]
+    groups = sorted(parameters.as_dict(), key=lambda name: name in SETUP_GROUPS)
     made = []
     for group in groups:
         declared, own = parameters.group(group).tunables(), OWN_SECTIONS.get(group, {})
@@ -38,7 +39,7 @@ def sections() -> list[dict[str, Any]]:
         rest = tuple(field for field in declared if field not in named)
         for title, fields in {TITLES.get(group, group.capitalize()): rest, **own}.items():
             controls = [_control(group, field, declared[field]) for field in fields]
-            made.append({"title": title, "is_setup": group not in STAGES, "controls": controls})
+            made.append({"title": title, "is_setup": group in SETUP_GROUPS, "controls": controls})
     return made
 
 

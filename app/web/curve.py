@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from spinscope.pipeline.chain import Parameters
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.parameters import Tunable
+from spinscope.pipeline.registry import Parameters
 
 from .bench import Clip
 from .controls import scale_of
@@ -74,7 +74,7 @@ def _point(job: Job, clip: Clip, parameters: Parameters, change: dict[str, dict[
     except ParameterError as error:
         return {"error": str(error)}
     finished = finish(clip, tried, job.check)
-    found = measures(finished.session, finished.ticks, finished.shots, finished.no_shot_reason)
+    found = measures(finished)
     shot = main_shot(found)
     kept = ("tracked_share", "residual_px", "jitter_px", "logo_events")
     return {**{key: found[key] for key in kept}, "best": shot and shot["best"], "spin": shot["spin"] if shot else {}}

@@ -12,22 +12,20 @@ from typing import Any
 import cv2
 import numpy as np
 
-from spinscope.app.analyze import report
 from spinscope.app.viewer import save
 from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.session import Result
 
-from .runs import Finished
 
-
-def as_json(finished: Finished) -> str:
+def as_json(finished: Result) -> str:
     """What `spinscope analyze --json` writes for the clip with these settings, on one line."""
-    return json.dumps(_report(finished), allow_nan=False) + "\n"
+    return json.dumps(finished.to_dict(), allow_nan=False) + "\n"
 
 
-def spins_csv(finished: Finished) -> str:
+def spins_csv(finished: Result) -> str:
     """One row a shot and method."""
     rows = []
-    for number, shot in enumerate(_report(finished)["shots"]):
+    for number, shot in enumerate(finished.to_dict()["shots"]):
         own = {"shot": number + 1, **{key: shot[key] for key in ("start_us", "end_us", "speed_m_s", "logo_events")}}
         for method, estimate in shot["spin"].items():
             x, y, z = estimate["vector_rps"] or (None, None, None)
@@ -49,22 +47,21 @@ def spins_csv(finished: Finished) -> str:
     return _csv(rows)
 
 
-def track_csv(finished: Finished) -> str:
+def track_csv(finished: Result) -> str:
     """One row a shot and tick."""
     rows = []
-    for number, shot in enumerate(_report(finished)["shots"]):
+    for number, shot in enumerate(finished.to_dict()["shots"]):
         track = shot["track"]
         for index in range(len(track["t_us"])):
             rows.append({"shot": number + 1, **{name: column[index] for name, column in track.items()}})
     return _csv(rows)
 
 
-def as_rrd(finished: Finished) -> bytes:
+def as_rrd(finished: Result) -> bytes:
     """The run with its layouts, as `spinscope view --save` writes it."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "run.rrd"
-        reason = finished.no_shot_reason
-        save(finished.session, finished.ticks, finished.shots, path, no_shot_reason=reason)
+        save(finished, path)
         return path.read_bytes()
 
 
@@ -76,10 +73,6 @@ def picture_of(events: EventBatch, width_px: int, height_px: int) -> bytes:
     # The busiest thousandth are hot pixels and would leave the rest dark.
     top = max(float(np.quantile(bright, 0.999)), 1e-9)
     return bytes(cv2.imencode(".png", (255 * np.clip(bright / top, 0, 1)).astype(np.uint8))[1])
-
-
-def _report(finished: Finished) -> dict[str, Any]:
-    return report(finished.session, finished.shots, finished.no_shot_reason)
 
 
 def _csv(rows: list[dict[str, Any]]) -> str:

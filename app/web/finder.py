@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 
-from spinscope.pipeline.chain import Parameters
+from spinscope.pipeline.registry import Parameters
 
 from .bench import Bench
 from .jobs import fault

@@ -9,18 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spinscope.app.session import Session
-from spinscope.app.words import Kind, kind_of_spin, km_h, rpm
 from spinscope.pipeline.chain import Tick
 from spinscope.pipeline.results import SpinEstimate
+from spinscope.pipeline.session import Result, Session
 from spinscope.pipeline.shots import Shot
+from spinscope.pipeline.spin_terms import Kind, kind_of_spin, km_h, rpm
 
 Floats = NDArray[np.float64]
 
 
-def measures(
-    session: Session, ticks: Sequence[Tick], shots: Sequence[Shot], no_shot_reason: str | None
-) -> dict[str, Any]:
+def measures(result: Result) -> dict[str, Any]:
     """The numbers of a run, ready for JSON; None where there is nothing to be said.
 
     tracked_share : share of the ticks in which a circle was measured
@@ -29,14 +27,15 @@ def measures(
     logo_events : in all shots
     shots : each with start_us, end_us, speed_m_s, best, kind, the coach's sentence, and every method's estimate
     """
+    session, ticks = result.session, result.ticks
     return {
         "ticks": len(ticks),
         "tracked_share": sum(tick.track.measured is not None for tick in ticks) / max(len(ticks), 1),
         "residual_px": _residual_px(ticks),
         "jitter_px": _jitter_px(ticks),
         "logo_events": sum(len(tick.logo.events) for tick in ticks),
-        "shots": [_shot(session, shot) for shot in shots],
-        "no_shot_reason": no_shot_reason,
+        "shots": [_shot(session, shot) for shot in result.shots],
+        "no_shot_reason": result.no_shot_reason,
     }
 
 

@@ -11,15 +11,17 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
+from spinscope.app.viewer.run import ViewedRun
 from spinscope.app.viewer.tuning import Drawings, compared, note_with_a, note_without_a, rrd_bytes
-from spinscope.pipeline.chain import STAGES, Parameters, Tick
+from spinscope.pipeline.chain import Tick
+from spinscope.pipeline.registry import STAGES, Parameters, quick_stages
+from spinscope.pipeline.session import Result
 
-from .bench import LATE, Bench, Clip
+from .bench import Bench, Clip
 from .jobs import Job, fault
 from .measures import measures
 from .outbox import Outbox
 from .presets import differences
-from .runs import Finished
 
 # A page learns of a run's progress this often, and not at all of one that is over at once: every change of the page
 # has the browser put the whole picture together anew, in the very time in which it is waited for.
@@ -58,7 +60,7 @@ class _Report:
     outbox: Outbox
     serial: int
     began: float = field(default_factory=time.perf_counter)
-    seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys([*STAGES, "drawing"], 0.0))
+    seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys([*STAGES.names, "drawing"], 0.0))
     told: tuple[str, float] = ("", 0.0)  # what was told last, and when
     lock: threading.Lock = field(default_factory=threading.Lock)
 
@@ -89,7 +91,7 @@ class Page:
         self.outbox = Outbox()
         self.last_sign_of_life = time.monotonic()
         self.listeners = 0
-        self.finished: Finished | None = None
+        self.finished: Result | None = None
         self._drawings = drawings
         self._pictures: OrderedDict[str, bytes] = OrderedDict()
         self._jobs: dict[str, Job] = {}
@@ -185,10 +187,10 @@ class Page:
         parameters: Parameters,
         wanted: Wanted,
         report: _Report,
-        a: Finished | None = None,
+        a: Result | None = None,
         *,
         is_shown: bool = True,
-    ) -> Finished:
+    ) -> Result:
         """Run a clip to its end: the late stages in a thread of their own, behind the others.
 
         Where that takes long it shows, beside A if there is one, first what is there at the playhead. For a dragged
@@ -198,37 +200,37 @@ class Page:
         ticks: list[Tick] = []
         count = clip.session.chain.tick_count(parameters)
         began, playhead_us = time.perf_counter(), wanted.playhead_us if is_shown else None
-        is_first_early = is_shown and wanted.hasty and not clip.knows(parameters, LATE)
+        is_first_early = is_shown and wanted.hasty and not clip.knows(parameters, STAGES.names)
         late = None if is_first_early else self._late.submit(self._whole, clip, parameters, wanted, report)
-        for tick in self._steps(clip, parameters, wanted, report, LATE):
+        for tick in self._steps(clip, parameters, wanted, report, quick_stages()):
             ticks.append(tick)
             if playhead_us is not None and tick.packet.end_us >= playhead_us and len(ticks) >= TIMED_TICKS:
                 playhead_us = None
                 rest_s = (time.perf_counter() - began) / len(ticks) * (count - len(ticks))
                 if rest_s > REST_WORTH_WAITING_S:
-                    self._show(wanted, clip, Finished.of(session, ticks), a, report, partial=True)
-        early = Finished.of(session, ticks)
+                    self._show(wanted, clip, Result.of(session, ticks), a, report, partial=True)
+        early = Result.of(session, ticks)
         if is_first_early:
             self._show(wanted, clip, early, a, report, partial=True)
         else:
-            self._drawings.begin(early.run, clip.keys(parameters))
+            self._drawings.begin(ViewedRun.of(early), clip.keys(parameters))
         whole = self._whole(clip, parameters, wanted, report) if late is None else late.result()
-        return Finished.of(session, whole)
+        return Result.of(session, whole)
 
     def _whole(self, clip: Clip, parameters: Parameters, wanted: Wanted, report: _Report) -> list[Tick]:
         """All ticks with all stages' results."""
         ticks: list[Tick] = []
         count = clip.session.chain.tick_count(parameters)
-        for tick in self._steps(clip, parameters, wanted, report, ()):
+        for tick in self._steps(clip, parameters, wanted, report, None):
             ticks.append(tick)
             report.tell("computing", len(ticks) / count)
         return ticks
 
     def _steps(
-        self, clip: Clip, parameters: Parameters, wanted: Wanted, report: _Report, without: Collection[str]
+        self, clip: Clip, parameters: Parameters, wanted: Wanted, report: _Report, targets: Collection[str] | None
     ) -> Iterator[Tick]:
         """The clip's ticks, until something newer is wanted."""
-        for step in clip.run(parameters, without):
+        for step in clip.run(parameters, targets):
             if self._is_old(wanted):
                 raise Superseded
             report.add(step.seconds)
@@ -238,8 +240,8 @@ class Page:
         self,
         wanted: Wanted,
         clip: Clip,
-        b: Finished,
-        a: Finished | None,
+        b: Result,
+        a: Result | None,
         report: _Report,
         *,
         partial: bool = False,
@@ -249,12 +251,12 @@ class Page:
             raise Superseded
         report.tell("drawing", 1.0)
         began = time.perf_counter()
-        chunks = self._drawings.chunks(b.run, clip.keys(b.session.parameters))
+        chunks = self._drawings.chunks(ViewedRun.of(b), clip.keys(b.session.parameters))
         if a is None:
-            chunks = [*chunks, *note_without_a(b.run)]
+            chunks = [*chunks, *note_without_a(ViewedRun.of(b))]
         else:
-            a_chunks = self._drawings.chunks(a.run, clip.keys(a.session.parameters))
-            chunks = [*chunks, *compared(a_chunks), *note_with_a(b.run, _difference_text(a, b))]
+            a_chunks = self._drawings.chunks(ViewedRun.of(a), clip.keys(a.session.parameters))
+            chunks = [*chunks, *compared(a_chunks), *note_with_a(ViewedRun.of(b), _difference_text(a, b))]
         recording_id = f"{self.id}-{wanted.serial}{f'-part{len(b.ticks)}' if partial else ''}"
         picture = rrd_bytes(chunks, recording_id)
         report.seconds["drawing"] += time.perf_counter() - began
@@ -270,9 +272,9 @@ class Page:
             force=True,
             recording=recording_id,
             bytes=len(picture),
-            start_us=b.run.start_us,
-            end_us=b.run.end_us,
-            opening_us=b.run.opening_us,
+            start_us=ViewedRun.of(b).start_us,
+            end_us=ViewedRun.of(b).end_us,
+            opening_us=ViewedRun.of(b).opening_us,
             measures=_measured(clip, b) if is_whole else None,
             pinned_measures=None if a is None else _measured(clip, a),
             differs=[] if a is None else differences(a.session.parameters, b.session.parameters),
@@ -282,13 +284,13 @@ class Page:
         return self._closed or wanted.serial != self._newest
 
 
-def _measured(clip: Clip, finished: Finished) -> dict[str, Any]:
-    made = measures(finished.session, finished.ticks, finished.shots, finished.no_shot_reason)
+def _measured(clip: Clip, finished: Result) -> dict[str, Any]:
+    made = measures(finished)
     costs = clip.cost_of(finished.session.parameters)
     return {**made, "stage_ms": {stage: 1000 * seconds for stage, seconds in costs.items()}}
 
 
-def _difference_text(a: Finished, b: Finished) -> str:
+def _difference_text(a: Result, b: Result) -> str:
     """What the Compare tab says of A and B; the page's own table says more."""
     rows = differences(a.session.parameters, b.session.parameters)
     if not rows:

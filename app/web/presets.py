@@ -7,9 +7,9 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from spinscope.app.session import PRESETS
-from spinscope.pipeline.chain import Parameters
 from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.presets import FOLDER
+from spinscope.pipeline.registry import Parameters
 
 from .controls import setup_of
 
@@ -22,7 +22,7 @@ BIAS_FILE, AGAIN_FILE = "spinscope.bias", "again.h5"  # what the page saves, and
 def built_in(opened: Parameters) -> dict[str, Values]:
     """The presets by name, each in the set-up of the opened recording; `opened` is what it was opened with."""
     found = {}
-    for path in sorted(PRESETS.glob("*.toml")):
+    for path in sorted(FOLDER.glob("*.toml")):
         found[path.stem] = applied(path.read_text(encoding="utf-8"), opened).as_dict()
     found["opened"] = opened.as_dict()
     return found

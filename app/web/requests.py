@@ -6,8 +6,8 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from spinscope.pipeline.chain import Parameters
 from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.registry import Parameters
 
 Values = dict[str, dict[str, Any]]
 TEXT_MOST = 100_000

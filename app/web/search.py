@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from spinscope.pipeline.chain import Parameters
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.parameters import Tunable
+from spinscope.pipeline.registry import Parameters
 
 from .bench import Clip
 from .controls import scale_of
@@ -100,7 +100,7 @@ def _cost(job: Job, clip: Clip, parameters: Parameters, values: dict[str, Any], 
     except ParameterError:
         return 2 * REFUSED  # values that do not go together, like a smallest radius above the largest
     finished = finish(clip, tried, job.check)
-    return cost_of(measures(finished.session, finished.ticks, finished.shots, finished.no_shot_reason), objective)
+    return cost_of(measures(finished), objective)
 
 
 def _suggested(trial: Any, name: str, tunable: Tunable) -> Any:

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import uvicorn
 
-from spinscope.app.session import Choices
 from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.session import Choices
 
 from .bench import Bench
 from .web import application

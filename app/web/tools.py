@@ -12,8 +12,8 @@ from fastapi import FastAPI, HTTPException, Response
 from starlette.concurrency import run_in_threadpool
 
 from spinscope.pipeline.biases import BiasParameters, read_biases, write_biases
-from spinscope.pipeline.chain import Parameters
 from spinscope.pipeline.errors import ParameterError, SpinscopeError
+from spinscope.pipeline.registry import Parameters
 from spinscope.pipeline.stages.fixed_ball import find_fixed_ball
 
 from . import biases, curve, exports, search
@@ -79,9 +79,9 @@ def _add_ball(app: FastAPI, page_of: PageOf) -> None:
     @app.post("/api/pages/{page_id}/find_ball")
     async def find_ball(page_id: str, request: Settings) -> dict[str, Any]:
         clip, parameters = clip_of(page_of(page_id), request)
-        setting, track = clip.session.chain.setting(parameters), parameters.track
+        camera, track = clip.session.chain.camera(parameters), parameters.track
         limits = track.radius_min_px, track.radius_max_px
-        circle, std_px = await run_in_threadpool(find_fixed_ball, clip.session.source.events, setting, *limits)
+        circle, std_px = await run_in_threadpool(find_fixed_ball, clip.session.source.events, camera, *limits)
         found = {"x": circle.x_px, "y": circle.y_px, "radius": circle.radius_px, "std": std_px}
         return {f"fixed_{name}_px": round(float(value), 2) for name, value in found.items() if math.isfinite(value)}
 

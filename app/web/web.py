@@ -16,9 +16,10 @@ from fastapi.staticfiles import StaticFiles
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException as StarletteHTTPException
 
+from spinscope.app.viewer.run import ViewedRun
 from spinscope.app.viewer.tuning import layout_bytes, tab_names
-from spinscope.pipeline.chain import STAGES
 from spinscope.pipeline.errors import SpinscopeError
+from spinscope.pipeline.registry import STAGES
 
 from . import presets
 from .assets import STATIC, viewer_script, viewer_version, viewer_wasm
@@ -124,7 +125,7 @@ def _page_routes(app: FastAPI, workshop: Workshop, version: str, page_of: PageOf
         page = page_of(page_id)
         if page.finished is None:
             raise HTTPException(409, "nothing has been computed yet")
-        made = await run_in_threadpool(layout_bytes, page.finished.run, tab)
+        made = await run_in_threadpool(layout_bytes, ViewedRun.of(page.finished), tab)
         return Response(made, media_type="application/octet-stream", headers={"cache-control": "no-store"})
 
 
@@ -160,7 +161,7 @@ def _opening(workshop: Workshop, page: Page, version: str) -> dict[str, Any]:
         "recording": _recording(bench),
         "recordings": workshop.recordings(),
         "sections": sections(),
-        "stages": list(STAGES),
+        "stages": list(STAGES.names),
         "presets": presets.built_in(opened),
         "tabs": tab_names(),
         "biases": state_of(bench.session.recording),

@@ -8,9 +8,9 @@ from collections import OrderedDict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from spinscope.app.session import Choices
 from spinscope.app.viewer.tuning import Drawings
 from spinscope.pipeline.errors import ParameterError, RecordingError
+from spinscope.pipeline.session import Choices
 
 from .bench import SUFFIXES, Bench
 from .finder import ShotFinder

@@ -16,15 +16,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..chain import Chain, EventSource, Parameters, Tick
-from ..results import SpinEstimate, frozen
+from ..chain import Chain, EventsInMemory
+from ..registry import STAGES, Parameters
+from ..results import MethodResult, SpinEstimate, frozen
 from ..simulator import flight, human_shot, spinner, thrown
 from ..simulator.scene import Scene
 from ..simulator.sensor import Sensor
 from ..simulator.simulation import SimulatedRecording, simulate
-from ..stages import contrast, logo
-from ..stages.spin import SpinResult
-from ..stages.track import TrackResult
+from ..stages.track import BallTrack
 
 Floats = NDArray[np.float64]
 
@@ -92,23 +91,23 @@ def _outcome(name: str, case: str, recording: SimulatedRecording, seed: int) -> 
         circle |= {"fixed_radius_px": truth.radius_px[0] + radius, "fixed_std_px": CENTRE_STD_PX}
         values = {"ball": "fixed", **{key: float(value) for key, value in circle.items()}}
         parameters = parameters.with_values({"track": values})
-    source = EventSource(name, recording.events, recording.width_px, recording.height_px, 0, int(truth.t_us[-1]))
+    source = EventsInMemory(name, recording.events, recording.width_px, recording.height_px, 0, int(truth.t_us[-1]))
     chain = Chain(source)
-    setting = chain.setting(parameters)
-    state, last, end_us = contrast.start(parameters.contrast, setting), None, 0
-    for tick in chain.run(parameters, forget=("surface",), without=("contrast",)):
-        if not tick.track.has_ball:
+    stage, mask_stage = STAGES["contrast"], STAGES["logo"]
+    state, last, end_us = chain.start(parameters, stage), None, 0
+    for tick in chain.run(parameters, ("logo", "normal_flow"), forget=("surface",)):
+        ball, events, normal_flow = tick.track.ball, tick.logo, tick.normal_flow
+        if ball is None:
             continue
-        track, events, spin = tick.track, tick.logo, tick.spin
         if case == CASES[1]:
             known = SpinEstimate("normal_flow", frozen(truth.spin_rps[0].copy()), np.eye(3), None)
-            spin = SpinResult({**spin.estimates, "normal_flow": known})
+            normal_flow = MethodResult(known)
         elif case != CASES[0]:
             late = case == CASES[2]
-            track = _true_track(tick, recording, track.latency_us if late else 0.0)
+            ball = _true_ball(ball, tick.packet.end_us, recording, ball.latency_us if late else 0.0)
             mask = parameters.logo if late else replace(parameters.logo, delay_us=0.0)
-            events = logo.step(mask, logo.start(mask, setting), tick.packet, tick.filter, track)
-        last = contrast.step(parameters.contrast, state, tick.packet, track, events, spin)
+            events = mask_stage.step(mask, chain.start(parameters, mask_stage), tick.packet, tick.filter, ball)
+        last = stage.step(parameters.contrast, state, tick.packet, ball, events, normal_flow)
         end_us = tick.packet.end_us
     if last is None:
         return None
@@ -128,16 +127,16 @@ def _outcome(name: str, case: str, recording: SimulatedRecording, seed: int) -> 
     )
 
 
-def _true_track(tick: Tick, recording: SimulatedRecording, latency_us: float) -> TrackResult:
-    """The tick's track with the true circle and speed, known to a hundredth of a pixel."""
-    truth, t_us = recording.truth, tick.packet.end_us - latency_us
+def _true_ball(ball: BallTrack, end_us: int, recording: SimulatedRecording, latency_us: float) -> BallTrack:
+    """The tick's ball with the true circle and speed, known to a hundredth of a pixel."""
+    truth, t_us = recording.truth, end_us - latency_us
     before, now = (
         np.array([np.interp(at, truth.t_us, column) for column in (truth.x_px, truth.y_px, truth.radius_px)])
         for at in (t_us - 5000.0, t_us)
     )
     mean = np.array([*now[:2], *((now[:2] - before[:2]) / 5e-3), now[2]])
     covariance = np.diag([1e-4, 1e-4, 1.0, 1.0, 1e-4])
-    return replace(tick.track, t_us=t_us, latency_us=latency_us, mean=frozen(mean), covariance=frozen(covariance))
+    return replace(ball, t_us=t_us, latency_us=latency_us, mean=frozen(mean), covariance=frozen(covariance))
 
 
 def budget_table(found: Sequence[Outcome], kind: str) -> str:

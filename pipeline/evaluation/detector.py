@@ -22,7 +22,6 @@ SEED = 73_000  # of this suite alone: nothing was tuned on these recordings
 SPEEDS_M_S = tuple(float(speed) for speed in range(4, 21, 2))
 SCENES = ("one ball", "two balls", "arm")
 FLIGHTS = 3  # of each speed and scene
-AFTER_TRACK = ("logo", "rate", "flow", "spin", "contrast")  # of no concern here
 STAGES = ("hough", "hough + kalman", "refined", "refined + kalman")
 
 # The paper's filter, fed with the Hough circle: its error is about a pixel, its start knows nothing of the velocity.
@@ -58,10 +57,10 @@ def measure(bench: Bench, scene: str, speed_m_s: float, seed: int) -> list[Row]:
     recording = rendered(bench, shown, seed=seed)
     about: Row = {"scene": scene, "speed_m_s": speed_m_s, "seed": seed}
     chain = Chain(source_of(recording))
-    focal_px = chain.setting(bench.parameters).camera.focal_px
+    focal_px = chain.camera(bench.parameters).focal_px
     follower = HoughKalman(bench.parameters.ball, focal_px)
     rows: list[Row] = []
-    for tick in chain.run(bench.parameters, forget=("surface",), without=AFTER_TRACK):
+    for tick in chain.run(bench.parameters, ("track",), forget=("surface",)):
         found = _found(tick, follower)
         truth = _truth_at(recording, tick.track.t_us)
         if truth is not None:

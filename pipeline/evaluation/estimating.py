@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..chain import Chain, EventSource, Parameters
-from ..methods import METHODS
+from ..chain import Chain, EventsInMemory
+from ..registry import Parameters, methods
 from ..results import Truth
 from ..shots import Shot, ShotLog
 from .rendering import Rendered
@@ -17,10 +17,10 @@ LOGO = 2  # the truth's label of the logo's events
 BEST = "best"  # what the program itself trusts
 
 
-def source_of(recording: Rendered, window_us: tuple[int, int] | None = None) -> EventSource:
+def source_of(recording: Rendered, window_us: tuple[int, int] | None = None) -> EventsInMemory:
     """The recording, or a window of it: nothing outside may be used."""
     start_us, end_us = window_us or (0, recording.duration_us)
-    return EventSource(
+    return EventsInMemory(
         (recording.identity, start_us, end_us),
         recording.events.between(start_us, end_us),
         recording.width_px,
@@ -32,11 +32,7 @@ def source_of(recording: Rendered, window_us: tuple[int, int] | None = None) -> 
 
 def shots_of(recording: Rendered, parameters: Parameters, window_us: tuple[int, int] | None = None) -> ShotLog:
     """The shots that the pipeline finds."""
-    log = ShotLog()
-    for tick in Chain(source_of(recording, window_us)).run(parameters, forget=("surface",)):
-        log.add(tick)
-    log.close()
-    return log
+    return ShotLog.of(Chain(source_of(recording, window_us)).run(parameters, forget=("surface",)))
 
 
 def longest(log: ShotLog) -> Shot | None:
@@ -54,7 +50,7 @@ def estimate_rows(log: ShotLog, truth: Truth, about: Row) -> list[Row]:
     """One row a method and one for `best`: its errors against the truth, or why there is no answer."""
     shot = longest(log)
     rows: list[Row] = []
-    for name in (*(METHODS if shot is None else shot.estimates), BEST):
+    for name in (*([method.name for method in methods()] if shot is None else shot.estimates), BEST):
         method = name if name != BEST else None if shot is None else shot.best
         row: Row = {**about, "method": name, "shots": len(log.shots)}
         errors = None if shot is None or method is None else shot.error_against(truth, method)

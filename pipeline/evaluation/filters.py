@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..chain import STAGES, Chain
+from ..chain import Chain
 from ..events import EventBatch
+from ..registry import STAGES
 from ..results import Packet
 from .estimating import COLUMNS, estimate_rows, method_line, shots_of, source_of
 from .tables import Cell, Row, Table, distinct, summary, where
@@ -41,7 +42,6 @@ def measure_kept(bench: Bench, setting: list[int]) -> list[Row]:
     recording = flight_of(bench, velocity, spin, bool(side), seed)
     label = recording.truth.label
     packet = Packet(0, 0, recording.duration_us, recording.events)
-    surroundings = Chain(source_of(recording)).setting(bench.parameters)
     rows: list[Row] = []
     for mode in FILTERS:
         for threshold_us in THRESHOLDS_US:
@@ -49,7 +49,8 @@ def measure_kept(bench: Bench, setting: list[int]) -> list[Row]:
                 {"mode": mode, "threshold_us": threshold_us, "logo_mode": mode, "logo_threshold_us": threshold_us}
             )
             stage = STAGES["filter"]
-            passed = stage.step(parameters, stage.start(parameters, surroundings), packet).surface_events
+            state = Chain(source_of(recording)).start(bench.parameters.with_groups(filter=parameters), stage)
+            passed = stage.step(parameters, state, packet).surface_events
             kept = np.isin(_keys(recording.events), _keys(passed))
             row: Row = {"question": "kept", "seed": seed, "mode": mode, "threshold_us": threshold_us}
             row["kept_all"] = float(kept.mean())

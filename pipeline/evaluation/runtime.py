@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 
-from ..chain import STAGES as STAGES
 from ..chain import Chain
+from ..registry import STAGES as REGISTERED
 from . import paper
 from .estimating import source_of
 from .tables import Cell, Row, Table, distinct, summary, where
@@ -14,8 +14,9 @@ from .thrower import flight_of, settings
 from .work import Bench, Task
 
 # The paper's "from the moment the events are received": up to the logo's events; the rest is spin estimation.
+STAGES = REGISTERED.names
 LATENCY_STAGES = ("filter", "surface", "track", "logo")
-SPIN_STAGES = ("rate", "flow", "spin")  # the paper's method, and normal flow beside it
+SPIN_STAGES = ("rate", "flow", "triplet", "normal_flow")  # the paper's method, and normal flow beside it
 TICKS_US = (5000, 1000)  # the paper's 200 Hz, and the shortest useful
 SHARES = ("spin", "contrast", "all")
 EVERY = 8  # every so many of the thrower's flights are taken

@@ -18,8 +18,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from ..chain import Parameters
 from ..errors import ParameterError, RecordingError
+from ..registry import Parameters
 from .tables import Row
 
 PIPELINE = Path(__file__).parents[1]

@@ -7,25 +7,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..camera import Setting
 from ..events import EventBatch
 from ..kernels import filter as kernels
 from ..kernels.rows import taken
 from ..parameters import ParameterGroup, choice, tunable
 from ..results import Packet
+from ..stage import Context, Stage
 
-INPUTS = ("packet",)
-# Each at the place that its kernel's number (OFF, STC, TRAIL, STC_CUT_TRAIL) says.
-MODES = ("off", "stc", "trail", "stc_cut_trail")
+MODES = {"off": kernels.OFF, "stc": kernels.STC, "trail": kernels.TRAIL, "stc_cut_trail": kernels.STC_CUT_TRAIL}
 
 
 @dataclass(frozen=True, kw_only=True)
 class FilterParameters(ParameterGroup):
     """One setting for the events that draw the surface and one for those that carry the logo."""
 
-    mode: str = choice("stc_cut_trail", MODES, "filter of the events that draw the surface")
+    mode: str = choice("stc_cut_trail", tuple(MODES), "filter of the events that draw the surface")
     threshold_us: int = tunable(5000, 1, 1_000_000, 100, "us", "time window of the surface's filter")
-    logo_mode: str = choice("trail", MODES, "filter of the events that carry the logo and refine the circle")
+    logo_mode: str = choice("trail", tuple(MODES), "filter of the events that carry the logo and refine the circle")
     logo_threshold_us: int = tunable(5000, 1, 1_000_000, 100, "us", "time window of the logo's filter")
 
 
@@ -45,9 +43,9 @@ class FilterState:
     width_px: int
 
 
-def start(parameters: FilterParameters, setting: Setting) -> FilterState:
+def start(parameters: FilterParameters, context: Context) -> FilterState:
     """No pixel has seen an event."""
-    camera = setting.camera
+    camera = context.camera
     return FilterState(np.full(camera.width_px * camera.height_px, kernels.NEVER), camera.width_px)
 
 
@@ -57,8 +55,8 @@ def step(parameters: FilterParameters, state: FilterState, packet: Packet) -> Fi
     Filters with the same setting give one and the same batch; a filter that is off gives the packet's own.
     """
     events = packet.events
-    surface = (MODES.index(parameters.mode), parameters.threshold_us)
-    logo = (MODES.index(parameters.logo_mode), parameters.logo_threshold_us)
+    surface = (MODES[parameters.mode], parameters.threshold_us)
+    logo = (MODES[parameters.logo_mode], parameters.logo_threshold_us)
     if surface[0] == logo[0] == kernels.OFF:
         return FilterResult(events, events)
     rows, logo_rows = kernels.passing(state.last, state.width_px, *events.columns, *surface, *logo)
@@ -67,3 +65,15 @@ def step(parameters: FilterParameters, state: FilterState, packet: Packet) -> Fi
         return FilterResult(surface_events, surface_events)
     logo_events = events if logo[0] == kernels.OFF else EventBatch(*taken(logo_rows, *events.columns))
     return FilterResult(surface_events, logo_events)
+
+
+STAGE = Stage(
+    name="filter",
+    label="Filter",
+    help="Spatio-temporal contrast (STC) and TRAIL filters: fewer redundant events and less noise.",
+    scope="recording",
+    inputs=("packet",),
+    parameters=FilterParameters,
+    start=start,
+    step=step,
+)

@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..camera import Setting
+from ..camera import Camera
 from ..errors import RecordingError
 from ..events import EventBatch
 from ..results import Circle
@@ -37,14 +37,13 @@ REMEDY = "give the circle instead: --fixed-ball X_PX Y_PX RADIUS_PX"
 
 
 def find_fixed_ball(
-    events: EventBatch, setting: Setting, radius_min_px: float, radius_max_px: float
+    events: EventBatch, camera: Camera, radius_min_px: float, radius_max_px: float
 ) -> tuple[Circle, float]:
     """The ball's circle and its 1 sigma in px (the larger of centre and radius), best effort.
 
     The score is the share of the directions from the centre in which the path reaches the circle.
     Raises RecordingError when the events draw no path that could be a logo's, or one that fits many circles.
     """
-    camera = setting.camera
     pixel = events.y_px.astype(np.int64) * camera.width_px + events.x_px
     counts = np.bincount(pixel, minlength=camera.width_px * camera.height_px)
     counts = counts.reshape(camera.height_px, camera.width_px)

@@ -9,19 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..camera import Setting
 from ..kernels.plane_flow import plane_flow
 from ..kernels.triplet import earlier_neighbours, triplet_flow
 from ..parameters import ParameterGroup, choice, tunable
 from ..results import Packet, frozen
+from ..stage import Context, Stage
 from .logo import LogoResult
 from .rate import RateResult
-from .track import TrackResult
+from .track import BallTrack
 
 Floats = NDArray[np.float64]
-
-INPUTS = ("packet", "track", "logo", "rate")
-ALSO = (("spin", "max_spin_rps"),)
 
 SLICES_A_ROTATION = 10  # section 3.3
 # Of t_acc: an edge at half the equator's speed crosses the reach of 3 px in 0.6 t_acc on the paper's 33 px ball; the
@@ -88,7 +85,7 @@ class FlowResult:
 
 
 @dataclass(frozen=True, slots=True)
-class LogoEvents:
+class FlowEvents:
     """Columns of logo events, in order of time; see FlowResult for what they hold."""
 
     t_us: NDArray[np.int64]
@@ -102,84 +99,53 @@ class LogoEvents:
     centre_y_px: NDArray[np.float64]
 
     @classmethod
-    def of(cls, logo: LogoResult) -> LogoEvents:
-        return cls(
-            logo.events.t_us,
-            logo.x_px,
-            logo.y_px,
-            logo.events.on,
-            logo.points_m,
-            logo.normals,
-            logo.of_outline,
-            logo.centre_x_px,
-            logo.centre_y_px,
-        )
+    def of(cls, logo: LogoResult) -> FlowEvents:
+        """The logo events of one tick."""
+        return cls(*(getattr(logo.events if name in ("t_us", "on") else logo, name) for name in cls.__slots__))
 
-    def __getitem__(self, rows: slice | NDArray[np.bool_] | NDArray[np.int64]) -> LogoEvents:
-        return LogoEvents(
-            self.t_us[rows],
-            self.x_px[rows],
-            self.y_px[rows],
-            self.on[rows],
-            self.points_m[rows],
-            self.normals[rows],
-            self.of_outline[rows],
-            self.centre_x_px[rows],
-            self.centre_y_px[rows],
-        )
+    def __getitem__(self, rows: slice | NDArray[np.bool_] | NDArray[np.int64]) -> FlowEvents:
+        return FlowEvents(*(getattr(self, name)[rows] for name in self.__slots__))
 
     @classmethod
-    def joined(cls, parts: Sequence[LogoEvents]) -> LogoEvents:
+    def joined(cls, parts: Sequence[FlowEvents]) -> FlowEvents:
         """Events that follow each other in time, as one; at least one part."""
-        return cls(
-            np.concatenate([part.t_us for part in parts]),
-            np.concatenate([part.x_px for part in parts]),
-            np.concatenate([part.y_px for part in parts]),
-            np.concatenate([part.on for part in parts]),
-            np.concatenate([part.points_m for part in parts]),
-            np.concatenate([part.normals for part in parts]),
-            np.concatenate([part.of_outline for part in parts]),
-            np.concatenate([part.centre_x_px for part in parts]),
-            np.concatenate([part.centre_y_px for part in parts]),
-        )
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls.__slots__))
 
-    def between(self, start_us: float, end_us: float) -> LogoEvents:
+    def between(self, start_us: float, end_us: float) -> FlowEvents:
         """The events of [start_us, end_us)."""
         first, last = np.searchsorted(self.t_us, [start_us, end_us])
         return self[int(first) : int(last)]
 
 
-NO_EVENTS = LogoEvents(
-    np.empty(0, np.int64),
-    np.empty(0),
-    np.empty(0),
-    np.empty(0, np.bool_),
-    np.empty((0, 3)),
-    np.empty((0, 3)),
-    np.empty(0, np.bool_),
-    np.empty(0),
-    np.empty(0),
-)
+_NONE, _NOWHERE, _NO = np.empty(0), np.empty((0, 3)), np.empty(0, np.bool_)
+NO_EVENTS = FlowEvents(np.empty(0, np.int64), _NONE, _NONE, _NO, _NOWHERE, _NOWHERE, _NO, _NONE, _NONE)
 
 
 @dataclass(slots=True)
-class State:
-    """What of the present shot is still to be worked on."""
+class FlowState:
+    """Events of the shot that are still to be worked on; times are None before the first tick."""
 
-    setting: Setting
-    shot: int | None = None
-    events: LogoEvents = NO_EVENTS
-    slice_start_us: int = 0
+    max_spin_rps: float
+    events: FlowEvents = NO_EVENTS
+    slice_start_us: int | None = None
     slice_index: int = 0
     planes_until_us: float = 0.0
 
 
-def start(parameters: FlowParameters, setting: Setting) -> State:
-    return State(setting)
+def start(parameters: FlowParameters, context: Context) -> FlowState:
+    """No events yet."""
+    return FlowState(context["spin.max_spin_rps"])
+
+
+def absent(parameters: FlowParameters, reason: str) -> FlowResult:
+    """No flow, because there is no ball."""
+    nothing = np.empty(0)
+    none = (NO_EVENTS, nothing, nothing, np.empty(0, np.int64))
+    return _result(None, math.nan, math.nan, none, (NO_EVENTS, np.empty((0, 2)), nothing, np.empty(0, np.bool_)))
 
 
 def step(
-    parameters: FlowParameters, state: State, packet: Packet, track: TrackResult, logo: LogoResult, rate: RateResult
+    parameters: FlowParameters, state: FlowState, packet: Packet, ball: BallTrack, logo: LogoResult, rate: RateResult
 ) -> FlowResult:
     """Flow of all slices that have ended, and normal flow of the events whose neighbourhood is complete.
 
@@ -189,19 +155,13 @@ def step(
     t_acc = 1 / (10 spin): the paper prints ceil(omega / 10), which is not a time; "we divided each rotation into 10
     time slices" is. Until the event rate has a rhythm, t_acc_from = rate uses the expected spin.
     """
-    nothing = np.empty(0)
-    if not track.has_ball:
-        state.shot, state.events = None, NO_EVENTS
-        none = (NO_EVENTS, nothing, nothing, np.empty(0, np.int64))
-        return _result(None, math.nan, math.nan, none, (NO_EVENTS, np.empty((0, 2)), nothing, np.empty(0, np.bool_)))
-    if track.shot != state.shot:
-        state.shot, state.events = track.shot, NO_EVENTS
-        state.slice_start_us, state.slice_index, state.planes_until_us = packet.start_us, 0, packet.start_us
-    state.events = LogoEvents.joined([state.events, LogoEvents.of(logo)])
+    if state.slice_start_us is None:
+        state.slice_start_us, state.planes_until_us = packet.start_us, packet.start_us
+    state.events = FlowEvents.joined([state.events, FlowEvents.of(logo)])
     t_acc_us = _t_acc_us(parameters, rate)
-    bound_px_s = 2 * math.pi * state.setting.max_spin_rps * logo.radius_px
+    bound_px_s = 2 * math.pi * state.max_spin_rps * logo.radius_px
     triplets = _ended_slices(parameters, state, packet.end_us, t_acc_us, bound_px_s)
-    planes = _planes(parameters, state, track, packet.end_us, t_acc_us, bound_px_s)
+    planes = _planes(parameters, state, ball, packet.end_us, t_acc_us, bound_px_s)
     keep_us = min(state.slice_start_us, state.planes_until_us - PLANE_REACH * t_acc_us)
     state.events = state.events.between(keep_us, packet.end_us)
     return _result(t_acc_us, bound_px_s, logo.radius_px, triplets, planes)
@@ -218,9 +178,10 @@ def _t_acc_us(parameters: FlowParameters, rate: RateResult) -> int:
 
 
 def _ended_slices(
-    parameters: FlowParameters, state: State, end_us: int, t_acc_us: int, bound_px_s: float
-) -> tuple[LogoEvents, Floats, Floats, NDArray[np.int64]]:
+    parameters: FlowParameters, state: FlowState, end_us: int, t_acc_us: int, bound_px_s: float
+) -> tuple[FlowEvents, Floats, Floats, NDArray[np.int64]]:
     """Events with flow of the slices that end by end_us, their flow and their slice."""
+    assert state.slice_start_us is not None
     events, vx, vy, index = [NO_EVENTS], [np.empty(0)], [np.empty(0)], [np.empty(0, np.int64)]
     while state.slice_start_us + t_acc_us <= end_us:
         piece = state.events.between(state.slice_start_us, state.slice_start_us + t_acc_us)
@@ -238,12 +199,12 @@ def _ended_slices(
         index.append(np.full(int(has.sum()), state.slice_index, np.int64))
         state.slice_start_us += t_acc_us
         state.slice_index += 1
-    return LogoEvents.joined(events), np.concatenate(vx), np.concatenate(vy), np.concatenate(index)
+    return FlowEvents.joined(events), np.concatenate(vx), np.concatenate(vy), np.concatenate(index)
 
 
 def _planes(
-    parameters: FlowParameters, state: State, track: TrackResult, end_us: int, t_acc_us: int, bound_px_s: float
-) -> tuple[LogoEvents, Floats, Floats, NDArray[np.bool_]]:
+    parameters: FlowParameters, state: FlowState, ball: BallTrack, end_us: int, t_acc_us: int, bound_px_s: float
+) -> tuple[FlowEvents, Floats, Floats, NDArray[np.bool_]]:
     """Events that are PLANE_REACH t_acc old and have normal flow, its directions and speeds, and in which frame.
 
     Without the events of the outline: they would be taken for a logo that stands still.
@@ -254,7 +215,7 @@ def _planes(
     most = max(PLANES_PER_MS * (until_us - state.planes_until_us) * 1e-3, 1.0)
     stride = max(1, math.ceil((last - first) / most))
     state.planes_until_us = until_us
-    scales_us, ball_px_s = np.array(PLANE_SCALES) * t_acc_us, track.mean[2:4]
+    scales_us, ball_px_s = np.array(PLANE_SCALES) * t_acc_us, ball.mean[2:4]
     ball_speed_px_s = float(np.linalg.norm(ball_px_s))
     rows, directions, speeds = plane_flow(
         events.t_us, events.x_px, events.y_px, events.on, first, last, stride, parameters.reach_px, reach_us,
@@ -282,8 +243,8 @@ def _result(
     t_acc_us: int | None,
     bound_px_s: float,
     radius_px: float,
-    triplets: tuple[LogoEvents, Floats, Floats, NDArray[np.int64]],
-    planes: tuple[LogoEvents, Floats, Floats, NDArray[np.bool_]],
+    triplets: tuple[FlowEvents, Floats, Floats, NDArray[np.int64]],
+    planes: tuple[FlowEvents, Floats, Floats, NDArray[np.bool_]],
 ) -> FlowResult:
     full, vx_px_s, vy_px_s, slice_index = triplets
     normal, direction, speed_px_s, in_image = planes
@@ -308,3 +269,16 @@ def _result(
         normal_speed_px_s=frozen(speed_px_s),
         normal_in_image=frozen(in_image),
     )
+
+
+STAGE = Stage(
+    name="flow",
+    label="t_acc and flow",
+    help="Optical flow of the logo in the ball's frame, by Triplet Matching and by local planes.",
+    inputs=("packet", "ball", "logo", "rate"),
+    reads=("spin.max_spin_rps",),
+    parameters=FlowParameters,
+    start=start,
+    step=step,
+    absent=absent,
+)

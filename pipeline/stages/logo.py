@@ -8,17 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..camera import Setting
 from ..events import EventBatch
 from ..kernels.logo import logo_rows, outline_like
 from ..kernels.rows import taken
 from ..kernels.sphere import meet_ball
 from ..parameters import ParameterGroup, tunable
 from ..results import Packet, frozen
+from ..stage import Context, Stage
 from .filter import FilterResult
-from .track import TrackResult
-
-INPUTS = ("packet", "filter", "track")
+from .track import BallTrack
 
 Floats = NDArray[np.float64]
 
@@ -104,39 +102,42 @@ class LogoResult:
     velocity_std_px_s: float
 
 
-def start(parameters: LogoParameters, setting: Setting) -> Setting:
-    """The state is the setting alone: every tick stands on its own."""
-    return setting
+def start(parameters: LogoParameters, context: Context) -> Context:
+    """The state is the context alone: every tick stands on its own."""
+    return context
+
+
+def absent(parameters: LogoParameters, reason: str) -> LogoResult:
+    """No logo events, because there is no ball."""
+    none, nowhere = frozen(np.empty(0)), frozen(np.empty((0, 3)))
+    no = frozen(np.empty(0, np.bool_))
+    turning = TurningEvents(frozen(np.empty(0, np.int64)), no, nowhere, none, none)
+    empty = (EventBatch.empty(), none, none, none, none)
+    return LogoResult(*empty, math.nan, parameters.pad_px, nowhere, nowhere, no, turning, *(math.nan,) * 3)
 
 
 def step(
-    parameters: LogoParameters, state: Setting, packet: Packet, filtered: FilterResult, track: TrackResult
+    parameters: LogoParameters, state: Context, packet: Packet, filtered: FilterResult, ball: BallTrack
 ) -> LogoResult:
-    """The tick's logo events; empty without a ball. A coasting ball counts.
+    """The tick's logo events. A coasting ball counts.
 
     Deviations from equation ball_pos: the paper carries the ball forward from the previous update to the event; here
     the tick is complete before its events are sorted out, so the ball is carried back from this tick's update, which
     has seen it. Both ends carry the pixels' latency: the outline's for the mask, which keeps the outline out, and
     `delay_us` more for the place on the ball.
     """
-    if not track.has_ball:
-        none, nowhere = frozen(np.empty(0)), frozen(np.empty((0, 3)))
-        no = frozen(np.empty(0, np.bool_))
-        turning = TurningEvents(frozen(np.empty(0, np.int64)), no, nowhere, none, none)
-        empty = (EventBatch.empty(), none, none, none, none)
-        return LogoResult(*empty, math.nan, parameters.pad_px, nowhere, nowhere, no, turning, *(math.nan,) * 3)
-    radius_px, moving = float(track.mean[4]), bool(track.mean[2:4].any())
+    radius_px, moving = float(ball.mean[4]), bool(ball.mean[2:4].any())
     pad_px = parameters.pad_px if moving else parameters.fixed_pad_px
     rim_pad_px = parameters.rim_pad_px if moving else parameters.fixed_rim_pad_px
-    events, inside = _logo_events(filtered.logo_events, track, radius_px - pad_px, radius_px - rim_pad_px)
-    centre_x, centre_y = track.centre_px(events.t_us.astype(np.float64) - parameters.delay_us)
+    events, inside = _logo_events(filtered.logo_events, ball, radius_px - pad_px, radius_px - rim_pad_px)
+    centre_x, centre_y = ball.centre_px(events.t_us.astype(np.float64) - parameters.delay_us)
     camera = state.camera
     rays = camera.rays(events.x_px, events.y_px)
     middles = camera.rays(centre_x, centre_y)
     x, y = (rays[:, 0] - middles[:, 0]) * camera.focal_px, (rays[:, 1] - middles[:, 1]) * camera.focal_px
-    knots_m = _knots_m(packet, track, parameters.delay_us, state)
+    knots_m = _knots_m(packet, ball, parameters.delay_us, state)
     points, normals = meet_ball(rays, events.t_us, packet.start_us, packet.end_us, knots_m, state.ball_radius_m)
-    of_outline = _of_outline(x, y, events.on, track)
+    of_outline = _of_outline(x, y, events.on, ball)
     rows, own = np.flatnonzero(inside), np.flatnonzero(~of_outline)
     return LogoResult(
         events=EventBatch(*(frozen(column[rows]) for column in events.columns)),
@@ -152,14 +153,14 @@ def step(
         turning=TurningEvents(
             *(frozen(column[own]) for column in (events.t_us, events.on, normals, centre_x, centre_y))
         ),
-        position_std_px=math.sqrt(0.5 * (track.covariance[0, 0] + track.covariance[1, 1])),
-        radius_std_px=math.sqrt(track.covariance[4, 4]),
-        velocity_std_px_s=math.sqrt(0.5 * (track.covariance[2, 2] + track.covariance[3, 3])),
+        position_std_px=math.sqrt(0.5 * (ball.covariance[0, 0] + ball.covariance[1, 1])),
+        radius_std_px=math.sqrt(ball.covariance[4, 4]),
+        velocity_std_px_s=math.sqrt(0.5 * (ball.covariance[2, 2] + ball.covariance[3, 3])),
     )
 
 
 def _logo_events(
-    events: EventBatch, track: TrackResult, mask_px: float, rim_px: float
+    events: EventBatch, ball: BallTrack, mask_px: float, rim_px: float
 ) -> tuple[EventBatch, NDArray[np.bool_]]:
     """The events inside the mask and those of the rim that are not the outline's; which (n,) are inside the mask.
 
@@ -167,10 +168,10 @@ def _logo_events(
     flights 3 in 100,000 of its events are of the other polarity, and nearly all OFF events ahead and ON events behind
     are the logo's, up to the outline itself. A fixed ball's outline is silent.
     """
-    x, y, vx, vy, radius_px = track.mean.tolist()
+    x, y, vx, vy, radius_px = ball.mean.tolist()
     rows, inside, likes, others = logo_rows(
         *events.columns,
-        track.t_us + track.latency_us,
+        ball.t_us + ball.latency_us,
         (x, y),
         (vx, vy),
         mask_px,
@@ -182,7 +183,7 @@ def _logo_events(
     return EventBatch(*taken(rows, *events.columns)), inside
 
 
-def _of_outline(x_px: Floats, y_px: Floats, on: NDArray[np.bool_], track: TrackResult) -> NDArray[np.bool_]:
+def _of_outline(x_px: Floats, y_px: Floats, on: NDArray[np.bool_], ball: BallTrack) -> NDArray[np.bool_]:
     """(n,) whether events look like the shaded rim of a bright ball that moves over a darker ground.
 
     A ball lit from above dims towards its rim, by a contrast threshold of 25 % at two thirds of the radius (the
@@ -190,17 +191,29 @@ def _of_outline(x_px: Floats, y_px: Floats, on: NDArray[np.bool_], track: TrackR
     those before the front half are still reporting ON there; both stand still in the ball's frame and so look like a
     logo that does not turn. They lie within 60 degrees of the direction of motion.
     """
-    _, _, vx, vy, radius_px = track.mean.tolist()
+    _, _, vx, vy, radius_px = ball.mean.tolist()
     if math.hypot(vx, vy) < OUTLINE_SPEED_PX_S:
         return np.zeros(on.size, np.bool_)
     return outline_like(x_px, y_px, on, (vx, vy), OUTLINE_SHARE * radius_px)
 
 
-def _knots_m(packet: Packet, track: TrackResult, delay_us: float, setting: Setting) -> NDArray[np.float64]:
+def _knots_m(packet: Packet, ball: BallTrack, delay_us: float, context: Context) -> NDArray[np.float64]:
     """(k, 3) the ball's centre at k times spread evenly over the packet, as the logo's events tell it."""
-    _, _, vx, vy, radius_px = track.mean.tolist()
+    _, _, vx, vy, radius_px = ball.mean.tolist()
     span_us = packet.end_us - packet.start_us
     count = 1 + math.ceil(math.hypot(vx, vy) * span_us * 1e-6 / KNOT_SPACING_PX)
     times_us = packet.start_us + np.arange(count, dtype=np.float64) * (span_us / max(count - 1, 1))
-    x_px, y_px = track.centre_px(times_us - delay_us)
-    return setting.camera.ball_centre_m(x_px, y_px, np.full(count, radius_px), setting.ball_radius_m)
+    x_px, y_px = ball.centre_px(times_us - delay_us)
+    return context.camera.ball_centre_m(x_px, y_px, np.full(count, radius_px), context.ball_radius_m)
+
+
+STAGE = Stage(
+    name="logo",
+    label="Logo",
+    help="Events inside the moving ball less a pad, each placed on the ball at its own time.",
+    inputs=("packet", "filter", "ball"),
+    parameters=LogoParameters,
+    start=start,
+    step=step,
+    absent=absent,
+)

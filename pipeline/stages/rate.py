@@ -8,15 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..camera import Setting
 from ..kernels.rate import autocorrelation, falling_crossings, low_passed, moving_average, shortest_period
 from ..parameters import ParameterGroup, choice, tunable
 from ..results import Packet, frozen
+from ..stage import Context, Stage
 from .logo import LogoResult
-from .track import TrackResult
-
-INPUTS = ("packet", "track", "logo")
-ALSO = (("spin", "max_spin_rps"),)
 
 # Fewer logo events than this in the window have no rhythm that could be told from chance.
 FEWEST_EVENTS = 100
@@ -64,53 +60,53 @@ class RateResult:
 
 
 @dataclass(slots=True)
-class State:
-    """Counts of the present shot, bin by bin."""
+class RateState:
+    """Counts of the shot, bin by bin, from bin number `first_bin` of the file's time on; None before the first tick."""
 
     max_spin_rps: float
-    shot: int | None = None
-    first_bin: int = 0
+    first_bin: int | None = None
     counts: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
 
 
-def start(parameters: RateParameters, setting: Setting) -> State:
-    return State(setting.max_spin_rps)
+def start(parameters: RateParameters, context: Context) -> RateState:
+    """No events yet."""
+    return RateState(context["spin.max_spin_rps"])
 
 
-def step(parameters: RateParameters, state: State, packet: Packet, track: TrackResult, logo: LogoResult) -> RateResult:
+def absent(parameters: RateParameters, reason: str) -> RateResult:
+    """No rate, because there is no ball."""
+    return _without_period(parameters, np.empty(0, np.int64), np.empty(0), "no ball")
+
+
+def step(parameters: RateParameters, state: RateState, packet: Packet, logo: LogoResult) -> RateResult:
     """The event rate up to the end of the tick and, once it has a rhythm, the spin magnitude behind it.
 
     The magnitude is the rate of the logo's reappearance, seen from the camera: while the ball flies past, the line
     of sight turns too, which adds or takes up to speed / (2 pi distance), about 0.7 rps at 9 m/s and 2 m.
     """
-    if not track.has_ball:
-        state.shot, state.counts = None, np.empty(0, np.int64)
-        return _silent(parameters, np.empty(0, np.int64), np.empty(0), "no ball")
-    if track.shot != state.shot:
-        state.shot, state.first_bin = track.shot, -(-packet.start_us // parameters.bin_us)
-        state.counts = np.empty(0, np.int64)
-    _count(parameters, state, packet, logo)
-    ended = packet.end_us // parameters.bin_us - state.first_bin
+    first_bin = _count(parameters, state, packet, logo)
+    ended = packet.end_us // parameters.bin_us - first_bin
     counts = state.counts[: max(ended, 0)]
-    t_us = (state.first_bin + np.arange(counts.size)) * parameters.bin_us
+    t_us = (first_bin + np.arange(counts.size)) * parameters.bin_us
     rate_hz = counts / (parameters.bin_us * 1e-6)
     if counts.sum() < FEWEST_EVENTS:
-        return _silent(parameters, t_us, rate_hz, f"{counts.sum()} logo events, {FEWEST_EVENTS} are needed")
-    return _listen(parameters, state.max_spin_rps, t_us, rate_hz)
+        return _without_period(parameters, t_us, rate_hz, f"{counts.sum()} logo events, {FEWEST_EVENTS} are needed")
+    return _with_period(parameters, state.max_spin_rps, t_us, rate_hz)
 
 
-def _count(parameters: RateParameters, state: State, packet: Packet, logo: LogoResult) -> None:
-    """Add the tick's events to the bins; forget the bins before the window."""
-    bins = logo.events.t_us // parameters.bin_us - state.first_bin
-    length = max(-(-packet.end_us // parameters.bin_us) - state.first_bin, 0)
+def _count(parameters: RateParameters, state: RateState, packet: Packet, logo: LogoResult) -> int:
+    """Add the tick's events to the bins, forget those before the window, and return the number of the first bin."""
+    first_bin = -(-packet.start_us // parameters.bin_us) if state.first_bin is None else state.first_bin
+    bins = logo.events.t_us // parameters.bin_us - first_bin
+    length = max(-(-packet.end_us // parameters.bin_us) - first_bin, 0)
     counts = np.bincount(bins[bins >= 0], minlength=length)
     counts[: state.counts.size] += state.counts
     forget = max(length - parameters.window_us // parameters.bin_us, 0)
-    state.first_bin += forget
-    state.counts = counts[forget:]
+    state.counts, state.first_bin = counts[forget:], first_bin + forget
+    return state.first_bin
 
 
-def _silent(
+def _without_period(
     parameters: RateParameters, t_us: NDArray[np.int64], rate_hz: NDArray[np.float64], reason: str
 ) -> RateResult:
     """A result without rhythm, with the curves as far as they go."""
@@ -127,7 +123,7 @@ def _ema_weight(parameters: RateParameters) -> float:
     return 1.0 - math.exp(-parameters.bin_us / parameters.ema_us)
 
 
-def _listen(
+def _with_period(
     parameters: RateParameters, max_spin_rps: float, t_us: NDArray[np.int64], rate_hz: NDArray[np.float64]
 ) -> RateResult:
     """Moving average, mean removed, low-pass, falling zero crossings, mean interval.
@@ -173,3 +169,16 @@ def _spin(
     if intervals_s.size == 1:
         spread_s = max(spread_s, 0.5 * IRREGULAR * mean_s)
     return 1.0 / mean_s, spread_s / mean_s**2 / math.sqrt(intervals_s.size), None
+
+
+STAGE = Stage(
+    name="rate",
+    label="Event rate",
+    help="Rate of the logo's events, its moving average, and the rotation that its zero crossings tell.",
+    inputs=("packet", "logo"),
+    reads=("spin.max_spin_rps",),
+    parameters=RateParameters,
+    start=start,
+    step=step,
+    absent=absent,
+)

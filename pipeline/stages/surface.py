@@ -2,30 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..camera import Setting
+from ..events import EventBatch
 from ..kernels import eros, isolated, surfaces
 from ..parameters import ParameterGroup, choice, tunable
 from ..results import Packet, frozen
+from ..stage import Context, Stage
 from .filter import FilterResult
 
-INPUTS = ("packet", "filter")
+KINDS = ("eros", "accumulated", "linear")
+# The rules of removal, and whether each is the printed kernel.
+CLEANINGS = {"off": None, "isolated": False, "printed": True}
 
 
 @dataclass(frozen=True, kw_only=True)
 class SurfaceParameters(ParameterGroup):
     """Which surface, and how it is cleaned."""
 
-    kind: str = choice("eros", ("eros", "accumulated", "linear"), "EROS, accumulated frame or linear time surface")
+    kind: str = choice("eros", KINDS, "EROS, accumulated frame or linear time surface")
     k_px: int = tunable(
         10, 1, eros.K_MAX_PX, 1, "px", "EROS: width of the block that an event fades (forced odd, 10 -> 11)"
     )
     span_us: int = tunable(2000, 100, 100_000, 100, "us", "accumulated, linear: how far back in time it shows")
-    cleaning: str = choice("isolated", ("off", "isolated", "printed"), "removal of isolated pixels before the search")
+    cleaning: str = choice("isolated", tuple(CLEANINGS), "removal of isolated pixels before the search")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,58 +53,79 @@ class SurfaceResult:
         height, width = self.values.shape
         x0, y0 = min(max(x0_px, 0), width), min(max(y0_px, 0), height)
         x1, y1 = max(min(x1_px, width), x0), max(min(y1_px, height), y0)
-        if self.cleaning == "off":
+        is_printed = CLEANINGS[self.cleaning]
+        if is_printed is None:
             return self.values[y0:y1, x0:x1].copy()
         window = np.empty((y1 - y0, x1 - x0), np.uint8)
         if window.size:
-            isolated.copy_cleaned(window, self.values, x0, y0, self.cleaning == "printed")
+            isolated.copy_cleaned(window, self.values, x0, y0, is_printed)
         return window
 
 
-@dataclass(slots=True, eq=False)
-class ErosState:
-    """The pixels' lives (flat uint8, see the kernel) and what each life reads."""
+class ErosSurface:
+    """EROS: an event sets its pixel to 255 and fades the block around it (section 3.1; see kernels.eros)."""
 
-    lives: NDArray[np.uint8]
-    table: NDArray[np.uint8]
+    def __init__(self, parameters: SurfaceParameters, width_px: int, height_px: int) -> None:
+        self._width_px, self._height_px = width_px, height_px
+        self._k_px = eros.odd_px(parameters.k_px)
+        self._lives = eros.no_lives(width_px, height_px)  # flat uint8, see the kernel
+        self._table = eros.values_of_lives(parameters.k_px)
 
-
-@dataclass(slots=True, eq=False)
-class LastEventState:
-    """The time of each pixel's last event: (height, width) int64, us."""
-
-    last_us: NDArray[np.int64]
-
-
-@dataclass(slots=True, eq=False)
-class SurfaceState:
-    """What the surface remembers, and its size."""
-
-    height_px: int
-    width_px: int
-    memory: ErosState | LastEventState
+    def update(self, packet: Packet, events: EventBatch) -> NDArray[np.uint8]:
+        """Draw the tick's events and return the (height, width) uint8 surface at its end."""
+        values = np.zeros((self._height_px, self._width_px), np.uint8)
+        eros.draw(self._lives, self._width_px, self._k_px, len(self._table) - 1, events.x_px, events.y_px)
+        eros.read(values, self._lives, self._table)
+        return values
 
 
-def start(parameters: SurfaceParameters, setting: Setting) -> SurfaceState:
+class LastEventSurface:
+    """Surface read from the time of each pixel's last event: accumulated frame, or linear time surface.
+
+    Parameters
+    ----------
+    is_linear : bool
+        Whether pixels fade linearly with the age of their last event, or are 255 for the whole span.
+    """
+
+    def __init__(self, parameters: SurfaceParameters, width_px: int, height_px: int, *, is_linear: bool) -> None:
+        self._span_us, self._is_linear = parameters.span_us, is_linear
+        self._last_us = np.full((height_px, width_px), surfaces.NEVER_US)
+
+    def update(self, packet: Packet, events: EventBatch) -> NDArray[np.uint8]:
+        """Remember the tick's events and return the (height, width) uint8 surface at its end."""
+        values = np.zeros(self._last_us.shape, np.uint8)
+        surfaces.remember(self._last_us, events.t_us, events.x_px, events.y_px)
+        surfaces.read(values, self._last_us, packet.end_us, self._span_us, self._is_linear)
+        return values
+
+
+Surface = ErosSurface | LastEventSurface
+# The choices of surface.kind, each with what draws it.
+_SURFACES: dict[str, Callable[[SurfaceParameters, int, int], Surface]] = {
+    "eros": ErosSurface,
+    "accumulated": partial(LastEventSurface, is_linear=False),
+    "linear": partial(LastEventSurface, is_linear=True),
+}
+
+
+def start(parameters: SurfaceParameters, context: Context) -> Surface:
     """An empty surface."""
-    height, width = setting.camera.height_px, setting.camera.width_px
-    memory: ErosState | LastEventState
-    if parameters.kind == "eros":
-        memory = ErosState(eros.no_lives(width, height), eros.values_of_lives(parameters.k_px))
-    else:
-        memory = LastEventState(np.full((height, width), surfaces.NEVER_US))
-    return SurfaceState(height, width, memory)
+    return _SURFACES[parameters.kind](parameters, context.camera.width_px, context.camera.height_px)
 
 
-def step(parameters: SurfaceParameters, state: SurfaceState, packet: Packet, filtered: FilterResult) -> SurfaceResult:
+def step(parameters: SurfaceParameters, state: Surface, packet: Packet, filtered: FilterResult) -> SurfaceResult:
     """Draw the tick's filtered events and read the surface at its end."""
-    events, memory = filtered.surface_events, state.memory
-    values = np.zeros((state.height_px, state.width_px), np.uint8)
-    if isinstance(memory, ErosState):
-        full = len(memory.table) - 1
-        eros.draw(memory.lives, state.width_px, eros.odd_px(parameters.k_px), full, events.x_px, events.y_px)
-        eros.read(values, memory.lives, memory.table)
-    else:
-        surfaces.remember(memory.last_us, events.t_us, events.x_px, events.y_px)
-        surfaces.read(values, memory.last_us, packet.end_us, parameters.span_us, parameters.kind == "linear")
-    return SurfaceResult(frozen(values), parameters.cleaning)
+    return SurfaceResult(frozen(state.update(packet, filtered.surface_events)), parameters.cleaning)
+
+
+STAGE = Stage(
+    name="surface",
+    label="Surface (EROS)",
+    help="Exponential reduced ordinal surface of the filtered events, in which the ball is looked for.",
+    scope="recording",
+    inputs=("packet", "filter"),
+    parameters=SurfaceParameters,
+    start=start,
+    step=step,
+)

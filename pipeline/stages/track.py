@@ -15,11 +15,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..camera import Setting
 from ..errors import ParameterError
 from ..events import EventBatch
 from ..parameters import ParameterGroup, choice, tunable
 from ..results import Circle, Packet, frozen
+from ..stage import Context, Stage
 from .filter import FilterResult
 from .surface import SurfaceResult
 from .track_hough import hough_near
@@ -27,7 +27,6 @@ from .track_kalman import OBSERVED, OBSERVED_BLOCK, BallFilter, load_filter
 from .track_outline import VOTE_US, Edge, Limits, Sighting, measure
 from .track_search import MOST_CANDIDATES, Rivals, agree, look
 
-INPUTS = ("packet", "filter", "surface")
 Status = Literal["searching", "starting", "tracking", "coasting", "lost"]
 
 
@@ -55,37 +54,31 @@ class TrackParameters(ParameterGroup):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TrackResult:
-    """The ball at the end of the tick, as a robot would have had it.
+class BallTrack:
+    """One ball at the end of the tick, as a robot would have had it.
 
-    status : searching (nothing yet), starting (candidates, not yet trusted), tracking (measured now),
-        coasting (predicted, not measured), lost (just given up)
-    reason : why there is no ball (searching, starting, lost), in words for people; None while there is one
-    shot : number of the shot, from 0; None while there is no ball
-    t_us : scene time of the state: the tick's end less the pixels' latency
-    latency_us : that latency; an event stamped t shows the scene of t - latency_us
-    mean : (5,) float64 Kalman state [x_px, y_px, vx_px_s, vy_px_s, radius_px]; NaN while there is no ball
-    covariance : (5, 5) float64, its covariance
-    hough : circle of the Hough transform on the surface, before refinement and gating; None if none was found
-    measured : the refined circle that entered the filter, None if none did
-    candidate : the tick's best circle while the track is not trusted yet (for the viewer)
+    Attributes
+    ----------
+    shot : int
+        Number of the shot, from 0.
+    t_us : float
+        Scene time of the state: the tick's end less the pixels' latency.
+    latency_us : float
+        That latency: an event stamped t shows the scene of t - latency_us.
+    mean : (5,) float64
+        Kalman state [x_px, y_px, vx_px_s, vy_px_s, radius_px].
+    covariance : (5, 5) float64
+        Its covariance.
+    measured : Circle, optional
+        The refined circle that entered the filter, None if none did: the ball is coasting.
     """
 
-    status: Status
-    reason: str | None
-    shot: int | None
+    shot: int
     t_us: float
     latency_us: float
     mean: NDArray[np.float64]
     covariance: NDArray[np.float64]
-    hough: Circle | None
     measured: Circle | None
-    candidate: Circle | None = None
-
-    @property
-    def has_ball(self) -> bool:
-        """Whether there is a ball that later stages may use."""
-        return self.status in ("tracking", "coasting")
 
     def centre_px(
         self, event_t_us: NDArray[np.int64] | NDArray[np.float64]
@@ -93,6 +86,68 @@ class TrackResult:
         """Centre (x, y) in px at the scene times behind these event times (section 3.2, eq. ball_pos)."""
         dt_s = (event_t_us - self.latency_us - self.t_us) * 1e-6
         return self.mean[0] + self.mean[2] * dt_s, self.mean[1] + self.mean[3] * dt_s
+
+
+NO_STATE, NO_COVARIANCE = frozen(np.full(5, np.nan)), frozen(np.full((5, 5), np.nan))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackResult:
+    """The balls at the end of the tick, and why there is none.
+
+    Attributes
+    ----------
+    status : str
+        searching (nothing yet), starting (candidates, not yet trusted), tracking (measured now), coasting (predicted,
+        not measured), lost (just given up); of the followed ball where there is one.
+    reason : str, optional
+        Why there is no ball (searching, starting, lost), in words for people; None while there is one.
+    t_us : float
+        Scene time: the tick's end less the pixels' latency.
+    balls : tuple of BallTrack
+        Every ball in flight. The first one is followed by the detail views.
+    hough : Circle, optional
+        Circle of the Hough transform on the surface, before refinement and gating.
+    candidate : Circle, optional
+        The tick's best circle while the track is not trusted yet.
+    """
+
+    status: Status
+    reason: str | None
+    t_us: float
+    balls: tuple[BallTrack, ...]
+    hough: Circle | None
+    candidate: Circle | None = None
+
+    @property
+    def ball(self) -> BallTrack | None:
+        """The followed ball; None without one."""
+        return self.balls[0] if self.balls else None
+
+    @property
+    def has_ball(self) -> bool:
+        """Whether there is a ball that later stages may use."""
+        return bool(self.balls)
+
+    @property
+    def shot(self) -> int | None:
+        """Shot of the followed ball; None without one."""
+        return self.balls[0].shot if self.balls else None
+
+    @property
+    def measured(self) -> Circle | None:
+        """Measured circle of the followed ball; None without one."""
+        return self.balls[0].measured if self.balls else None
+
+    @property
+    def mean(self) -> NDArray[np.float64]:
+        """(5,) float64 Kalman state of the followed ball; NaN without one."""
+        return self.balls[0].mean if self.balls else NO_STATE
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """(5, 5) float64 covariance of the followed ball; NaN without one."""
+        return self.balls[0].covariance if self.balls else NO_COVARIANCE
 
 
 # Share of the half outline ahead that a tracked ball must show to be measured: a third pins down its circle.
@@ -120,7 +175,7 @@ FREE = np.full(5, 1e9)
 class TrackState:
     """What the tracker carries from tick to tick."""
 
-    setting: Setting
+    context: Context
     limits: Limits
     contour: EventBatch = field(default_factory=EventBatch.empty)
     ball: BallFilter | None = None
@@ -130,7 +185,7 @@ class TrackState:
     shots: int = 0
 
 
-def start(parameters: TrackParameters, setting: Setting) -> TrackState:
+def start(parameters: TrackParameters, context: Context) -> TrackState:
     """Fresh state; raises ParameterError for a fixed ball without a place or radii the wrong way round."""
     if parameters.ball == "fixed":
         _fixed_ring(parameters)
@@ -139,7 +194,7 @@ def start(parameters: TrackParameters, setting: Setting) -> TrackState:
             f"track.radius_min_px = {parameters.radius_min_px:g} must be below "
             f"track.radius_max_px = {parameters.radius_max_px:g}"
         )
-    per_m = 1.0 / setting.ball_radius_m
+    per_m = 1.0 / context.ball_radius_m
     limits = Limits(
         parameters.radius_min_px,
         parameters.radius_max_px,
@@ -148,7 +203,7 @@ def start(parameters: TrackParameters, setting: Setting) -> TrackState:
     )
     if parameters.ball == "flying":
         load_filter()  # loaded now and not in the middle of a shot
-    return TrackState(setting, limits)
+    return TrackState(context, limits)
 
 
 def step(
@@ -158,10 +213,22 @@ def step(
     filtered: FilterResult,
     surface: SurfaceResult,
 ) -> TrackResult:
-    """One tick: the ball at its end."""
-    if parameters.ball == "fixed":
-        variance = np.array([1.0, 1.0, 0.0, 0.0, 1.0]) * parameters.fixed_std_px**2
-        return _result(parameters, packet, "tracking", 0, _fixed_ring(parameters), np.diag(variance))
+    """One tick: the balls at its end."""
+    return _STEPS[parameters.ball](parameters, state, packet, filtered, surface)
+
+
+def _step_fixed(
+    parameters: TrackParameters, state: TrackState, packet: Packet, filtered: FilterResult, surface: SurfaceResult
+) -> TrackResult:
+    """A ball spinner's ball: the stated circle."""
+    variance = np.array([1.0, 1.0, 0.0, 0.0, 1.0]) * parameters.fixed_std_px**2
+    return _ball(parameters, packet, "tracking", 0, _fixed_ring(parameters), np.diag(variance))
+
+
+def _step_flying(
+    parameters: TrackParameters, state: TrackState, packet: Packet, filtered: FilterResult, surface: SurfaceResult
+) -> TrackResult:
+    """A flying ball: searched for, then followed."""
     since_us, events = packet.end_us - max(parameters.contour_us, VOTE_US), filtered.logo_events
     if since_us < packet.start_us:
         events = EventBatch.concatenate([state.contour, events])
@@ -171,9 +238,12 @@ def step(
     return _follow(parameters, state, state.ball, packet, surface)
 
 
+_STEPS = {"flying": _step_flying, "fixed": _step_fixed}
+
+
 def _search(parameters: TrackParameters, state: TrackState, packet: Packet, surface: SurfaceResult) -> TrackResult:
     """A tick without a track: start one from a sighting that is trusted, or promising for long enough."""
-    camera = state.setting.camera
+    camera = state.context.camera
     hough, found = look(surface, state.contour, packet.end_us, camera, state.limits, MOST_CANDIDATES)
     pending, state.pending = state.pending, None
     if not found:
@@ -199,9 +269,9 @@ def _search(parameters: TrackParameters, state: TrackState, packet: Packet, surf
 
 def _wait_us(parameters: TrackParameters, state: TrackState, sighting: Sighting) -> int:
     """How long such a sighting must have been there before it is a shot."""
-    camera, (x, y, _, _, radius) = state.setting.camera, sighting.ring
+    camera, (x, y, _, _, radius) = state.context.camera, sighting.ring
     inside = min(x, y, camera.width_px - 1 - x, camera.height_px - 1 - y)
-    if sighting.speed_px_s / radius * state.setting.ball_radius_m < SLOW_M_S and inside > COMING_IN * radius:
+    if sighting.speed_px_s / radius * state.context.ball_radius_m < SLOW_M_S and inside > COMING_IN * radius:
         return WATCH_US
     # What is not trusted at once counts when seen again in events that it does not share with the first time.
     return 0 if sighting.trusted else parameters.contour_us
@@ -212,7 +282,7 @@ def _follow(
 ) -> TrackResult:
     """A tick with a track: predict, measure near the prediction, update; let a better ball take over."""
     ball.predict((packet.end_us - packet.start_us) * 1e-6)
-    camera = state.setting.camera
+    camera = state.context.camera
     expected = ball.mean
     if _beyond(expected, camera.width_px, camera.height_px):
         return _end(parameters, state, packet, "the ball left the view")
@@ -236,7 +306,7 @@ def _follow(
     if measured is None and packet.end_us - state.seen_us > parameters.coast_us:
         return _end(parameters, state, packet, f"the ball was not seen for {parameters.coast_us / 1000:g} ms")
     status: Status = "tracking" if measured else "coasting"
-    return _result(parameters, packet, status, state.shots - 1, now, _honest(ball), hough, measured)
+    return _ball(parameters, packet, status, state.shots - 1, now, _total_covariance(ball), hough, measured)
 
 
 def _update(
@@ -252,7 +322,7 @@ def _update(
     # ball wholly in view, and it keeps the fit sane on short arcs.
     loose = np.array([1e9, 1e9, 10 * expected[4] + spread[2], 10 * expected[4] + spread[3], 0.5])
     gate = 2.0 + 3.0 * max(spread[0], spread[1])
-    sighting = measure(state.contour, packet.end_us, state.setting.camera, expected, gate, loose)
+    sighting = measure(state.contour, packet.end_us, state.context.camera, expected, gate, loose)
     if sighting is None or sighting.ahead < LEAST_AHEAD:
         return None
     observed = _edge(parameters).ball(sighting.ring)[OBSERVED]
@@ -274,19 +344,19 @@ def _begin(
     shot: int,
 ) -> TrackResult:
     """Start the filter at a sighting."""
-    per_m = sighting.ring[4] / state.setting.ball_radius_m
+    per_m = sighting.ring[4] / state.context.ball_radius_m
     mean = _edge(parameters).ball(sighting.ring)
     covariance = sighting.covariance.copy()
     covariance[OBSERVED, OBSERVED] += OUTLINE_STD_PX**2
     # The paper: high enough to converge fast. The fit bends by what the ball accelerates within its window.
     covariance[[2, 3], [2, 3]] += (0.2 * per_m) ** 2
-    growth = parameters.approach_m_s * per_m * mean[4] / state.setting.camera.focal_px
+    growth = parameters.approach_m_s * per_m * mean[4] / state.context.camera.focal_px
     state.ball = BallFilter(mean, covariance, parameters.acceleration_m_s2 * per_m, growth)
     state.pending, state.rivals = None, Rivals()
     state.seen_us = packet.end_us
     state.shots = shot + 1
     measured = _circle(parameters, sighting)
-    return _result(parameters, packet, "tracking", shot, mean, _honest(state.ball), hough, measured)
+    return _ball(parameters, packet, "tracking", shot, mean, _total_covariance(state.ball), hough, measured)
 
 
 def _end(parameters: TrackParameters, state: TrackState, packet: Packet, reason: str) -> TrackResult:
@@ -294,7 +364,7 @@ def _end(parameters: TrackParameters, state: TrackState, packet: Packet, reason:
     return _no_ball(parameters, packet, "lost", reason)
 
 
-def _honest(ball: BallFilter) -> NDArray[np.float64]:
+def _total_covariance(ball: BallFilter) -> NDArray[np.float64]:
     """The filter's covariance plus the errors that every tick has in common."""
     late = ball.mean[2:4] * LATENCY_STD_US * 1e-6
     covariance = ball.covariance + COMMON_COVARIANCE
@@ -328,31 +398,19 @@ def _fixed_ring(parameters: TrackParameters) -> NDArray[np.float64]:
     return np.array([x, y, 0.0, 0.0, radius])
 
 
-def _result(
+def _ball(
     parameters: TrackParameters,
     packet: Packet,
     status: Status,
-    shot: int | None,
+    shot: int,
     mean: NDArray[np.float64],
     covariance: NDArray[np.float64],
     hough: Circle | None = None,
     measured: Circle | None = None,
-    reason: str | None = None,
-    candidate: Circle | None = None,
 ) -> TrackResult:
-    late = parameters.latency_us
-    return TrackResult(
-        status,
-        reason,
-        shot,
-        packet.end_us - late,
-        late,
-        frozen(mean),
-        frozen(covariance),
-        hough,
-        measured,
-        candidate,
-    )
+    t_us = packet.end_us - parameters.latency_us
+    ball = BallTrack(shot, t_us, parameters.latency_us, frozen(mean), frozen(covariance), measured)
+    return TrackResult(status, None, t_us, (ball,), hough)
 
 
 def _no_ball(
@@ -363,5 +421,16 @@ def _no_ball(
     hough: Circle | None = None,
     candidate: Circle | None = None,
 ) -> TrackResult:
-    nothing = np.full(5, np.nan), np.full((5, 5), np.nan)
-    return _result(parameters, packet, status, None, *nothing, hough, None, reason, candidate)
+    return TrackResult(status, reason, packet.end_us - parameters.latency_us, (), hough, candidate)
+
+
+STAGE = Stage(
+    name="track",
+    label="Tracker",
+    help="Hough circle in the surface, refined on the ball's outline, and Kalman filter: the ball's place and speed.",
+    scope="recording",
+    inputs=("packet", "filter", "surface"),
+    parameters=TrackParameters,
+    start=start,
+    step=step,
+)

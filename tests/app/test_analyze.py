@@ -13,8 +13,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from spinscope.app.analyze import report as report_of
-from spinscope.app.session import Choices, Session
+from spinscope.pipeline.session import Choices, Session
 
 SCHEMA = json.loads((Path(__file__).parent / "analyze.schema.json").read_text(encoding="utf-8"))
 FLIGHTS = (
@@ -115,14 +114,15 @@ def test_one_method_only(samples: Path) -> None:
     assert any("fixed ball found" in warning for warning in report["warnings"])
     session = Session.open(samples / "flight_back.h5", Choices())
     for method, best in (("normal_flow", "normal_flow"), ("contrast", "contrast")):
-        (shot,) = session.shots(method=method).shots
-        assert shot.best == best
-        made = report_of(session, [shot], None, method)["shots"][0]
+        result = session.estimate(method)
+        assert result.shots[0].best == best
+        made = result.to_dict()["shots"][0]
         assert (list(made["spin"]), made["best"]) == ([method], best)
     assert session.chain.seconds["contrast"] > 0
     other = Session.open(samples / "flight_back.h5", Choices())
-    other.shots(method="triplet")
-    assert other.chain.seconds["contrast"] == 0, "contrast, which takes longest, is not run for it"
+    other.estimate("triplet")
+    assert not other.chain.seconds["contrast"] and not other.chain.seconds["normal_flow"], "only what it needs is run"
+    assert other.chain.seconds["triplet"] > 0
 
 
 def test_of_several_recordings_a_bad_one_is_named_and_the_rest_goes_on(samples: Path, tmp_path: Path) -> None:

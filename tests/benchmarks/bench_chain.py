@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from spinscope.pipeline.chain import STAGES, Chain, EventSource, Parameters
+from spinscope.pipeline.chain import Chain, EventsInMemory
 from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.registry import STAGES, Parameters
 from spinscope.pipeline.results import Packet
 
 SAMPLES = Path(__file__).parents[2] / "sample_recordings"
@@ -74,16 +76,20 @@ def packets(events: EventBatch, tick_us: int = 5000) -> list[Packet]:
 def track(events: EventBatch, parts: list[Packet]) -> list[float]:
     """Thread seconds of each packet from filter to logo."""
     parameters = Parameters()
-    source = EventSource("bench", events, 1280, 720, 0, parts[-1].end_us)
-    setting = Chain(source).setting(parameters)
-    states = {name: STAGES[name].start(parameters.group(name), setting) for name in TRACKING}
+    chain = Chain(EventsInMemory("bench", events, 1280, 720, 0, parts[-1].end_us))
+    stages = [STAGES[name] for name in TRACKING]
+    states = {stage.name: chain.start(parameters, stage) for stage in stages}
     seconds = []
     for packet in parts:
         begin = time.thread_time()
-        results = {"packet": packet}
-        for name in TRACKING:
-            inputs = [results[other] for other in STAGES[name].INPUTS]
-            results[name] = STAGES[name].step(parameters.group(name), states[name], *inputs)
+        results: dict[str, Any] = {"packet": packet}
+        for stage in stages:
+            if stage.scope == "ball":
+                results["ball"] = results["track"].ball
+                if results["ball"] is None:
+                    continue
+            given = (results[name] for name in stage.inputs)
+            results[stage.name] = stage.step(parameters.group(stage.group), states[stage.name], *given)
         seconds.append(time.thread_time() - begin)
     return seconds
 

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spinscope.app.session import Choices, Session
-from spinscope.pipeline.camera import Setting
 from spinscope.pipeline.chain import Tick
 from spinscope.pipeline.kernels.contrast import score
 from spinscope.pipeline.kernels.contrast_window import whole
 from spinscope.pipeline.results import SpinEstimate
-from spinscope.pipeline.stages import contrast
+from spinscope.pipeline.session import Choices, Session
+from spinscope.pipeline.spin.contrast import stage as contrast
+from spinscope.pipeline.stage import Context
 from spinscope.pipeline.stages.spin import SpinResult
 from tests.naive_contrast import dotted_ball, naive_score
 
@@ -32,20 +32,20 @@ def say(text: str) -> None:
     sys.stdout.write(f"\n{text}\n")
 
 
-def recorded(name: str) -> tuple[list[Tick], Setting]:
+def recorded(name: str) -> tuple[list[Tick], Context]:
     """The chain's results up to the spin, where there is a ball."""
     session = Session.open(SAMPLES / f"{name}.h5", Choices(fixed_ball=BALLS.get(name)))
     ticks = [tick for tick in session.ticks(forget=("surface",)) if tick.track.has_ball]
-    return ticks, session.chain.setting(session.parameters)
+    return ticks, session.chain.context(session.parameters, contrast.STAGE)
 
 
-def costs_ms(ticks: list[Tick], setting: Setting) -> tuple[list[float], list[float]]:
+def costs_ms(ticks: list[Tick], context: Context) -> tuple[list[float], list[float]]:
     """CPU of each tick with a full estimate, and of each that follows one."""
     parameters = contrast.ContrastParameters()
-    state, full, followed = contrast.start(parameters, setting), [], []
+    state, full, followed = contrast.start(parameters, context), [], []
     for tick in ticks:
         started = time.thread_time()
-        result = contrast.step(parameters, state, tick.packet, tick.track, tick.logo, tick.spin)
+        result = contrast.step(parameters, state, tick.packet, tick.track.ball, tick.logo, tick.normal_flow)
         (full if result.full else followed).append((time.thread_time() - started) * 1e3)
     return full, followed
 

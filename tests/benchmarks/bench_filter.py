@@ -11,9 +11,10 @@ import h5py
 import numpy as np
 import pytest
 
-from spinscope.pipeline.camera import Camera, CameraParameters, Setting
+from spinscope.pipeline.camera import Camera, CameraParameters
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.results import Packet
+from spinscope.pipeline.stage import Context
 from spinscope.pipeline.stages import filter as stage
 from spinscope.pipeline.stages.filter import FilterParameters
 from tests.naive_filter import NaiveFilter
@@ -21,7 +22,7 @@ from tests.naive_filter import NaiveFilter
 # The thread's own time: what other programs do on a shared machine does not count.
 pytestmark = pytest.mark.benchmark(timer=time.thread_time)
 PACKET_EVENTS = 25_000  # 5 ms at 5 Mev/s
-SETTING = Setting(Camera.of(CameraParameters(), 1280, 720), 0.02, 150.0)
+CONTEXT = Context(Camera.of(CameraParameters(), 1280, 720), 0.02, {"spin.max_spin_rps": 150.0})
 
 
 def flight() -> EventBatch:
@@ -45,7 +46,7 @@ def everywhere() -> EventBatch:
 def test_two_filters_in_one_packet(benchmark: Any, stream: Any) -> None:
     events, parameters = stream(), FilterParameters()
     packets = [Packet(0, 0, 0, events[first : first + PACKET_EVENTS]) for first in range(0, len(events), PACKET_EVENTS)]
-    state = stage.start(parameters, SETTING)
+    state = stage.start(parameters, CONTEXT)
 
     def run() -> None:
         for packet in packets:

@@ -15,7 +15,9 @@ from spinscope.pipeline.kernels.logo import logo_rows
 from spinscope.pipeline.kernels.plane_flow import FEWEST, SPREAD_PX, fit_plane
 from spinscope.pipeline.kernels.rate import low_passed
 from spinscope.pipeline.kernels.triplet import earlier_neighbours, triplet_flow
-from spinscope.pipeline.stages import flow, logo, rate, spin
+from spinscope.pipeline.spin import normal_flow, triplet
+from spinscope.pipeline.spin.parameters import SpinParameters
+from spinscope.pipeline.stages import flow, logo, rate
 from spinscope.pipeline.stages.filter import FilterResult
 from tests.naive_spin import (
     naive_logo_rows,
@@ -25,7 +27,7 @@ from tests.naive_spin import (
     naive_triplets,
 )
 from tests.pipeline.stages.test_spin_samples import track_of, truth_of
-from tests.spinning_ball import SETTING, packets
+from tests.spinning_ball import CONTEXT, packets
 
 # The thread's own time: what other programs do on a shared machine does not count.
 pytestmark = pytest.mark.benchmark(timer=time.thread_time)
@@ -77,8 +79,8 @@ def ticks(name: str) -> list[Any]:
 
 def test_triplet_matching_of_a_slice(benchmark: Any) -> None:
     """The densest slices of a flight, 2 ms each."""
-    group, state = logo.LogoParameters(), logo.start(logo.LogoParameters(), SETTING)
-    seen = [logo.step(group, state, p, FilterResult(p.events, p.events), k) for p, k in ticks("flight_slow_top")]
+    group, state = logo.LogoParameters(), logo.start(logo.LogoParameters(), CONTEXT)
+    seen = [logo.step(group, state, p, FilterResult(p.events, p.events), k.ball) for p, k in ticks("flight_slow_top")]
     t = np.concatenate([s.events.t_us for s in seen])
     x, y = (np.concatenate([getattr(s, name) for s in seen]) for name in ("x_px", "y_px"))
     on = np.concatenate([s.events.on for s in seen])
@@ -129,20 +131,22 @@ def test_the_low_pass(benchmark: Any) -> None:
 @pytest.mark.parametrize("name", ["flight_fast_top", "flight_slow_top", "flight_mixed"])
 def test_a_flight_through_the_stages_after_the_track(benchmark: Any, name: str) -> None:
     work = ticks(name)
-    groups = logo.LogoParameters(), rate.RateParameters(), flow.FlowParameters(), spin.SpinParameters()
+    stages = (logo, rate, flow, triplet, normal_flow)
+    groups = logo.LogoParameters(), rate.RateParameters(), flow.FlowParameters(), SpinParameters(), SpinParameters()
     took: dict[str, list[float]] = {"logo": [], "rate": [], "flow": [], "spin": []}
 
     def run() -> None:
-        states = [s.start(g, SETTING) for s, g in zip((logo, rate, flow, spin), groups, strict=True)]
+        states = [s.start(g, CONTEXT) for s, g in zip(stages, groups, strict=True)]
         for packet, track in work:
             clock = [time.thread_time()]
-            seen = logo.step(groups[0], states[0], packet, FilterResult(packet.events, packet.events), track)
+            seen = logo.step(groups[0], states[0], packet, FilterResult(packet.events, packet.events), track.ball)
             clock.append(time.thread_time())
-            rhythm = rate.step(groups[1], states[1], packet, track, seen)
+            rhythm = rate.step(groups[1], states[1], packet, seen)
             clock.append(time.thread_time())
-            moved = flow.step(groups[2], states[2], packet, track, seen, rhythm)
+            moved = flow.step(groups[2], states[2], packet, track.ball, seen, rhythm)
             clock.append(time.thread_time())
-            spin.step(groups[3], states[3], packet, track, seen, rhythm, moved)
+            triplet.step(groups[3], states[3], packet, moved, rhythm)
+            normal_flow.step(groups[4], states[4], packet, seen, moved, rhythm)
             clock.append(time.thread_time())
             for stage, taken in zip(took, np.diff(clock), strict=True):
                 took[stage].append(taken * 1e3)

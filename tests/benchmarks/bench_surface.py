@@ -15,10 +15,11 @@ import numpy as np
 import pytest
 from numba import njit
 
-from spinscope.pipeline.camera import Camera, CameraParameters, Setting
+from spinscope.pipeline.camera import Camera, CameraParameters
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.kernels import eros, isolated
 from spinscope.pipeline.results import Packet
+from spinscope.pipeline.stage import Context
 from spinscope.pipeline.stages import filter as filter_stage
 from spinscope.pipeline.stages import surface as stage
 from spinscope.pipeline.stages.filter import FilterParameters
@@ -27,7 +28,7 @@ from tests.naive_surface import eros_float32_loop
 
 WIDTH, HEIGHT = 1280, 720
 PACKET_EVENTS = 25_000  # 5 ms at 5 Mev/s
-SETTING = Setting(Camera.of(CameraParameters(), WIDTH, HEIGHT), 0.02, 150.0)
+CONTEXT = Context(Camera.of(CameraParameters(), WIDTH, HEIGHT), 0.02, {"spin.max_spin_rps": 150.0})
 # The thread's own time: what other programs do on a shared machine does not count.
 pytestmark = pytest.mark.benchmark(timer=time.thread_time)
 cv2.setNumThreads(1)
@@ -66,7 +67,7 @@ def events() -> EventBatch:
 def flight_surface(events: EventBatch) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Lives, table and values of EROS (k = 11) after the whole flight, filtered as by default."""
     filters = FilterParameters()
-    state = filter_stage.start(filters, SETTING)
+    state = filter_stage.start(filters, CONTEXT)
     filtered = filter_stage.step(filters, state, Packet(0, 0, 0, events)).surface_events
     lives, table = eros.no_lives(WIDTH, HEIGHT), eros.values_of_lives(11)
     eros.draw(lives, WIDTH, 11, len(table) - 1, filtered.x_px, filtered.y_px)
@@ -146,7 +147,7 @@ def test_cleaning(benchmark: Any, flight_surface: tuple[np.ndarray, ...], rule: 
 def test_filter_and_surface_of_a_packet(benchmark: Any, events: EventBatch, kind: str) -> None:
     """Both filters, the surface (k = 11) and its read-out, per 25,000 raw events; 0.83 ms is 30 Mev/s."""
     filters, surfaces = FilterParameters(), SurfaceParameters(kind=kind)
-    filter_state, state = filter_stage.start(filters, SETTING), stage.start(surfaces, SETTING)
+    filter_state, state = filter_stage.start(filters, CONTEXT), stage.start(surfaces, CONTEXT)
     starts = range(0, len(events) - PACKET_EVENTS, PACKET_EVENTS)
     packets = [Packet(0, 0, int(events.t_us[i + PACKET_EVENTS - 1]) + 1, events[i : i + PACKET_EVENTS]) for i in starts]
     packet_s: list[float] = []

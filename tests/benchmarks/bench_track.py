@@ -18,7 +18,7 @@ from spinscope.pipeline.stages.filter import FilterParameters
 from spinscope.pipeline.stages.surface import SurfaceParameters
 from spinscope.pipeline.stages.track import TrackParameters
 from tests import naive_circle
-from tests.track_runs import PAPERS_SETTING, inputs, run, sample, tracked
+from tests.track_runs import PAPER_CONTEXT, inputs, run, sample, tracked
 
 # The thread's own time: what other programs do on a shared machine does not count.
 pytestmark = pytest.mark.benchmark(timer=time.thread_time)
@@ -97,7 +97,7 @@ def test_a_tick(benchmark: Any, name: str, tick_us: int) -> None:
     benchmark(run, rows)
     seconds: list[list[float]] = [[] for _ in rows]
     for _ in range(5):
-        state = track.start(parameters, PAPERS_SETTING)
+        state = track.start(parameters, PAPER_CONTEXT)
         for tick, row in zip(seconds, rows, strict=True):
             started = time.thread_time()
             track.step(parameters, state, *row)
@@ -118,7 +118,7 @@ def test_filter_surface_and_track_together(benchmark: Any) -> None:
 
     def whole() -> None:
         states = [
-            stage.start(parameters, PAPERS_SETTING)
+            stage.start(parameters, PAPER_CONTEXT)
             for stage, parameters in ((filter, sieve), (surface, drawing), (track, finding))
         ]
         for packet in packets:

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from spinscope.app.session import SAMPLES, Choices, Session
 from spinscope.pipeline.recordings import open_recording
+from spinscope.pipeline.session import SAMPLES, Choices, Session
 
 FILE = Path(__file__).with_name("samples.json")
 
@@ -24,7 +24,8 @@ def numbers(path: Path) -> dict[str, Any]:
     fixed = bool(np.ptp(truth.x_px) == 0)
     ball = (float(truth.x_px[0]), float(truth.y_px[0]), float(truth.radius_px[0]))
     session = Session.open(path, Choices(fixed_ball=ball if fixed else None))
-    ticks, log = session.all_ticks()
+    result = session.estimate_keeping_ticks()
+    ticks = result.ticks
     events = session.source.events
     return {
         "events": [len(events), int(events.x_px.sum()), int(events.y_px.sum()), int(events.on.sum())],
@@ -42,7 +43,7 @@ def numbers(path: Path) -> dict[str, Any]:
                 },
                 "best": shot.best,
             }
-            for shot in log.shots
+            for shot in result.shots
         ],
     }
 

@@ -3,57 +3,106 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import threading
 import time
-from types import SimpleNamespace
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pytest
 
 from spinscope.pipeline import chain as chain_module
-from spinscope.pipeline.chain import Chain, EventSource, Parameters
+from spinscope.pipeline.chain import Chain, EventsInMemory
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.registry import STAGES, Parameters
+from spinscope.pipeline.stage import Stage
 
 INPUTS = {
     "filter": ("packet",),
     "surface": ("packet", "filter"),
     "track": ("packet", "filter", "surface"),
-    "logo": ("packet", "filter", "track"),
-    "rate": ("packet", "track", "logo"),
-    "flow": ("packet", "track", "logo", "rate"),
-    "spin": ("packet", "track", "logo", "rate", "flow"),
-    "contrast": ("packet", "track", "logo", "spin"),
+    "logo": ("packet", "filter", "ball"),
+    "rate": ("packet", "logo"),
+    "flow": ("packet", "ball", "logo", "rate"),
+    "triplet": ("packet", "flow", "rate"),
+    "normal_flow": ("packet", "logo", "flow", "rate"),
+    "contrast": ("packet", "ball", "logo", "normal_flow"),
 }
+OF_RECORDING = ("filter", "surface", "track")
+BELOW_LOGO = {"logo", "rate", "flow", "triplet", "normal_flow", "contrast"}
+ALL_BUT_CONTRAST = tuple(name for name in INPUTS if name != "contrast")
+
+
+@dataclass(frozen=True)
+class ToyBall:
+    """One ball of the toy tracker."""
+
+    shot: int
+
+
+@dataclass(frozen=True)
+class ToyTrack:
+    """Result of the toy tracker: the balls in flight, and everything seen so far."""
+
+    balls: tuple[ToyBall, ...]
+    seen: tuple[Any, ...]
+    reason: str = "no ball"
+
+
+class Toys:
+    """Toy stages in place of the real ones, whose results name everything seen so far.
+
+    counts : how often each stage stepped
+    flying : the shots in flight by tick number; one ball throughout by default
+    """
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.counts = dict.fromkeys(INPUTS, 0)
+        self.flying: Callable[[int], tuple[int, ...]] = lambda index: (0,)
+        self.steps: dict[str, Callable[..., Any]] = {}
+        self.stages = {stage.name: self._toy(stage) for stage in STAGES}
+        monkeypatch.setattr(STAGES, "_entries", self.stages)
+
+    def _toy(self, stage: Stage) -> Stage:
+        def step(parameters: Any, state: list[str], packet: Any, *inputs: Any) -> Any:
+            self.counts[stage.name] += 1
+            state.append(f"{packet.index}:{len(packet.events)}")
+            seen = (stage.name, parameters, tuple(state), inputs)
+            if stage.name == "track":
+                return ToyTrack(tuple(ToyBall(shot) for shot in self.flying(packet.index)), seen)
+            return seen
+
+        self.steps[stage.name] = step
+        absent = (lambda parameters, reason: (stage.name, reason)) if stage.scope == "ball" else None
+        return dataclasses.replace(
+            stage,
+            inputs=INPUTS[stage.name],
+            start=lambda parameters, context: [],
+            step=lambda *given: self.steps[stage.name](*given),
+            absent=absent,
+        )
 
 
 @pytest.fixture
-def calls(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
-    """Replace the stages by toys whose result names everything seen so far; returns how often each stepped."""
-    counts = dict.fromkeys(INPUTS, 0)
-
-    def toy(name: str) -> SimpleNamespace:
-        def start(parameters: Any, setting: Any) -> list[str]:
-            return []
-
-        def step(parameters: Any, state: list[str], packet: Any, *inputs: Any) -> tuple[Any, ...]:
-            counts[name] += 1
-            state.append(f"{packet.index}:{len(packet.events)}")
-            return name, parameters, tuple(state), inputs
-
-        also = (("spin", "max_spin_rps"),) if name == "flow" else ()
-        return SimpleNamespace(INPUTS=INPUTS[name], ALSO=also, start=start, step=step)
-
-    monkeypatch.setattr(chain_module, "STAGES", {name: toy(name) for name in INPUTS})
-    return counts
+def toys(monkeypatch: pytest.MonkeyPatch) -> Toys:
+    """The stages replaced by toys."""
+    return Toys(monkeypatch)
 
 
-def source(count: int = 100, step_us: int = 1000, first_us: int = 0) -> EventSource:
+@pytest.fixture
+def calls(toys: Toys) -> dict[str, int]:
+    """How often each toy stepped."""
+    return toys.counts
+
+
+def source(count: int = 100, step_us: int = 1000, first_us: int = 0) -> EventsInMemory:
     t = first_us + np.arange(count, dtype=np.int64) * step_us
     zeros = np.zeros(count, np.uint16)
     events = EventBatch(t, zeros, zeros, zeros.astype(bool))
-    return EventSource("toy", events, 8, 8, int(t[0]), int(t[-1]) + 1)
+    return EventsInMemory("toy", events, 8, 8, int(t[0]), int(t[-1]) + 1)
 
 
 DEFAULT = Parameters()
@@ -82,11 +131,11 @@ def test_an_unchanged_run_computes_nothing_again(calls: dict[str, int]) -> None:
 @pytest.mark.parametrize(
     ("assignment", "rerun"),
     [
-        ("logo.pad_px=3", {"logo", "rate", "flow", "spin", "contrast"}),
-        ("surface.k_px=5", {"surface", "track", "logo", "rate", "flow", "spin", "contrast"}),
-        ("spin.triplet_solve=least_squares", {"spin", "contrast"}),
-        ("spin.max_spin_rps=90", {"flow", "spin", "contrast"}),
-        ("rate.bin_us=1000", {"rate", "flow", "spin", "contrast"}),
+        ("logo.pad_px=3", BELOW_LOGO),
+        ("surface.k_px=5", set(INPUTS) - {"filter"}),
+        ("spin.triplet_solve=least_squares", {"triplet", "normal_flow", "contrast"}),
+        ("spin.max_spin_rps=90", BELOW_LOGO - {"logo"}),
+        ("rate.bin_us=1000", BELOW_LOGO - {"logo"}),
         ("contrast.kernel_rad=0.05", {"contrast"}),
         ("filter.mode=off", set(INPUTS)),
     ],
@@ -143,21 +192,82 @@ def test_forgotten_results_are_made_again_when_asked_for(calls: dict[str, int]) 
     assert calls["track"] == 20
 
 
-def test_a_stage_left_out_is_not_run_and_what_was_known_of_it_stays(calls: dict[str, int]) -> None:
+def test_what_is_not_wanted_is_not_run_and_what_was_known_of_it_stays(calls: dict[str, int]) -> None:
     chain = Chain(source())
     whole = [tick.contrast for tick in Chain(source()).run(DEFAULT)]
     calls.update(dict.fromkeys(calls, 0))
     assert len(list(chain.run(DEFAULT, ticks=7))) == 7
-    assert all(tick.contrast is None for tick in chain.run(DEFAULT, without=("contrast",)))
+    assert all(tick.get("contrast") is None for tick in chain.run(DEFAULT, ALL_BUT_CONTRAST))
     assert calls == {**dict.fromkeys(INPUTS, 20), "contrast": 7}
     assert [tick.contrast for tick in chain.run(DEFAULT)] == whole
     assert calls == dict.fromkeys(INPUTS, 20)
 
 
-def test_a_stage_that_raises_leaves_no_half_column(calls: dict[str, int]) -> None:
+@pytest.mark.parametrize("targets", [c for n in range(3) for c in itertools.combinations(INPUTS, n)])
+def test_targets_run_with_what_they_need_and_nothing_else(calls: dict[str, int], targets: tuple[str, ...]) -> None:
+    """Every single target and every pair: what they need is derived from the inputs."""
+
+    def needed(name: str) -> set[str]:
+        own = {"track" if other == "ball" else other for other in INPUTS[name]} - {"packet"}
+        own |= {"track"} if name not in OF_RECORDING else set()
+        return {name}.union(*(needed(other) for other in own))
+
+    wanted = set().union(*(needed(name) for name in targets))
+    ticks = list(Chain(source()).run(DEFAULT, targets))
+    assert {name for name, count in calls.items() if count} == wanted
+    assert len(ticks) == 20
+    for tick in ticks:
+        assert {name for name in INPUTS if tick.get(name) is not None} == wanted
+        for name in set(INPUTS) - wanted:
+            with pytest.raises(AttributeError, match="not among the targets"):
+                getattr(tick, name)
+
+
+def test_an_unknown_target_is_refused(calls: dict[str, int]) -> None:
+    with pytest.raises(ParameterError, match="did you mean contrast"):
+        list(Chain(source()).run(DEFAULT, ("contrats",)))
+
+
+def test_each_ball_has_states_of_its_own(toys: Toys) -> None:
+    """Shot 5 flies in ticks 2 to 9, shot 6 in ticks 6 to 12, nobody before, shot 7 alone at the end."""
+    toys.flying = lambda index: tuple(
+        shot for shot, (first, last) in {5: (2, 9), 6: (6, 12), 7: (15, 19)}.items() if first <= index <= last
+    )
     chain = Chain(source())
-    stage = chain_module.STAGES["rate"]
-    sound = stage.step
+    ticks = list(chain.run(DEFAULT, together=4))
+    for index, tick in enumerate(ticks):
+        assert [ball.track.shot for ball in tick.balls] == list(toys.flying(index))
+        for ball in tick.balls:
+            first = {5: 2, 6: 6, 7: 15}[ball.track.shot]
+            for name in BELOW_LOGO:
+                _, _, state, inputs = ball.results[name]
+                assert [int(entry.split(":")[0]) for entry in state] == list(range(first, index + 1)), name
+                if name == "contrast":
+                    assert inputs[0] == ball.track and inputs[1] == ball.results["logo"]
+        assert tick.logo == (tick.balls[0].results["logo"] if tick.balls else ("logo", "no ball"))
+    assert toys.counts["logo"] == 8 + 7 + 5
+    assert chain.knows(DEFAULT, "contrast") and not chain.knows(DEFAULT.with_assignments(["logo.pad_px=1"]), "logo")
+    again = list(chain.run(DEFAULT))
+    assert toys.counts["logo"] == 20
+    for one, other in zip(ticks, again, strict=True):
+        assert [ball.results for ball in one.balls] == [ball.results for ball in other.balls]
+    list(chain.run(DEFAULT.with_assignments(["logo.pad_px=1"]), ("logo",)))
+    assert toys.counts["logo"] == 40 and toys.counts["rate"] == 20 == toys.counts["track"]
+
+
+def test_a_column_of_a_shot_is_not_known_until_its_last_tick(toys: Toys) -> None:
+    toys.flying = lambda index: (0,) if index < 10 else (1,) if index > 12 else ()
+    chain = Chain(source())
+    list(chain.run(DEFAULT, ("track",)))
+    list(chain.run(DEFAULT, ticks=15))
+    assert chain.knows(DEFAULT, "track") and not chain.knows(DEFAULT, "logo")
+    list(chain.run(DEFAULT, ("rate",)))
+    assert chain.knows(DEFAULT, "logo") and chain.knows(DEFAULT, "rate") and not chain.knows(DEFAULT, "flow")
+
+
+def test_a_stage_that_raises_leaves_no_half_column(toys: Toys) -> None:
+    chain = Chain(source())
+    sound = toys.steps["rate"]
 
     def broken(parameters: Any, state: list[str], packet: Any, *inputs: Any) -> Any:
         result = sound(parameters, state, packet, *inputs)
@@ -165,14 +275,14 @@ def test_a_stage_that_raises_leaves_no_half_column(calls: dict[str, int]) -> Non
             raise ValueError("broken")
         return result
 
-    stage.step = broken
+    toys.steps["rate"] = broken
     with pytest.raises(ValueError, match="broken"):
         list(chain.run(DEFAULT))
-    stage.step = sound
+    toys.steps["rate"] = sound
     assert [tick.contrast for tick in chain.run(DEFAULT)] == [tick.contrast for tick in Chain(source()).run(DEFAULT)]
 
 
-@pytest.mark.parametrize("limit", [{"budget_bytes": 8 * 20 * 1000 + 5 * 20 * 1000}, {"most_columns": 8 + 5}])
+@pytest.mark.parametrize("limit", [{"budget_bytes": 9 * 20 * 1000 + 6 * 20 * 1000}, {"max_columns": 9 + 6}])
 def test_the_budget_drops_what_was_not_used_for_longest(
     calls: dict[str, int], monkeypatch: pytest.MonkeyPatch, limit: dict[str, int]
 ) -> None:
@@ -184,30 +294,30 @@ def test_the_budget_drops_what_was_not_used_for_longest(
     list(chain.run(DEFAULT.with_assignments(["logo.pad_px=2"])))
     assert calls == before
     list(chain.run(DEFAULT.with_assignments(["logo.pad_px=1"])))
-    assert {name for name in calls if calls[name] > before[name]} == {"logo", "rate", "flow", "spin", "contrast"}
+    assert {name for name in calls if calls[name] > before[name]} == BELOW_LOGO
 
 
 def test_a_damaged_clock_is_refused_instead_of_running_forever(calls: dict[str, int]) -> None:
     events = EventBatch.checked([0, 10**15], [0, 0], [0, 0], [0, 0], width_px=8, height_px=8)
     with pytest.raises(ParameterError, match="--window"):
-        list(Chain(EventSource("long", events, 8, 8, 0, 10**15 + 1)).run(DEFAULT))
+        list(Chain(EventsInMemory("long", events, 8, 8, 0, 10**15 + 1)).run(DEFAULT))
 
 
-def test_threads_share_the_work_and_get_the_same(calls: dict[str, int], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_threads_share_the_work_and_get_the_same(toys: Toys, calls: dict[str, int]) -> None:
     """Two runs at once, one of them without the last stage: every result is made once, whoever wants it first."""
     whole = [tick.contrast for tick in Chain(source()).run(DEFAULT)]
-    for stage in chain_module.STAGES.values():
-        step = stage.step
-        monkeypatch.setattr(stage, "step", lambda *inputs, step=step: (time.sleep(2e-4), step(*inputs))[1])
+    for name, step in list(toys.steps.items()):
+        toys.steps[name] = lambda *inputs, step=step: (time.sleep(2e-4), step(*inputs))[1]
     calls.update(dict.fromkeys(calls, 0))
     chain = Chain(source(), clock=time.perf_counter)
     took = [dict.fromkeys(INPUTS, 0.0) for _ in range(3)]
     found: dict[int, list[Any]] = {}
 
-    def run(number: int, without: tuple[str, ...]) -> None:
-        found[number] = [tick.contrast for tick in chain.run(DEFAULT, without=without, seconds=took[number])]
+    def run(number: int, targets: tuple[str, ...]) -> None:
+        found[number] = [tick.get("contrast") for tick in chain.run(DEFAULT, targets, seconds=took[number])]
 
-    threads = [threading.Thread(target=run, args=(n, ("contrast",) if n == 0 else ())) for n in range(3)]
+    targets = (ALL_BUT_CONTRAST, tuple(INPUTS), tuple(INPUTS))
+    threads = [threading.Thread(target=run, args=given) for given in enumerate(targets)]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -221,10 +331,9 @@ def test_threads_share_the_work_and_get_the_same(calls: dict[str, int], monkeypa
     assert not any(chain.seconds.values()), "each run has its own account"
 
 
-def test_no_run_goes_on_from_a_state_that_another_one_left_half_way(calls: dict[str, int]) -> None:
+def test_no_run_goes_on_from_a_state_that_another_one_left_half_way(toys: Toys) -> None:
     chain = Chain(source())
-    stage = chain_module.STAGES["rate"]
-    sound = stage.step
+    sound = toys.steps["rate"]
 
     def broken(parameters: Any, state: list[str], packet: Any, *inputs: Any) -> Any:
         state.append("half way")
@@ -233,10 +342,10 @@ def test_no_run_goes_on_from_a_state_that_another_one_left_half_way(calls: dict[
     first, second = chain.run(DEFAULT), chain.run(DEFAULT)
     next(first)
     next(second)  # both hold the same columns now
-    stage.step = broken
+    toys.steps["rate"] = broken
     with pytest.raises(ValueError, match="broken"):
         next(first)
-    stage.step = sound
+    toys.steps["rate"] = sound
     with pytest.raises(ValueError, match="broken"):
         next(second)
     assert [tick.contrast for tick in chain.run(DEFAULT)] == [tick.contrast for tick in Chain(source()).run(DEFAULT)]

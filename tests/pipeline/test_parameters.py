@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from spinscope.pipeline.chain import Parameters
 from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.registry import Parameters
 
 DEFAULT = Parameters()
 

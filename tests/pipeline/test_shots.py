@@ -15,33 +15,32 @@ from spinscope.pipeline.shots import Shot, ShotLog
 CAMERA = Camera.of(CameraParameters(), 1280, 720)
 
 
-def tick(number: int, shot: int | None, x_px: float = 100.0, reason: str | None = None) -> Any:
-    """A tick with what a shot needs of it."""
-    track = SimpleNamespace(
-        shot=shot,
-        has_ball=shot is not None,
-        reason=reason,
-        t_us=5000.0 * (number + 1) - 100,
-        mean=np.array([x_px, 50.0, 1000.0, 0.0, 16.0]),
-        covariance=np.eye(5),
-        measured=None if number % 2 else object(),
-    )
-    estimates = {"triplet": SpinEstimate.refused("triplet", f"tick {number}")}
+def tick(number: int, *shots: int, x_px: float = 100.0, reason: str | None = None) -> Any:
+    """A tick with these shots in flight, and with what a shot needs of it."""
     packet = SimpleNamespace(start_us=5000 * number, end_us=5000 * (number + 1))
-    logo = SimpleNamespace(events=[0] * number)
-    return SimpleNamespace(packet=packet, track=track, logo=logo, estimates=estimates)
+    balls = [
+        SimpleNamespace(
+            track=SimpleNamespace(
+                shot=shot,
+                t_us=5000.0 * (number + 1) - 100,
+                mean=np.array([x_px, 50.0, 1000.0, 0.0, 16.0]),
+                covariance=np.eye(5),
+                measured=None if number % 2 else object(),
+            ),
+            results={"logo": SimpleNamespace(events=[0] * number)},
+            estimates={"triplet": SpinEstimate.refused("triplet", f"tick {number}")},
+        )
+        for shot in shots
+    ]
+    return SimpleNamespace(packet=packet, track=SimpleNamespace(reason=reason), balls=balls)
 
 
 def gathered(*ticks: Any) -> ShotLog:
-    log = ShotLog()
-    for one in ticks:
-        log.add(one)
-    log.close()
-    return log
+    return ShotLog.of(ticks)
 
 
 def test_ticks_of_one_number_are_one_shot() -> None:
-    log = gathered(tick(0, None), tick(1, 0), tick(2, 0), tick(3, None), tick(4, 1), tick(5, 1), tick(6, 2), tick(7, 2))
+    log = gathered(tick(0), tick(1, 0), tick(2, 0), tick(3), tick(4, 1), tick(5, 1), tick(6, 2), tick(7, 2))
     assert [(shot.start_us, shot.end_us) for shot in log.shots] == [(5000, 15000), (20000, 30000), (30000, 40000)]
     assert [shot.logo_events for shot in log.shots] == [3, 9, 13]
     assert log.shots[0].estimates["triplet"].reason == "tick 2", "the last tick's estimate is the whole shot's"
@@ -49,14 +48,20 @@ def test_ticks_of_one_number_are_one_shot() -> None:
     assert log.no_shot_reason is None
 
 
+def test_shots_overlap_and_are_listed_by_their_start() -> None:
+    log = gathered(tick(0, 7), tick(1, 7, 3), tick(2, 3, 7), tick(3, 3), tick(4))
+    assert [(shot.start_us, shot.end_us) for shot in log.shots] == [(0, 15000), (5000, 20000)]
+    assert [shot.logo_events for shot in log.shots] == [3, 6]
+
+
 def test_a_single_tick_of_several_is_no_shot() -> None:
     assert [shot.start_us for shot in gathered(tick(0, 0), tick(1, 1), tick(2, 1)).shots] == [5000]
-    assert "single tick" in str(gathered(tick(0, 0), tick(1, None)).no_shot_reason)
+    assert "single tick" in str(gathered(tick(0, 0), tick(1)).no_shot_reason)
     assert len(gathered(tick(0, 0)).shots) == 1
 
 
 def test_the_last_reason_is_told_where_there_is_no_ball() -> None:
-    assert gathered(tick(0, None, reason="dark"), tick(1, None, reason="darker")).no_shot_reason == "darker"
+    assert gathered(tick(0, reason="dark"), tick(1, reason="darker")).no_shot_reason == "darker"
     assert "no events" in str(gathered().no_shot_reason)
 
 
@@ -67,7 +72,7 @@ def flight(velocity_m_s: tuple[float, float, float]) -> Shot:
     x, y, radius = CAMERA.silhouette(places, 0.02)
     state = np.stack([x, y, 0 * x, 0 * x, radius], axis=1)
     estimate = SpinEstimate("triplet", np.array([0.0, 40.0, 0.0]), np.eye(3), None)
-    return Shot(0, 0, 100_000, t_us, state, 0 * state, t_us >= 0, 0, {"triplet": estimate}, "triplet")
+    return Shot(0, 100_000, t_us, state, 0 * state, t_us >= 0, 0, {"triplet": estimate}, "triplet")
 
 
 def test_velocity_is_the_flights() -> None:

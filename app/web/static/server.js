@@ -58,7 +58,7 @@ export class Connection extends EventTarget {
 
   #listen() {
     this.#stream?.close();
-    const stream = (this.#stream = new EventSource(this.path("messages")));
+    const stream = (this.#stream = new EventsInMemory(this.path("messages")));
     stream.onmessage = (event) => {
       const message = JSON.parse(event.data);
       this.dispatchEvent(new CustomEvent(message.kind, { detail: message }));

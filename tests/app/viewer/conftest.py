@@ -2,37 +2,44 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 import pytest
 
-from spinscope.app.session import Choices, Session
-from spinscope.app.viewer.run import Run
+from spinscope.app.viewer.run import ViewedRun
+from spinscope.pipeline.chain import Tick
+from spinscope.pipeline.session import Choices, Session
 
 
-def run_of(path: Path, choices: Choices) -> Run:
+def run_of(path: Path, choices: Choices) -> ViewedRun:
     """Run the chain over a recording, as `spinscope view` does."""
-    session = Session.open(path, choices)
-    ticks, log = session.all_ticks()
-    return Run.of(session, ticks, log.shots, log.no_shot_reason)
+    return ViewedRun.of(Session.open(path, choices).estimate_keeping_ticks())
+
+
+def with_results(tick: Tick, **results: Any) -> Tick:
+    """The tick with other results of some stages; None for a stage that was not run."""
+    changed = {name: result for name, result in {**tick.results, **results}.items() if result is not None}
+    return dataclasses.replace(tick, results=changed)
 
 
 @pytest.fixture(scope="session")
-def flight(samples: Path) -> Run:
+def flight(samples: Path) -> ViewedRun:
     """A topspin shot of 96 ms."""
     return run_of(samples / "flight_fast_top.h5", Choices())
 
 
 @pytest.fixture(scope="session")
-def spinner(samples: Path) -> Run:
+def spinner(samples: Path) -> ViewedRun:
     """A ball on a spinner at 50 rps."""
     return run_of(samples / "spinner_ball1_top.h5", Choices(fixed_ball=(663.8, 272.4, 16.5)))
 
 
 @pytest.fixture(scope="session")
-def no_ball(tmp_path_factory: pytest.TempPathFactory) -> Run:
+def no_ball(tmp_path_factory: pytest.TempPathFactory) -> ViewedRun:
     """60 ms of noise, beginning at 5 s of the file's time."""
     path = tmp_path_factory.mktemp("noise") / "noise.h5"
     random, count = np.random.default_rng(1), 4000

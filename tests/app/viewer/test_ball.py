@@ -7,20 +7,20 @@ import pytest
 
 from spinscope.app.viewer import entities
 from spinscope.app.viewer.recorded import write_rrd
-from spinscope.app.viewer.run import Run, shown_estimate
+from spinscope.app.viewer.run import ViewedRun, shown_estimate
 from spinscope.app.viewer.still import TEXTURE_PX
 from tests.app.viewer.reading import Rows, read_back
 from tests.naive_still import turned
 
 
 @pytest.fixture(scope="module")
-def logged(flight: Run, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Rows]:
+def logged(flight: ViewedRun, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Rows]:
     path = tmp_path_factory.mktemp("rrd") / "flight.rrd"
     write_rrd(flight, path, "all")
     return read_back(path)
 
 
-def test_the_ball_is_where_the_tracker_has_it(flight: Run, logged: dict[str, Rows]) -> None:
+def test_the_ball_is_where_the_tracker_has_it(flight: ViewedRun, logged: dict[str, Rows]) -> None:
     for tick in flight.ticks:
         if tick.track.has_ball:
             (place,) = logged[entities.BALL].at("translation", tick.packet.end_us)
@@ -29,7 +29,7 @@ def test_the_ball_is_where_the_tracker_has_it(flight: Run, logged: dict[str, Row
             np.testing.assert_allclose(on_image[:2], tick.track.mean[:2], rtol=1e-6)
 
 
-def test_the_ball_turns_as_its_spin_says(flight: Run, logged: dict[str, Rows]) -> None:
+def test_the_ball_turns_as_its_spin_says(flight: ViewedRun, logged: dict[str, Rows]) -> None:
     """A millisecond after a tick the logged attitude has turned by the spin shown at that tick."""
     tick = flight.ticks[len(flight.ticks) // 2]
     estimate, _ = shown_estimate(tick)
@@ -46,7 +46,7 @@ def test_the_ball_turns_as_its_spin_says(flight: Run, logged: dict[str, Rows]) -
     np.testing.assert_allclose(after, turned(before, estimate.vector_rps, np.full(3, 1e-3)), atol=1e-4)
 
 
-def test_the_shown_arrow_points_along_the_trusted_spin(flight: Run, logged: dict[str, Rows]) -> None:
+def test_the_shown_arrow_points_along_the_trusted_spin(flight: ViewedRun, logged: dict[str, Rows]) -> None:
     tick = [tick for tick in flight.ticks if tick.best is not None][-1]
     assert tick.best is not None
     estimate = tick.estimates[tick.best]
@@ -58,7 +58,7 @@ def test_the_shown_arrow_points_along_the_trusted_spin(flight: Run, logged: dict
     assert sense > 0  # the ring runs the way the ball turns
 
 
-def test_the_path_is_the_ticks_places_in_pieces(flight: Run, logged: dict[str, Rows]) -> None:
+def test_the_path_is_the_ticks_places_in_pieces(flight: ViewedRun, logged: dict[str, Rows]) -> None:
     for before, tick in zip(flight.ticks, flight.ticks[1:], strict=False):
         if before.track.has_ball and tick.track.has_ball:
             (piece,) = logged[entities.PATH].at("strips", tick.packet.end_us)
@@ -66,7 +66,7 @@ def test_the_path_is_the_ticks_places_in_pieces(flight: Run, logged: dict[str, R
             np.testing.assert_allclose(piece, flight.centre_m(means), rtol=1e-5)
 
 
-def test_a_texture_is_painted_for_every_tick_of_200_hz(flight: Run, logged: dict[str, Rows]) -> None:
+def test_a_texture_is_painted_for_every_tick_of_200_hz(flight: ViewedRun, logged: dict[str, Rows]) -> None:
     mesh = logged[entities.MESH]
     width, height = TEXTURE_PX
     assert len(mesh.values["albedo_texture_buffer"]) == 1 + int(flight.has_ball.sum())

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from spinscope.app.viewer import entities, painting
 from spinscope.app.viewer.recorded import write_rrd
-from spinscope.app.viewer.run import Run
+from spinscope.app.viewer.run import ViewedRun
 from spinscope.app.viewer.still import MAP_PX, map_directions, map_frame
+from tests.app.viewer.conftest import with_results
 from tests.app.viewer.reading import read_back
 from tests.naive_still import turned
 
@@ -48,7 +49,7 @@ def test_a_point_on_the_ball_moves_right_on_the_map() -> None:
     np.testing.assert_allclose(there, directions[height // 2, width // 2 + 10], atol=1e-6)
 
 
-def strength(run: Run, path: Path) -> np.ndarray:
+def strength(run: ViewedRun, path: Path) -> np.ndarray:
     """(height, width) how strongly the last map is coloured, its sum 1."""
     write_rrd(run, path, "spin")
     picture = read_back(path)[entities.UNROLLED].picture(run.end_us).astype(float)
@@ -56,17 +57,17 @@ def strength(run: Run, path: Path) -> np.ndarray:
     return coloured.clip(0) / coloured.clip(0).sum()
 
 
-def test_the_map_is_sharp_when_the_spin_is_right(flight: Run, tmp_path: Path) -> None:
+def test_the_map_is_sharp_when_the_spin_is_right(flight: ViewedRun, tmp_path: Path) -> None:
     """With the spin 4 % off, the logo's events are spread over several times the area."""
 
-    def wrong(share: float) -> Run:
+    def wrong(share: float) -> ViewedRun:
         ticks = []
         for tick in flight.ticks:
             assert tick.contrast is not None
             estimate = tick.contrast.estimate
             if estimate.vector_rps is not None:
                 estimate = dataclasses.replace(estimate, vector_rps=share * estimate.vector_rps)
-            ticks.append(dataclasses.replace(tick, contrast=dataclasses.replace(tick.contrast, estimate=estimate)))
+            ticks.append(with_results(tick, contrast=dataclasses.replace(tick.contrast, estimate=estimate)))
         return dataclasses.replace(flight, ticks=ticks)
 
     sharp, smeared = (strength(run, tmp_path / "run.rrd") for run in (flight, wrong(1.04)))
@@ -77,7 +78,7 @@ def test_the_map_is_sharp_when_the_spin_is_right(flight: Run, tmp_path: Path) ->
 
 
 def test_a_long_run_is_painted_less_often_and_at_its_shots_end_all_the_same(
-    flight: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    flight: ViewedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def painted_us() -> np.ndarray:
         write_rrd(flight, tmp_path / "run.rrd", "spin")

@@ -16,7 +16,7 @@ from spinscope.app.viewer import LAYOUTS, entities
 from spinscope.app.viewer.layouts import NAMES
 from spinscope.app.viewer.recorded import write_rrd
 from spinscope.app.viewer.rerun_api import program, quiet_environment
-from spinscope.app.viewer.run import Run
+from spinscope.app.viewer.run import ViewedRun
 from spinscope.pipeline.errors import RecordingError
 from tests.app.viewer.reading import Rows, read_back
 
@@ -40,7 +40,7 @@ EVERYWHERE = {
 
 
 @pytest.fixture(scope="module")
-def flight_file(flight: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def flight_file(flight: ViewedRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("rrd") / "flight.rrd"
     write_rrd(flight, path, "all")
     return path
@@ -52,21 +52,21 @@ def logged(flight_file: Path) -> Logged:
 
 
 @pytest.fixture(scope="module", params=["flight", "spinner", "no_ball"])
-def any_run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Path]:
-    run: Run = request.getfixturevalue(request.param)
+def any_run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[ViewedRun, Path]:
+    run: ViewedRun = request.getfixturevalue(request.param)
     path = tmp_path_factory.mktemp("rrd") / f"{request.param}.rrd"
     write_rrd(run, path, "all")
     return run, path
 
 
-def test_rerun_itself_finds_no_fault(any_run: tuple[Run, Path]) -> None:
+def test_rerun_itself_finds_no_fault(any_run: tuple[ViewedRun, Path]) -> None:
     command = [program(), "rrd", "verify", str(any_run[1])]
     done = subprocess.run(command, capture_output=True, text=True, env=quiet_environment(), check=False)
     assert done.returncode == 0, done.stderr
     assert any_run[1].stat().st_size < 15e6
 
 
-def test_everything_begins_at_the_start_and_no_time_comes_twice(any_run: tuple[Run, Path]) -> None:
+def test_everything_begins_at_the_start_and_no_time_comes_twice(any_run: tuple[ViewedRun, Path]) -> None:
     run, logged = any_run[0], read_back(any_run[1])
     assert set(logged) >= EVERYWHERE
     for path, rows in logged.items():
@@ -77,7 +77,7 @@ def test_everything_begins_at_the_start_and_no_time_comes_twice(any_run: tuple[R
                 assert t_us[0] == run.start_us, (path, component)
 
 
-def test_plots_span_the_run_even_without_a_ball(any_run: tuple[Run, Path]) -> None:
+def test_plots_span_the_run_even_without_a_ball(any_run: tuple[ViewedRun, Path]) -> None:
     run, logged = any_run[0], read_back(any_run[1])
     plots = [path for path in logged if path.startswith("/plots/") and not path.endswith("/crossings")]
     assert len(plots) > 15
@@ -86,7 +86,7 @@ def test_plots_span_the_run_even_without_a_ball(any_run: tuple[Run, Path]) -> No
         assert t_us[-1] >= run.ends_us[-1] - 5000, path
 
 
-def test_the_kalman_circle_is_the_filters_mean(flight: Run, logged: Logged) -> None:
+def test_the_kalman_circle_is_the_filters_mean(flight: ViewedRun, logged: Logged) -> None:
     circle = logged[entities.KALMAN]
     assert not circle.at("centers", flight.start_us)
     for tick in flight.ticks:
@@ -98,7 +98,7 @@ def test_the_kalman_circle_is_the_filters_mean(flight: Run, logged: Logged) -> N
             assert not centres
 
 
-def test_measured_circles_are_there_when_measured(flight: Run, logged: Logged) -> None:
+def test_measured_circles_are_there_when_measured(flight: ViewedRun, logged: Logged) -> None:
     for tick in flight.ticks:
         for path, circle in ((entities.HOUGH, tick.track.hough), (entities.MEASURED, tick.track.measured)):
             centres = logged[path].at("centers", tick.packet.end_us)
@@ -108,7 +108,7 @@ def test_measured_circles_are_there_when_measured(flight: Run, logged: Logged) -
                 np.testing.assert_allclose(centres, [[circle.x_px, circle.y_px]], rtol=1e-6)
 
 
-def test_the_true_circle_is_dashed_around_the_true_centre(flight: Run, logged: Logged) -> None:
+def test_the_true_circle_is_dashed_around_the_true_centre(flight: ViewedRun, logged: Logged) -> None:
     assert flight.truth is not None
     tick = flight.ticks[10]
     dashes = np.array(logged[entities.TRUE_CIRCLE].at("strips", tick.packet.end_us))
@@ -116,7 +116,7 @@ def test_the_true_circle_is_dashed_around_the_true_centre(flight: Run, logged: L
     np.testing.assert_allclose(dashes.mean(axis=(0, 1)), truth, atol=0.01)
 
 
-def test_raw_events_are_all_there_in_their_colours(flight: Run, logged: Logged) -> None:
+def test_raw_events_are_all_there_in_their_colours(flight: ViewedRun, logged: Logged) -> None:
     events = logged[entities.EVENTS]
     for tick in flight.ticks[::5]:
         positions = np.array(events.at("positions", tick.packet.end_us))
@@ -129,7 +129,7 @@ def test_raw_events_are_all_there_in_their_colours(flight: Run, logged: Logged) 
         np.testing.assert_array_equal(positions[marked, 1], kept.y_px)
 
 
-def test_the_surface_is_shown_as_it_is(flight: Run, logged: Logged) -> None:
+def test_the_surface_is_shown_as_it_is(flight: ViewedRun, logged: Logged) -> None:
     tick = flight.ticks[-3]
     (blob,) = logged[entities.SURFACE].at("blob", tick.packet.end_us)
     shown = cv2.imdecode(np.array(blob, np.uint8), cv2.IMREAD_UNCHANGED)
@@ -137,19 +137,19 @@ def test_the_surface_is_shown_as_it_is(flight: Run, logged: Logged) -> None:
     assert logged[entities.SURFACE].static["translation"] == [[-0.5, -0.5, 0.0]]
 
 
-def test_logo_events_are_in_the_balls_frame(flight: Run, logged: Logged) -> None:
+def test_logo_events_are_in_the_balls_frame(flight: ViewedRun, logged: Logged) -> None:
     for tick in flight.ticks[4::6]:
         positions = np.array(logged[entities.LOGO].at("positions", tick.packet.end_us)).reshape(-1, 2)
         np.testing.assert_allclose(positions, np.column_stack([tick.logo.x_px, tick.logo.y_px]), atol=1e-4)
 
 
-def test_the_state_lane_changes_when_the_tracker_does(flight: Run, logged: Logged) -> None:
+def test_the_state_lane_changes_when_the_tracker_does(flight: ViewedRun, logged: Logged) -> None:
     lane = logged[entities.STATUS]
     for tick in flight.ticks:
         assert lane.at("state", tick.packet.end_us) == [tick.track.status]
 
 
-def test_the_plots_carry_values_and_variances(flight: Run, logged: Logged) -> None:
+def test_the_plots_carry_values_and_variances(flight: ViewedRun, logged: Logged) -> None:
     for i, name in enumerate(entities.QUANTITIES):
         rows = logged[f"{entities.PLOT}/{name}/kalman"]
         for tick in flight.ticks:
@@ -160,7 +160,7 @@ def test_the_plots_carry_values_and_variances(flight: Run, logged: Logged) -> No
         assert rows.static["units"] == [entities.UNITS[i]]
 
 
-def test_the_event_rate_is_the_last_ticks(flight: Run, logged: Logged) -> None:
+def test_the_event_rate_is_the_last_ticks(flight: ViewedRun, logged: Logged) -> None:
     rate = max((tick.rate for tick in flight.ticks), key=lambda rate: rate.t_us.size)
     rows = logged[f"{entities.RATE}/histogram"]
     shown = [rows.at("scalars", int(t))[0] for t in rate.t_us]
@@ -169,20 +169,20 @@ def test_the_event_rate_is_the_last_ticks(flight: Run, logged: Logged) -> None:
     np.testing.assert_allclose(crossings.t_us["scalars"], rate.crossings_us, atol=1e-3)
 
 
-def test_every_methods_spin_is_plotted(flight: Run, logged: Logged) -> None:
+def test_every_methods_spin_is_plotted(flight: ViewedRun, logged: Logged) -> None:
     tick = flight.ticks[-2]
     for method, estimate in tick.estimates.items():
         (value,) = logged[f"{entities.SPIN_MAGNITUDE}/{method}"].at("values", tick.packet.end_us)
         np.testing.assert_allclose(value, np.nan if estimate.magnitude_rps is None else estimate.magnitude_rps)
 
 
-def test_without_truth_nothing_claims_to_be_true(flight: Run, tmp_path: Path) -> None:
+def test_without_truth_nothing_claims_to_be_true(flight: ViewedRun, tmp_path: Path) -> None:
     write_rrd(dataclasses.replace(flight, truth=None), tmp_path / "untold.rrd", "all")
     assert not [path for path in read_back(tmp_path / "untold.rrd") if "tru" in path]
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_the_blueprint_has_all_tabs_paused_in_slow_motion(no_ball: Run, tmp_path: Path, layout: str) -> None:
+def test_the_blueprint_has_all_tabs_paused_in_slow_motion(no_ball: ViewedRun, tmp_path: Path, layout: str) -> None:
     write_rrd(no_ball, tmp_path / "run.rrd", layout)
     logged = read_back(tmp_path / "run.rrd", blueprint=True)
     containers = {path: rows.static for path, rows in logged.items() if path.startswith("/container/")}
@@ -198,7 +198,7 @@ def test_the_blueprint_has_all_tabs_paused_in_slow_motion(no_ball: Run, tmp_path
 
 
 def test_a_failed_write_leaves_the_old_file_and_no_litter(
-    flight: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    flight: ViewedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "run.rrd"
     path.write_bytes(b"precious")
@@ -213,7 +213,7 @@ def test_a_failed_write_leaves_the_old_file_and_no_litter(
     assert path.read_bytes() == b"precious"
 
 
-def test_a_folder_that_is_not_there_is_named(no_ball: Run, tmp_path: Path) -> None:
+def test_a_folder_that_is_not_there_is_named(no_ball: ViewedRun, tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"No such file or directory.*missing/run\.rrd"):
         write_rrd(no_ball, tmp_path / "missing" / "run.rrd", "all")
 

@@ -10,9 +10,10 @@ import pytest
 
 from spinscope.app.viewer import entities
 from spinscope.app.viewer.recorded import write_rrd
-from spinscope.app.viewer.run import Run
+from spinscope.app.viewer.run import ViewedRun
 from spinscope.app.viewer.score import CELL_PX, DISC_RADIUS_PX, GAP_PX
 from spinscope.pipeline.chain import Tick
+from tests.app.viewer.conftest import with_results
 from tests.app.viewer.reading import Rows, read_back
 
 RIVALS = np.array([[20.0, 0.0, -30.0], [0.0, 40.0, 5.0]])
@@ -23,16 +24,16 @@ def with_rivals(tick: Tick) -> Tick:
     result = tick.contrast
     if result is None or not result.magnitudes_rps.size:
         return tick
-    return dataclasses.replace(tick, contrast=dataclasses.replace(result, rivals_rps=RIVALS, rival_sigmas=np.ones(2)))
+    return with_results(tick, contrast=dataclasses.replace(result, rivals_rps=RIVALS, rival_sigmas=np.ones(2)))
 
 
 @pytest.fixture(scope="module")
-def rivalled(flight: Run) -> Run:
+def rivalled(flight: ViewedRun) -> ViewedRun:
     return dataclasses.replace(flight, ticks=[with_rivals(tick) for tick in flight.ticks])
 
 
 @pytest.fixture(scope="module")
-def logged(rivalled: Run, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Rows]:
+def logged(rivalled: ViewedRun, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Rows]:
     path = tmp_path_factory.mktemp("score") / "flight.rrd"
     write_rrd(rivalled, path, "spin")
     return read_back(path)
@@ -44,7 +45,7 @@ def numbers(rows: Rows, component: str, t_us: int) -> np.ndarray:
     return np.array(value if component == "widths" else value["buffer"])
 
 
-def test_the_curve_is_the_stages(rivalled: Run, logged: dict[str, Rows]) -> None:
+def test_the_curve_is_the_stages(rivalled: ViewedRun, logged: dict[str, Rows]) -> None:
     shown = 0
     for tick in rivalled.ticks:
         assert tick.contrast is not None
@@ -59,7 +60,7 @@ def test_the_curve_is_the_stages(rivalled: Run, logged: dict[str, Rows]) -> None
     assert shown > len(rivalled.ticks) / 2
 
 
-def test_best_and_rivals_stand_at_their_magnitudes(rivalled: Run, logged: dict[str, Rows]) -> None:
+def test_best_and_rivals_stand_at_their_magnitudes(rivalled: ViewedRun, logged: dict[str, Rows]) -> None:
     tick = rivalled.ticks[-3]
     assert tick.contrast is not None
     best = logged[f"{entities.SCORE_MAGNITUDE}/best"]
@@ -69,7 +70,7 @@ def test_best_and_rivals_stand_at_their_magnitudes(rivalled: Run, logged: dict[s
     assert (numbers(rivals, "values", tick.packet.end_us) < 0).all(), "below the curve: their axes are others"
 
 
-def test_axes_lie_on_the_disc_of_their_side(rivalled: Run, logged: dict[str, Rows]) -> None:
+def test_axes_lie_on_the_disc_of_their_side(rivalled: ViewedRun, logged: dict[str, Rows]) -> None:
     tick = rivalled.ticks[-3]
     places = np.array(logged[f"{entities.SCORE_AXES}/rivals"].at("positions", tick.packet.end_us))
     axes = RIVALS / np.linalg.norm(RIVALS, axis=1)[:, None]
@@ -78,7 +79,7 @@ def test_axes_lie_on_the_disc_of_their_side(rivalled: Run, logged: dict[str, Row
     np.testing.assert_allclose(places, [left, right], rtol=1e-5)
 
 
-def test_the_map_of_axes_is_lightest_at_the_best(rivalled: Run, logged: dict[str, Rows]) -> None:
+def test_the_map_of_axes_is_lightest_at_the_best(rivalled: ViewedRun, logged: dict[str, Rows]) -> None:
     tick = rivalled.ticks[-3]
     picture = logged[f"{entities.SCORE_AXES}/score"].picture(tick.packet.end_us).mean(axis=2)
     ((x, y),) = np.array(logged[f"{entities.SCORE_AXES}/best"].at("positions", tick.packet.end_us)) / CELL_PX
@@ -87,8 +88,8 @@ def test_the_map_of_axes_is_lightest_at_the_best(rivalled: Run, logged: dict[str
     assert np.median(picture) < 0.6 * picture.max()
 
 
-def test_nothing_is_claimed_without_contrast(flight: Run, tmp_path: Path) -> None:
-    ticks = [dataclasses.replace(tick, contrast=None) for tick in flight.ticks]
+def test_nothing_is_claimed_without_contrast(flight: ViewedRun, tmp_path: Path) -> None:
+    ticks = [with_results(tick, contrast=None) for tick in flight.ticks]
     write_rrd(dataclasses.replace(flight, ticks=ticks, truth=None), tmp_path / "run.rrd", "spin")
     logged = read_back(tmp_path / "run.rrd")
     assert f"{entities.SPIN_MAGNITUDE}/contrast" not in logged

@@ -11,13 +11,14 @@ import pytest
 
 from spinscope.app.viewer import entities
 from spinscope.app.viewer.recorded import write_rrd
-from spinscope.app.viewer.run import Run
-from spinscope.app.words import kind_of_spin
-from spinscope.pipeline.stages.spin import SpinResult
+from spinscope.app.viewer.run import ViewedRun
+from spinscope.pipeline.results import MethodResult
+from spinscope.pipeline.spin_terms import kind_of_spin
+from tests.app.viewer.conftest import with_results
 from tests.app.viewer.reading import Rows, read_back
 
 
-def logged_by(run: Run, folder: Path) -> dict[str, Rows]:
+def logged_by(run: ViewedRun, folder: Path) -> dict[str, Rows]:
     write_rrd(run, folder / "run.rrd", "coach")
     return read_back(folder / "run.rrd")
 
@@ -28,16 +29,16 @@ def said(logged: dict[str, Rows], t_us: int) -> str:
 
 
 @pytest.fixture(scope="module")
-def logged(flight: Run, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Rows]:
+def logged(flight: ViewedRun, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Rows]:
     return logged_by(flight, tmp_path_factory.mktemp("rrd"))
 
 
-def test_before_the_ball_it_says_so(flight: Run, logged: dict[str, Rows]) -> None:
+def test_before_the_ball_it_says_so(flight: ViewedRun, logged: dict[str, Rows]) -> None:
     assert said(logged, flight.start_us).startswith("## No ball yet")
     assert flight.name in said(logged, flight.start_us)
 
 
-def test_the_shots_end_tells_the_shot(flight: Run, logged: dict[str, Rows]) -> None:
+def test_the_shots_end_tells_the_shot(flight: ViewedRun, logged: dict[str, Rows]) -> None:
     (shot,) = flight.shots
     assert shot.best is not None
     best = shot.estimates[shot.best]
@@ -57,7 +58,7 @@ def test_the_shots_end_tells_the_shot(flight: Run, logged: dict[str, Rows]) -> N
     assert "from the truth" in text
 
 
-def test_every_tick_speaks_of_its_own_estimate(flight: Run, logged: dict[str, Rows]) -> None:
+def test_every_tick_speaks_of_its_own_estimate(flight: ViewedRun, logged: dict[str, Rows]) -> None:
     for tick in flight.ticks[:-1]:
         text = said(logged, tick.packet.end_us)
         if tick.best is not None and "so far" in text:
@@ -67,14 +68,14 @@ def test_every_tick_speaks_of_its_own_estimate(flight: Run, logged: dict[str, Ro
                 assert f"refused: {estimate.reason}" in text
 
 
-def test_a_ball_in_place_has_an_axis_and_no_speed(spinner: Run, tmp_path: Path) -> None:
+def test_a_ball_in_place_has_an_axis_and_no_speed(spinner: ViewedRun, tmp_path: Path) -> None:
     text = said(logged_by(spinner, tmp_path), spinner.end_us)
     assert "In place" in text or "in place" in text
     assert "m/s" not in text
     assert "topspin" not in text
 
 
-def test_no_ball_says_why(no_ball: Run, tmp_path: Path) -> None:
+def test_no_ball_says_why(no_ball: ViewedRun, tmp_path: Path) -> None:
     assert no_ball.no_shot_reason
     text = said(logged_by(no_ball, tmp_path), no_ball.start_us)
     assert text.startswith("## No ball in this recording")
@@ -82,19 +83,19 @@ def test_no_ball_says_why(no_ball: Run, tmp_path: Path) -> None:
     assert "5,000,000 to" in text  # the file's own time
 
 
-def vague(spin: SpinResult) -> SpinResult:
-    """The same answers with a hundred times the uncertainty."""
-    estimates = {
-        name: estimate
-        if estimate.covariance_rps2 is None
-        else dataclasses.replace(estimate, covariance_rps2=1e4 * estimate.covariance_rps2)
-        for name, estimate in spin.estimates.items()
-    }
-    return SpinResult(estimates)
+def vague(result: MethodResult) -> MethodResult:
+    """The same answer with a hundred times the uncertainty."""
+    estimate = result.estimate
+    if estimate.covariance_rps2 is None:
+        return result
+    return MethodResult(dataclasses.replace(estimate, covariance_rps2=1e4 * estimate.covariance_rps2))
 
 
-def test_doubt_and_warnings_are_said(flight: Run, tmp_path: Path) -> None:
-    ticks = [dataclasses.replace(tick, spin=vague(tick.spin), contrast=None) for tick in flight.ticks]
+def test_doubt_and_warnings_are_said(flight: ViewedRun, tmp_path: Path) -> None:
+    ticks = [
+        with_results(tick, triplet=vague(tick.triplet), normal_flow=vague(tick.normal_flow), contrast=None)
+        for tick in flight.ticks
+    ]
     doubtful = dataclasses.replace(flight, ticks=ticks, shots=[], warnings=["seven hot pixels"])
     text = said(logged_by(doubtful, tmp_path), flight.ticks[12].packet.end_us)
     assert "no method is trusted" in text
@@ -107,7 +108,7 @@ def block(logged: dict[str, Rows], number: int, t_us: int) -> np.ndarray:
     return cv2.imdecode(np.array(blob, np.uint8), cv2.IMREAD_GRAYSCALE)
 
 
-def test_the_card_changes_with_the_shot(flight: Run, logged: dict[str, Rows]) -> None:
+def test_the_card_changes_with_the_shot(flight: ViewedRun, logged: dict[str, Rows]) -> None:
     for number in range(2):
         first, last = (block(logged, number, t_us) for t_us in (flight.start_us, flight.shots[0].end_us))
         assert first.shape == last.shape

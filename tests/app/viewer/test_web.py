@@ -13,13 +13,13 @@ import pytest
 from spinscope.app.viewer import show
 from spinscope.app.viewer.native import show_native
 from spinscope.app.viewer.rerun_api import playhead_request
-from spinscope.app.viewer.run import Run
+from spinscope.app.viewer.run import ViewedRun
 from spinscope.app.viewer.web import served
 from spinscope.pipeline.errors import SpinscopeError
 
 
 @pytest.fixture(scope="module")
-def address(no_ball: Run) -> Iterator[str]:
+def address(no_ball: ViewedRun) -> Iterator[str]:
     with served(no_ball, "all") as (server, address):
         thread = threading.Thread(target=server.serve_forever, daemon=True)
         thread.start()
@@ -75,18 +75,18 @@ def test_other_paths_and_other_names_are_turned_away(address: str, path: str, ho
         fetched(address + path, Host=host)
 
 
-def test_a_taken_port_gives_another(address: str, no_ball: Run) -> None:
+def test_a_taken_port_gives_another(address: str, no_ball: ViewedRun) -> None:
     with served(no_ball, "all") as (_, second):
         assert second != address
 
 
-def test_it_opens_where_a_spin_is_first_trusted(flight: Run, no_ball: Run) -> None:
+def test_it_opens_where_a_spin_is_first_trusted(flight: ViewedRun, no_ball: ViewedRun) -> None:
     first = next(tick for tick in flight.ticks if tick.best is not None)
     assert flight.opening_us == first.packet.end_us > flight.first_sight_us
     assert no_ball.opening_us == no_ball.first_sight_us == no_ball.ticks[0].packet.end_us
 
 
-def test_the_playhead_goes_where_the_run_opens(flight: Run) -> None:
+def test_the_playhead_goes_where_the_run_opens(flight: ViewedRun) -> None:
     """Decoded as protobuf: {6: {2: {1: "t"}, 3: {1: nanoseconds}, 5: 1 (paused)}}."""
     cursor = fields(fields(playhead_request(flight.opening_us))[6])
     assert fields(cursor[2]) == {1: b"t"}
@@ -123,7 +123,9 @@ def fields(message: bytes) -> dict[int, bytes | int]:
     return found
 
 
-def test_ctrl_c_ends_it(no_ball: Run, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_ctrl_c_ends_it(
+    no_ball: ViewedRun, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
@@ -137,7 +139,7 @@ def test_ctrl_c_ends_it(no_ball: Run, monkeypatch: pytest.MonkeyPatch, capsys: p
     assert "--save" in line
 
 
-def test_no_display_no_window(no_ball: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_display_no_window(no_ball: ViewedRun, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)

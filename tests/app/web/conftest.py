@@ -13,10 +13,10 @@ import httpx
 import pytest
 import uvicorn
 
-from spinscope.app.session import Choices
 from spinscope.app.web.serving import _listening_socket
 from spinscope.app.web.web import application
 from spinscope.app.web.workshop import Workshop
+from spinscope.pipeline.session import Choices
 
 PATIENCE_S = 120.0  # the first run on a machine compiles the kernels
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from spinscope.app.simulate import simulate_to_file
-from spinscope.pipeline.chain import STAGES
+from spinscope.pipeline.registry import STAGES
 
 from .conftest import Served, served
 

@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from spinscope.app.cli import cli
-from spinscope.app.session import DEFAULT_SAMPLE, Choices
+from spinscope.pipeline.session import DEFAULT_SAMPLE, Choices
 
 
 @pytest.fixture

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spinscope.app.session import Choices
 from spinscope.app.viewer.tuning import Drawings, compared, layout_bytes, rrd_bytes, tab_names
 from spinscope.app.web.bench import LATE, Bench
 from spinscope.app.web.jobs import Job, fault
@@ -20,9 +19,10 @@ from spinscope.app.web.measures import _jitter_px, coach_sentence, measures
 from spinscope.app.web.outbox import Outbox
 from spinscope.app.web.page import Page, Wanted
 from spinscope.app.web.runs import Finished, finish
-from spinscope.app.words import kind_of_spin
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.results import Circle, SpinEstimate
+from spinscope.pipeline.session import Choices
+from spinscope.pipeline.spin_terms import kind_of_spin
 
 from .conftest import Client
 

@@ -15,9 +15,9 @@ from click.testing import CliRunner
 from rerun.chunk import RrdReader
 
 from spinscope.app.cli import cli
-from spinscope.app.session import Choices
 from spinscope.app.web.bench import Bench
-from spinscope.pipeline.chain import STAGES, Parameters
+from spinscope.pipeline.registry import STAGES, Parameters
+from spinscope.pipeline.session import Choices
 from spinscope.pipeline.stages import logo
 
 from .conftest import Client, Served

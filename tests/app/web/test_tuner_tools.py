@@ -7,15 +7,15 @@ from typing import Any
 
 import pytest
 
-from spinscope.app.session import Choices
 from spinscope.app.simulate import simulate_to_file
 from spinscope.app.web.biases import known_biases
 from spinscope.app.web.controls import scale_of, sections
 from spinscope.app.web.curve import values_over
 from spinscope.app.web.search import REFUSED, cost_of
 from spinscope.pipeline.biases import BiasParameters
-from spinscope.pipeline.chain import Parameters
 from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.registry import Parameters
+from spinscope.pipeline.session import Choices
 
 from .conftest import Client, served
 

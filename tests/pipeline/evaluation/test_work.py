@@ -14,10 +14,10 @@ from pathlib import Path
 
 import pytest
 
-from spinscope.pipeline.chain import Parameters
 from spinscope.pipeline.errors import ParameterError, RecordingError
 from spinscope.pipeline.evaluation.tables import Row
 from spinscope.pipeline.evaluation.work import Bench, Task, _make_room, executor, run, write_whole
+from spinscope.pipeline.registry import Parameters
 
 CALLS: list[int] = []
 

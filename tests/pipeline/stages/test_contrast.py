@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spinscope.app.session import Choices, Session
 from spinscope.pipeline.events import EventBatch
-from spinscope.pipeline.methods import best_of
-from spinscope.pipeline.results import SpinEstimate
-from spinscope.pipeline.stages import contrast
-from spinscope.pipeline.stages.contrast import ContrastResult
+from spinscope.pipeline.registry import trusted_method
+from spinscope.pipeline.results import MethodResult, SpinEstimate
+from spinscope.pipeline.session import Choices, Session
+from spinscope.pipeline.spin.contrast import stage as contrast
+from spinscope.pipeline.spin.contrast.stage import ContrastResult
 from spinscope.pipeline.stages.logo import LogoResult
-from tests.spinning_ball import SETTING, after_track, known_track, packets
+from tests.spinning_ball import CONTEXT, after_track, known_track, packets
 
 BALLS = {"spinner_ball2_side": (528.43, 426.87, 16.49), "spinner_ball5_back_no_logo": (606.67, 302.79, 16.47)}
 
@@ -27,12 +27,12 @@ def results(
     """The results of the ticks with a ball in view, and the true spin in rps."""
     session = Session.open(samples / f"{name}.h5", Choices(fixed_ball=BALLS.get(name)))
     parameters = contrast.ContrastParameters()
-    state = contrast.start(parameters, session.chain.setting(session.parameters))
+    state = session.chain.start(session.parameters, contrast.STAGE)
     found = []
-    for tick in session.ticks(forget=("surface",)):
-        result = contrast.step(parameters, state, tick.packet, tick.track, logo_of(tick.logo), tick.spin)
-        if tick.track.has_ball:
-            found.append(result)
+    for tick in session.ticks(("logo", "normal_flow"), forget=("surface",)):
+        if tick.track.ball is not None:
+            given = tick.packet, tick.track.ball, logo_of(tick.logo), tick.normal_flow
+            found.append(contrast.step(parameters, state, *given))
     assert session.truth is not None
     return found, session.truth.spin_rps[0]
 
@@ -115,12 +115,13 @@ def test_too_few_events_are_refused(samples: Path) -> None:
 def test_a_sure_normal_flow_that_says_otherwise_is_heard(samples: Path) -> None:
     session = Session.open(samples / "spinner_ball2_side.h5", Choices(fixed_ball=BALLS["spinner_ball2_side"]))
     parameters = contrast.ContrastParameters()
-    state = contrast.start(parameters, session.chain.setting(session.parameters))
+    state = session.chain.start(session.parameters, contrast.STAGE)
     other = SpinEstimate("normal_flow", np.array([0.0, 0.0, 70.0]), np.eye(3), None)
     ticks = list(session.ticks(forget=("surface",)))
     for tick in ticks:
-        spin = replace(tick.spin, estimates={**tick.spin.estimates, "normal_flow": other})
-        estimate = contrast.step(parameters, state, tick.packet, tick.track, tick.logo, spin).estimate
+        assert tick.track.ball is not None
+        given = tick.packet, tick.track.ball, tick.logo, MethodResult(other)
+        estimate = contrast.step(parameters, state, *given).estimate
     assert estimate.status == "refused" and estimate.against == "normal_flow"
     assert "normal flow says (0, 0, 70) rps" in str(estimate.reason)
 
@@ -134,7 +135,8 @@ def test_noise_on_a_ball_is_no_spin_for_any_trusted_method(seed: int) -> None:
     events = EventBatch.checked(t, x, y, random.random(3000) < 0.5, width_px=1280, height_px=720)
     ticks = [(packet, known_track(packet.end_us)) for packet in packets(events)]
     parameters = contrast.ContrastParameters()
-    state = contrast.start(parameters, SETTING)
+    state = contrast.start(parameters, CONTEXT)
     for (packet, track), (logo, _, _, spin) in zip(ticks, after_track(ticks), strict=True):
-        estimate = contrast.step(parameters, state, packet, track, logo, spin).estimate
-        assert best_of({**spin.estimates, "contrast": estimate}) is None
+        assert track.ball is not None
+        result = contrast.step(parameters, state, packet, track.ball, logo, MethodResult(spin["normal_flow"]))
+        assert trusted_method({**spin, "contrast": result.estimate}) is None

@@ -7,15 +7,16 @@ import itertools
 import numpy as np
 import pytest
 
-from spinscope.pipeline.camera import Camera, CameraParameters, Setting
+from spinscope.pipeline.camera import Camera, CameraParameters
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.results import Packet
+from spinscope.pipeline.stage import Context
 from spinscope.pipeline.stages import filter as stage
 from spinscope.pipeline.stages.filter import MODES, FilterParameters
 from tests.naive_filter import NaiveFilter
 
 WIDTH, HEIGHT, TICK_US = 9, 7, 1000
-SETTING = Setting(Camera.of(CameraParameters(), WIDTH, HEIGHT), 0.02, 150.0)
+CONTEXT = Context(Camera.of(CameraParameters(), WIDTH, HEIGHT), 0.02, {"spin.max_spin_rps": 150.0})
 START_US = 1_600_000_000_000_000
 
 
@@ -43,7 +44,7 @@ def rows(batch: EventBatch) -> list[tuple[int, int, int, bool]]:
 @pytest.mark.parametrize("logo_threshold_us", [200, 500])
 def test_every_pair_of_filters_equals_two_twins(mode: str, logo_mode: str, logo_threshold_us: int) -> None:
     parameters = FilterParameters(mode=mode, threshold_us=200, logo_mode=logo_mode, logo_threshold_us=logo_threshold_us)
-    state = stage.start(parameters, SETTING)
+    state = stage.start(parameters, CONTEXT)
     twin, logo_twin = NaiveFilter(mode, 200), NaiveFilter(logo_mode, logo_threshold_us)
     for packet in packets(seed=1):
         result = stage.step(parameters, state, packet)
@@ -55,12 +56,12 @@ def test_every_pair_of_filters_equals_two_twins(mode: str, logo_mode: str, logo_
 def test_equal_settings_are_filtered_once_and_off_copies_nothing() -> None:
     (packet, *_) = packets(seed=2)
     same = FilterParameters(mode="trail", threshold_us=300, logo_mode="trail", logo_threshold_us=300)
-    result = stage.step(same, stage.start(same, SETTING), packet)
+    result = stage.step(same, stage.start(same, CONTEXT), packet)
     assert result.surface_events is result.logo_events
     off = FilterParameters(mode="off", logo_mode="stc")
-    result = stage.step(off, stage.start(off, SETTING), packet)
+    result = stage.step(off, stage.start(off, CONTEXT), packet)
     assert result.surface_events is packet.events
     assert 0 < len(result.logo_events) < len(packet.events)
     both_off = FilterParameters(mode="off", logo_mode="off", threshold_us=1)
-    result = stage.step(both_off, stage.start(both_off, SETTING), packet)
+    result = stage.step(both_off, stage.start(both_off, CONTEXT), packet)
     assert result.surface_events is result.logo_events is packet.events

@@ -28,7 +28,7 @@ def noise(count: int, seed: int) -> EventBatch:
 def test_samples_are_found_within_two_sigma(name: str, extra: int) -> None:
     """Also under ten times the noise."""
     events, truth = sample(name)
-    circle, std_px = find_fixed_ball(merged(events, noise(extra, 1)), setting(), 5.0, 40.0)
+    circle, std_px = find_fixed_ball(merged(events, noise(extra, 1)), setting().camera, 5.0, 40.0)
     off = math.hypot(circle.x_px - truth.x_px[0], circle.y_px - truth.y_px[0])
     assert off < 2 * std_px
     assert abs(circle.radius_px - truth.radius_px[0]) < 2 * std_px
@@ -38,18 +38,18 @@ def test_samples_are_found_within_two_sigma(name: str, extra: int) -> None:
 def test_a_path_that_fits_many_circles_is_refused() -> None:
     """Ball 1: a narrow band across the disc, which could be any chord of it."""
     with pytest.raises(RecordingError, match=r"fits many circles.*--fixed-ball"):
-        find_fixed_ball(sample("spinner_ball1_top")[0], setting(), 5.0, 40.0)
+        find_fixed_ball(sample("spinner_ball1_top")[0], setting().camera, 5.0, 40.0)
 
 
 def test_a_logo_that_hardly_shows_is_refused() -> None:
     with pytest.raises(RecordingError, match=r"194 events, fewer than the 300"):
-        find_fixed_ball(sample("spinner_ball5_back_no_logo")[0], setting(), 5.0, 40.0)
+        find_fixed_ball(sample("spinner_ball5_back_no_logo")[0], setting().camera, 5.0, 40.0)
 
 
 def test_radii_out_of_range_are_refused() -> None:
     for low, high in ((20.0, 40.0), (5.0, 10.0)):
         with pytest.raises(RecordingError, match="no ball found"):
-            find_fixed_ball(sample("spinner_ball2_side")[0], setting(), low, high)
+            find_fixed_ball(sample("spinner_ball2_side")[0], setting().camera, low, high)
 
 
 def test_noise_hot_pixels_and_silence_are_refused() -> None:
@@ -66,4 +66,4 @@ def test_noise_hot_pixels_and_silence_are_refused() -> None:
     )
     for events in (noise(200_000, 3), pixels, row, EventBatch.empty()):
         with pytest.raises(RecordingError, match="no ball found"):
-            find_fixed_ball(events, setting(), 5.0, 40.0)
+            find_fixed_ball(events, setting().camera, 5.0, 40.0)

@@ -14,7 +14,7 @@ from spinscope.pipeline.stages import rate as stage
 from spinscope.pipeline.stages.filter import FilterResult
 from spinscope.pipeline.stages.rate import RateParameters, RateResult
 from spinscope.pipeline.stages.track import TrackResult
-from tests.spinning_ball import SETTING, known_track, no_track, packets
+from tests.spinning_ball import CONTEXT, known_track, no_track, of_shot, packets
 
 
 def rhythm(spin_rps: float, *, duration_us: int = 100_000, strokes: int = 4, events: int = 400) -> EventBatch:
@@ -34,13 +34,18 @@ def rates(
 ) -> list[RateResult]:
     """What the stage says tick by tick."""
     group = parameters or RateParameters()
-    logo_state, state = logo_stage.start(logo_stage.LogoParameters(), SETTING), stage.start(group, SETTING)
+    logo_state, shot = logo_stage.start(logo_stage.LogoParameters(), CONTEXT), None
     results = []
     for number, packet in enumerate(packets(events, until_us=100_000)):
         track = tracks[number] if tracks else known_track(packet.end_us)
+        if track.ball is None:
+            results.append(stage.absent(group, "no ball"))
+            continue
+        if track.shot != shot:
+            shot, state = track.shot, stage.start(group, CONTEXT)
         filtered = FilterResult(packet.events, packet.events)
-        seen = logo_stage.step(logo_stage.LogoParameters(), logo_state, packet, filtered, track)
-        results.append(stage.step(group, state, packet, track, seen))
+        seen = logo_stage.step(logo_stage.LogoParameters(), logo_state, packet, filtered, track.ball)
+        results.append(stage.step(group, state, packet, seen))
     return results
 
 
@@ -86,14 +91,14 @@ def test_reasons_for_no_spin() -> None:
 
 
 def test_above_the_highest_spin_there_is_no_answer() -> None:
-    setting = dataclasses.replace(SETTING, max_spin_rps=40.0)
-    state, group = stage.start(RateParameters(), setting), RateParameters()
-    seen = logo_stage.start(logo_stage.LogoParameters(), SETTING)
+    slow = dataclasses.replace(CONTEXT, values={"spin.max_spin_rps": 40.0})
+    state, group = stage.start(RateParameters(), slow), RateParameters()
+    seen = logo_stage.start(logo_stage.LogoParameters(), CONTEXT)
     for packet in packets(rhythm(80.0)):
         track = known_track(packet.end_us)
         filtered = FilterResult(packet.events, packet.events)
-        logo = logo_stage.step(logo_stage.LogoParameters(), seen, packet, filtered, track)
-        result = stage.step(group, state, packet, track, logo)
+        logo = logo_stage.step(logo_stage.LogoParameters(), seen, packet, filtered, track.ball)
+        result = stage.step(group, state, packet, logo)
     assert result.spin_rps is None
 
 
@@ -102,7 +107,7 @@ def test_a_new_shot_starts_afresh_and_without_a_ball_there_is_nothing() -> None:
     ends = [packet.end_us for packet in packets(events, until_us=100_000)]
     tracks = [known_track(end_us) for end_us in ends]
     tracks[9] = no_track(ends[9])
-    tracks[10:] = [dataclasses.replace(track, shot=1) for track in tracks[10:]]
+    tracks[10:] = [of_shot(track, 1) for track in tracks[10:]]
     results = rates(events, tracks=tracks)
     assert results[8].t_us[0] == 0 and results[8].spin_rps is not None
     assert results[9].t_us.size == 0 and results[9].reason == "no ball"
@@ -117,12 +122,12 @@ def test_it_looks_back_over_the_window_only() -> None:
 
 def test_ticks_of_another_length_than_the_bins_give_the_same_bins() -> None:
     events = rhythm(60.0)
-    group, state = RateParameters(bin_us=700), stage.start(RateParameters(), SETTING)
-    logo_state = logo_stage.start(logo_stage.LogoParameters(), SETTING)
+    group, state = RateParameters(bin_us=700), stage.start(RateParameters(), CONTEXT)
+    logo_state = logo_stage.start(logo_stage.LogoParameters(), CONTEXT)
     for start_us in range(0, 100_000, 1000):
         packet = Packet(start_us // 1000, start_us, start_us + 1000, events.between(start_us, start_us + 1000))
         track = known_track(packet.end_us)
         filtered = FilterResult(packet.events, packet.events)
-        logo = logo_stage.step(logo_stage.LogoParameters(), logo_state, packet, filtered, track)
-        result = stage.step(group, state, packet, track, logo)
+        logo = logo_stage.step(logo_stage.LogoParameters(), logo_state, packet, filtered, track.ball)
+        result = stage.step(group, state, packet, logo)
     np.testing.assert_array_equal(result.rate_hz, rates(events, group)[-1].rate_hz)

@@ -17,23 +17,25 @@ from hypothesis import strategies as st
 
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.kernels.sphere import image_velocity
-from spinscope.pipeline.methods import best_of
+from spinscope.pipeline.registry import trusted_method
 from spinscope.pipeline.results import SpinEstimate
+from spinscope.pipeline.spin.parameters import SpinParameters
+from spinscope.pipeline.spin.triplet import TripletSpin
 from spinscope.pipeline.stages.flow import FlowResult
 from spinscope.pipeline.stages.rate import RateResult
-from spinscope.pipeline.stages.spin import METHODS, SpinParameters, SpinResult
-from spinscope.pipeline.stages.triplet_spin import TripletSpin
 from tests.spinning_ball import (
     CAMERA,
-    SETTING,
+    CONTEXT,
     after_track,
     errors,
     known_track,
     no_track,
+    of_shot,
     packets,
     spinning_ball,
 )
 
+METHODS = ("triplet", "normal_flow")
 ROOT = Path(__file__).parents[3]
 SILENT = RateResult(*(np.empty(0),) * 4, 200.0, np.empty(0), None, None, "nothing yet")  # type: ignore[arg-type]
 STILL = {"centre_m": (0.0, 0.0, 2.0), "velocity_m_s": (0.0, 0.0, 0.0)}
@@ -53,32 +55,32 @@ def events_of(case: str) -> EventBatch:
     return spinning_ball(np.array(spin_rps), towards=towards, **motion)
 
 
-def spins(events: EventBatch, motion: dict, **parameters: object) -> list[SpinResult]:
+def spins(events: EventBatch, motion: dict, **parameters: object) -> list[dict[str, SpinEstimate]]:
     """What the stage says tick by tick."""
     ticks = [(packet, known_track(packet.end_us, **motion)) for packet in packets(events)]
     return [result[3] for result in after_track(ticks, parameters=SpinParameters(**parameters))]
 
 
 def last(case: str, method: str = "normal_flow", **parameters: object) -> SpinEstimate:
-    return spins(events_of(case), CASES[case][2], **parameters)[-1].estimates[method]
+    return spins(events_of(case), CASES[case][2], **parameters)[-1][method]
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_normal_flow_finds_the_spin(case: str) -> None:
     results = spins(events_of(case), CASES[case][2])
-    estimate = results[-1].estimates["normal_flow"]
+    estimate = results[-1]["normal_flow"]
     off_rps, off_deg = errors(estimate, np.array(CASES[case][0]))
     assert abs(off_rps) < 2.0 and off_deg < (5.0 if case == "back, flying" else 1.5)
     assert off_deg < 3 * estimate.axis_std_deg
-    assert best_of(results[-1].estimates) == "normal_flow"
+    assert trusted_method(results[-1]) == "normal_flow"
 
 
 @pytest.mark.parametrize("case", ["top, in place", "side, logo at 45 degrees", "top, flying"])
 def test_each_tick_says_what_is_known_so_far(case: str) -> None:
     """After 10 ms, a fifth to a half of a rotation, the axis is known to a few degrees already."""
     for number, result in enumerate(spins(events_of(case), CASES[case][2])):
-        assert set(result.estimates) == set(METHODS)
-        estimate = result.estimates["normal_flow"]
+        assert set(result) == set(METHODS)
+        estimate = result["normal_flow"]
         if estimate.vector_rps is not None:
             off_rps, off_deg = errors(estimate, np.array(CASES[case][0]))
             assert off_deg < 4 * estimate.axis_std_deg + 1
@@ -110,13 +112,13 @@ def test_laws_of_symmetry(case: str, method: str) -> None:
     """Turning the scene turns the spin, a mirror keeps the part along its own axis, time reversed reverses it."""
     events, motion = events_of(case), CASES[case][2]
     x, y, z = motion["centre_m"]
-    here = spins(events, motion, magnitude_from="flow")[-1].estimates[method].vector_rps
+    here = spins(events, motion, magnitude_from="flow")[-1][method].vector_rps
     for change, signs, place in (
         (upside_down, (-1, -1, 1), (-x, -y, z)),
         (mirrored, (1, -1, -1), (-x, y, z)),
         (backwards, (-1, -1, -1), (x, y, z)),
     ):
-        there = spins(change(events), {**motion, "centre_m": place}, magnitude_from="flow")[-1].estimates[method]
+        there = spins(change(events), {**motion, "centre_m": place}, magnitude_from="flow")[-1][method]
         assert here is not None and there.vector_rps is not None
         tolerance = (0.02 if method == "normal_flow" else 0.2) * np.linalg.norm(here)
         np.testing.assert_allclose(there.vector_rps, np.array(signs) * here, atol=tolerance)
@@ -125,11 +127,11 @@ def test_laws_of_symmetry(case: str, method: str) -> None:
 def test_a_ball_twice_as_large_twice_as_far_away_is_the_same() -> None:
     """All that the camera sees is the same, and so is the spin."""
     motion = CASES["mixed, off the axis"][2]
-    large = dataclasses.replace(SETTING, ball_radius_m=0.04)
+    large = dataclasses.replace(CONTEXT, ball_radius_m=0.04)
     place = {**motion, "centre_m": tuple(2 * c for c in motion["centre_m"])}
     events = events_of("mixed, off the axis")
-    ticks = [(packet, known_track(packet.end_us, **place, setting=large)) for packet in packets(events)]
-    for method, estimate in after_track(ticks, setting=large)[-1][3].estimates.items():
+    ticks = [(packet, known_track(packet.end_us, **place, context=large)) for packet in packets(events)]
+    for method, estimate in after_track(ticks, context=large)[-1][3].items():
         assert estimate.vector_rps is not None
         np.testing.assert_allclose(estimate.vector_rps, last("mixed, off the axis", method).vector_rps, atol=0.05)
 
@@ -169,7 +171,7 @@ def perfect_flow(seed: int, spin_rad_s: np.ndarray) -> FlowResult:
 
 
 def triplet(flow: FlowResult, solve: str) -> np.ndarray:
-    method = TripletSpin(SpinParameters(triplet_solve=solve), SETTING)
+    method = TripletSpin(SpinParameters(triplet_solve=solve), CONTEXT)
     vector = method.estimate(10_000, flow, SILENT).vector_rps
     assert vector is not None
     return vector
@@ -215,7 +217,7 @@ def test_full_rank_needs_more_than_one_side() -> None:
     columns = ("t_us", "x_px", "y_px", "points_m", "normals", "vx_px_s", "vy_px_s", "slice_index")
     one_side = dataclasses.replace(flow, **{name: getattr(flow, name)[near] for name in columns})
     one_side.normals[:] = flow.normals[0]
-    method = TripletSpin(SpinParameters(triplet_solve="least_squares"), SETTING)
+    method = TripletSpin(SpinParameters(triplet_solve="least_squares"), CONTEXT)
     assert "one side" in (method.estimate(10_000, one_side, SILENT).reason or "")
 
 
@@ -223,15 +225,15 @@ def test_no_ball_and_no_logo_are_refusals_with_reasons() -> None:
     events = events_of("top, in place")
     ticks = [(packet, no_track(packet.end_us)) for packet in packets(events)]
     for _, _, _, result in after_track(ticks):
-        assert best_of(result.estimates) is None
-        assert {e.reason for e in result.estimates.values()} == {"no ball"}
+        assert trusted_method(result) is None
+        assert {e.reason for e in result.values()} == {"no ball"}
     empty = [
         (dataclasses.replace(packet, events=EventBatch.empty()), known_track(packet.end_us)) for packet, _ in ticks
     ]
     result = after_track(empty)[-1][3]
-    assert best_of(result.estimates) is None
-    assert result.estimates["triplet"].reason == "no flow"
-    assert "hardly seen" in (result.estimates["normal_flow"].reason or "")
+    assert trusted_method(result) is None
+    assert result["triplet"].reason == "no flow"
+    assert "hardly seen" in (result["normal_flow"].reason or "")
 
 
 def test_an_outline_that_bleeds_into_the_mask_is_no_logo() -> None:
@@ -242,13 +244,14 @@ def test_an_outline_that_bleeds_into_the_mask_is_no_logo() -> None:
     on = rng.random(4000) < 0.2
     track = known_track(50_000, **FLIGHT)
     direction = np.arctan2(track.mean[3], track.mean[2]) + angle + np.where(on, 0, np.pi)
-    x, y = track.centre_px(t)
+    assert track.ball is not None
+    x, y = track.ball.centre_px(t)
     away = track.mean[4] - 2.5 - depth
     x, y = np.round(x + away * np.cos(direction)), np.round(y + away * np.sin(direction))
     events = EventBatch.checked(t, x, y, on, width_px=1280, height_px=720)
     results = spins(events, FLIGHT)
-    assert all(result.estimates["normal_flow"].status == "refused" for result in results)
-    assert all(best_of(result.estimates) is None for result in results)
+    assert all(result["normal_flow"].status == "refused" for result in results)
+    assert all(trusted_method(result) is None for result in results)
 
 
 def test_events_without_order_are_no_spin() -> None:
@@ -256,17 +259,17 @@ def test_events_without_order_are_no_spin() -> None:
     t = np.sort(rng.integers(0, 50_000, 3000))
     x, y = rng.integers(628, 652, 3000), rng.integers(348, 372, 3000)
     events = EventBatch.checked(t, x, y, rng.random(3000) < 0.5, width_px=1280, height_px=720)
-    assert all(best_of(result.estimates) is None for result in spins(events, STILL))
+    assert all(trusted_method(result) is None for result in spins(events, STILL))
 
 
 def test_a_new_shot_knows_nothing_of_the_last() -> None:
     events = events_of("top, in place")
     ticks = [(packet, known_track(packet.end_us)) for packet in packets(events)]
-    second = [(packet, dataclasses.replace(track, shot=1)) for packet, track in ticks[5:]]
+    second = [(packet, of_shot(track, 1)) for packet, track in ticks[5:]]
     fresh = after_track(ticks[5:])
     for (_, _, _, one), (_, _, _, other) in zip(after_track(ticks[:5] + second)[5:], fresh, strict=True):
         for method in METHODS:
-            a, b = one.estimates[method], other.estimates[method]
+            a, b = one[method], other[method]
             assert a.reason == b.reason
             if a.vector_rps is not None:
                 np.testing.assert_array_equal(a.vector_rps, b.vector_rps)
@@ -274,8 +277,8 @@ def test_a_new_shot_knows_nothing_of_the_last() -> None:
 
 def test_the_window_forgets() -> None:
     events = events_of("side, logo at 45 degrees")
-    short = spins(events, STILL, window_us=20_000)[-1].estimates
-    whole = spins(events, STILL)[-1].estimates
+    short = spins(events, STILL, window_us=20_000)[-1]
+    whole = spins(events, STILL)[-1]
     for method in METHODS:
         assert 0 < short[method].events < 0.6 * whole[method].events
     assert errors(short["normal_flow"], np.array([0.0, 0.0, 50.0]))[1] < 2
@@ -289,7 +292,7 @@ def digest() -> list[float]:
     for seen, rate, flow, spin in after_track([(packet, known_track(packet.end_us)) for packet in cut]):
         numbers += [len(seen.events), seen.points_m.sum(), rate.ema_hz.sum(), flow.vx_px_s.sum()]
         numbers += [flow.normal_speed_px_s.sum()]
-        for estimate in spin.estimates.values():
+        for estimate in spin.values():
             numbers += [] if estimate.vector_rps is None else estimate.vector_rps.tolist()
     return [float(number) for number in numbers]
 

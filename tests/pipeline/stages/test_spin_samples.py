@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from spinscope.pipeline.events import EventBatch
-from spinscope.pipeline.methods import best_of
+from spinscope.pipeline.registry import trusted_method
 from spinscope.pipeline.results import SpinEstimate
+from spinscope.pipeline.spin.parameters import SpinParameters
 from spinscope.pipeline.stages import filter as filter_stage
-from spinscope.pipeline.stages.spin import SpinParameters, SpinResult
-from spinscope.pipeline.stages.track import TrackResult
-from tests.spinning_ball import SETTING, after_track, errors, no_track, packets
+from spinscope.pipeline.stages.track import BallTrack, TrackResult
+from tests.spinning_ball import CONTEXT, after_track, errors, no_track, packets, track_with
 
 LATENCY_US = 65.0
 FLIGHTS = ("flight_fast_top", "flight_slow_top", "flight_back", "flight_mixed", "flight_two_balls")
@@ -32,7 +32,7 @@ def truth_of(samples: Path, name: str) -> tuple[EventBatch, dict[str, np.ndarray
         truth = {key: file[f"truth/{key}"][:] for key in file["truth"]}
     events = EventBatch.checked(t, x, y, p == 1, width_px=1280, height_px=720)
     parameters = filter_stage.FilterParameters()
-    state = filter_stage.start(parameters, SETTING)
+    state = filter_stage.start(parameters, CONTEXT)
     parts = [filter_stage.step(parameters, state, packet).logo_events for packet in packets(events)]
     return EventBatch.concatenate(parts), truth
 
@@ -50,10 +50,12 @@ def track_of(
     moves = np.zeros(2) if fixed else np.array([x[1] - x[0], y[1] - y[0]]) * 200.0
     mean = np.array([x[1] + noise[0], y[1] + noise[1], *moves, r[1] + noise[2] / 2 + wider_px])
     covariance = np.diag([0.3**2, 0.3**2, 100.0**2, 100.0**2, 0.2**2])
-    return TrackResult("tracking", None, 0, t_us, LATENCY_US, mean, covariance, None, None)
+    return track_with(BallTrack(0, t_us, LATENCY_US, mean, covariance, None))
 
 
-def shot(samples: Path, name: str, *, wider_px: float = 0.0, **parameters: str) -> tuple[list[SpinResult], np.ndarray]:
+def shot(
+    samples: Path, name: str, *, wider_px: float = 0.0, **parameters: str
+) -> tuple[list[dict[str, SpinEstimate]], np.ndarray]:
     """The spin stage's results of the ticks with a ball, and the true spin (rps)."""
     events, truth = truth_of(samples, name)
     fixed, rng = name.startswith("spinner"), np.random.default_rng(11)
@@ -67,8 +69,8 @@ def shot(samples: Path, name: str, *, wider_px: float = 0.0, **parameters: str) 
     return spins, truth["spin_rps"][len(truth["spin_rps"]) // 2]
 
 
-def answer(results: list[SpinResult], method: str = "normal_flow") -> SpinEstimate:
-    return results[-1].estimates[method]
+def answer(results: list[dict[str, SpinEstimate]], method: str = "normal_flow") -> SpinEstimate:
+    return results[-1][method]
 
 
 @pytest.mark.parametrize("name", [*FLIGHTS, *SPINNERS])
@@ -77,16 +79,16 @@ def test_normal_flow_is_within_8_degrees_and_2_rps_and_trusted(samples: Path, na
     off_rps, off_deg = errors(answer(results), true_rps)
     assert abs(off_rps) < 2 and off_deg < 8
     assert off_deg < 3 * answer(results).axis_std_deg and abs(off_rps) < 3 * answer(results).magnitude_std_rps
-    assert best_of(results[-1].estimates) == "normal_flow"
+    assert trusted_method(results[-1]) == "normal_flow"
 
 
 @pytest.mark.parametrize("name", [*FLIGHTS, *SPINNERS])
 def test_what_was_trusted_on_the_way_was_right(samples: Path, name: str) -> None:
     results, true_rps = shot(samples, name)
     for result in results:
-        best = best_of(result.estimates)
+        best = trusted_method(result)
         if best is not None:
-            off_rps, off_deg = errors(result.estimates[best], true_rps)
+            off_rps, off_deg = errors(result[best], true_rps)
             assert off_deg < 15 and abs(off_rps) < 10
 
 
@@ -110,4 +112,4 @@ def test_a_logo_that_is_not_seen_gets_no_answer_however_the_outline_bleeds(
     """A radius that is too large lets the outline into the mask: thousands of events, and no answer from them."""
     results, _ = shot(samples, name, wider_px=wider_px)
     assert answer(results).status == "refused"
-    assert all(best_of(result.estimates) is None for result in results)
+    assert all(trusted_method(result) is None for result in results)

@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from spinscope.pipeline.camera import Camera, CameraParameters, Setting
+from spinscope.pipeline.camera import Camera, CameraParameters
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.results import Packet
+from spinscope.pipeline.stage import Context
 from spinscope.pipeline.stages import filter as filter_stage
 from spinscope.pipeline.stages import surface as stage
 from spinscope.pipeline.stages.filter import FilterParameters, FilterResult
@@ -24,7 +25,7 @@ from spinscope.pipeline.stages.surface import SurfaceParameters, SurfaceResult
 from tests.naive_surface import NaiveEros, cleaned, recent_events
 
 WIDTH, HEIGHT, TICK_US = 45, 31, 1000  # neither is a multiple of a word
-SETTING = Setting(Camera.of(CameraParameters(), WIDTH, HEIGHT), 0.02, 150.0)
+CONTEXT = Context(Camera.of(CameraParameters(), WIDTH, HEIGHT), 0.02, {"spin.max_spin_rps": 150.0})
 START_US = 1_600_000_000_000_000
 ROOT = Path(__file__).parents[3]
 
@@ -46,7 +47,7 @@ def packets(ticks: int = 5, events_a_tick: int = 100) -> list[Packet]:
 
 
 def run(parameters: SurfaceParameters) -> list[SurfaceResult]:
-    state = stage.start(parameters, SETTING)
+    state = stage.start(parameters, CONTEXT)
     return [stage.step(parameters, state, p, FilterResult(p.events, EventBatch.empty())) for p in packets()]
 
 
@@ -121,7 +122,7 @@ def digest() -> str:
     for mode, changed in zip(filter_stage.MODES, surface_settings, strict=True):
         filters = FilterParameters(mode=mode, logo_mode="trail", threshold_us=900)
         surfaces = SurfaceParameters().with_values(changed)
-        filter_state, state = filter_stage.start(filters, SETTING), stage.start(surfaces, SETTING)
+        filter_state, state = filter_stage.start(filters, CONTEXT), stage.start(surfaces, CONTEXT)
         for packet in packets(ticks=4, events_a_tick=60):
             filtered = filter_stage.step(filters, filter_state, packet)
             result = stage.step(surfaces, state, packet, filtered)

@@ -9,7 +9,6 @@ from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.stages import track
 from spinscope.pipeline.stages.track import TrackParameters
-from spinscope.pipeline.stages.track_calibration import calibrate_latency
 from tests.track_runs import (
     HEIGHT,
     WIDTH,
@@ -210,22 +209,6 @@ def test_a_slow_ball_in_the_middle_is_watched_before_it_is_a_shot() -> None:
         events = disc_events(np.array([600.0, 350.0, speed_px_s, 0.0, 18.0]), 0, 40_000)
         statuses = [result.status for result in run(inputs(events, surface_mode="off"), place=place)]
         assert statuses == ["starting"] * ticks + ["tracking"] * (8 - ticks)
-
-
-def test_calibration_finds_the_defaults_again() -> None:
-    """From all flights together: what TrackParameters says, within its stated 1 sigma."""
-    runs = [(TrackParameters(), tracked(name), sample(name)[1]) for name in FLIGHTS]
-    found = calibrate_latency(runs, WIDTH, HEIGHT)
-    default = TrackParameters()
-    assert found.outlines > 100
-    assert abs(found.latency_us - default.latency_us) < track.LATENCY_STD_US
-    assert abs(found.lag_px - default.lag_px) < track.PLACE_STD_PX
-    assert abs(found.outline_px - default.outline_px) < track.RADIUS_STD_PX
-    assert found.along_std_px < 0.1
-    alone = calibrate_latency(runs[2:3], WIDTH, HEIGHT)
-    assert alone.lag_px == default.lag_px
-    with pytest.raises(ParameterError, match="10 or more"):
-        calibrate_latency([(default, tracked(FLIGHTS[0])[:5], sample(FLIGHTS[0])[1])], WIDTH, HEIGHT)
 
 
 def test_a_fixed_ball_is_where_it_is_said_to_be() -> None:

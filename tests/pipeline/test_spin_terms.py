@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spinscope.app.words import axis_words, kind_of_spin, km_h, rpm, speed_words, spin_words
 from spinscope.pipeline.results import SpinEstimate
+from spinscope.pipeline.spin_terms import axis_words, kind_of_spin, km_h, rpm, speed_words, spin_words
 
 LOOKING_DOWN = (0.0, 0.0, -1.0)
 angles = st.floats(-180, 180)

@@ -8,9 +8,10 @@ from pathlib import Path
 import h5py
 import pytest
 
-from spinscope.app.session import Choices, Session, chosen_parameters, preset
-from spinscope.pipeline.chain import Parameters
 from spinscope.pipeline.errors import ParameterError, RecordingError
+from spinscope.pipeline.presets import preset
+from spinscope.pipeline.registry import Parameters
+from spinscope.pipeline.session import Choices, Session
 
 
 def test_the_default_preset_is_the_declared_defaults() -> None:
@@ -27,7 +28,7 @@ def test_the_papers_preset_names_its_filter() -> None:
 def test_assignments_beat_the_preset(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text("[logo]\npad_px = 4.0\n[track]\ntick_us = 1000\n", encoding="utf-8")
-    parameters = chosen_parameters(Choices(preset=str(file), assignments=("logo.pad_px=1",)))
+    parameters = Choices(preset=str(file), assignments=("logo.pad_px=1",)).parameters()
     assert (parameters.logo.pad_px, parameters.track.tick_us) == (1.0, 1000)
 
 

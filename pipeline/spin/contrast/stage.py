@@ -10,22 +10,22 @@ of time that grows with the shot.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..camera import Setting
-from ..kernels.contrast_estimate import estimate_spin, follow_spin
-from ..kernels.contrast_events import Answer, LogoEvents, Place, Settings
-from ..kernels.contrast_picture import Picture, picture
-from ..parameters import ParameterGroup, switch, tunable
-from ..results import Packet, SpinEstimate, frozen
-from .logo import LogoResult
-from .spin import SpinResult
-from .track import TrackResult
+from ...kernels.contrast_estimate import estimate_spin, follow_spin
+from ...kernels.contrast_events import Answer, LogoEvents, Place, Settings
+from ...kernels.contrast_picture import Picture, picture
+from ...parameters import ParameterGroup, switch, tunable
+from ...results import MethodResult, Packet, SpinEstimate, frozen
+from ...stage import Context, SpinMethod
+from ...stages.logo import LogoResult
+from ...stages.track import BallTrack
 
-INPUTS = ("packet", "track", "logo", "spin")
 METHOD, FLOW_METHOD = "contrast", "normal_flow"
 
 Floats = NDArray[np.float64]
@@ -48,7 +48,9 @@ LATENCY_SPREAD_S = 25e-6
 
 @dataclass(frozen=True, kw_only=True)
 class ContrastParameters(ParameterGroup):
-    """How sharp, how long, and what is trusted."""
+    """Kernel, window, and what is trusted."""
+
+    renamed: ClassVar[dict[str, str]] = {"weakest": "min_gain"}
 
     kernel_rad: float = tunable(
         0.04, 0.01, 0.3, 0.005, "rad", "how near on the ball events must come to count as one (1 sigma)"
@@ -56,8 +58,8 @@ class ContrastParameters(ParameterGroup):
     floor_events: float = tunable(1.5, 0.1, 100.0, 0.1, "events", "density below which differences mean little")
     window_us: int = tunable(500_000, 5000, 10_000_000, 5000, "us", "how far back in time events may lie")
     fewest_events: int = tunable(40, 10, 10_000, 10, "events", "logo events needed for an answer")
-    weakest: float = tunable(
-        0.25, 0.0, 5.0, 0.05, "", "contrast an event must gain over exchanged times (natural log), on average"
+    min_gain: float = tunable(
+        0.25, 0.0, 5.0, 0.05, "", "contrast that an event must gain over permuted times (natural log), on average"
     )
     rival_sigmas: float = tunable(1.2, 0.0, 20.0, 0.1, "sigma", "lead that the best spin must have over any other")
     # On 110 simulated flights that contrast answers rightly one in a hundred is farther away than 5.7.
@@ -113,16 +115,16 @@ class ContrastResult:
 
 
 @dataclass(slots=True)
-class State:
-    """The present shot's logo events, tick by tick, and the last answers.
+class ContrastState:
+    """The shot's logo events, tick by tick, and the last answers.
 
+    start_us : start of the shot; None before its first tick
     full_us : age of the shot, us, at which the next full estimate is due
     tried, searched : number of events at the last full estimate and at the last search over all spins
     """
 
-    setting: Setting
-    shot: int | None = None
-    start_us: int = 0
+    context: Context
+    start_us: int | None = None
     parts: list[tuple[int, LogoEvents]] = field(default_factory=list)
     places: list[tuple[float, float, float, float]] = field(default_factory=list)
     full_us: float = STAGES_US[0]
@@ -133,28 +135,28 @@ class State:
     picture: Picture = field(default_factory=Picture.empty)
 
 
-def start(parameters: ContrastParameters, setting: Setting) -> State:
-    """No shot yet."""
-    return State(setting)
+def start(parameters: ContrastParameters, context: Context) -> ContrastState:
+    """No events yet."""
+    return ContrastState(context)
+
+
+def absent(parameters: ContrastParameters, reason: str) -> ContrastResult:
+    """Refusal, because there is no ball."""
+    return _nothing(SpinEstimate.refused(METHOD, reason))
 
 
 def step(
     parameters: ContrastParameters,
-    state: State,
+    state: ContrastState,
     packet: Packet,
-    track: TrackResult,
+    ball: BallTrack,
     logo: LogoResult,
-    spin: SpinResult,
+    normal_flow: MethodResult,
 ) -> ContrastResult:
-    """The estimate from the present shot up to the end of this tick."""
-    if not track.has_ball:
-        state.shot, state.answer = None, None
-        return _nothing(SpinEstimate.refused(METHOD, track.reason or "no ball"))
-    if state.shot != track.shot:
-        fresh = State(state.setting, track.shot, packet.start_us)
-        for name in State.__slots__:
-            setattr(state, name, getattr(fresh, name))
-    _take(parameters, state, packet, track, logo)
+    """The estimate from the shot up to the end of this tick."""
+    if state.start_us is None:
+        state.start_us = packet.start_us
+    _take(parameters, state, packet, ball, logo)
     count = sum(len(part) for _, part in state.parts)
     if count < parameters.fewest_events:
         state.answer = None
@@ -162,26 +164,28 @@ def step(
         return _nothing(SpinEstimate.refused(METHOD, reason, count))
     full = _due(state, packet.end_us - state.start_us, count)
     settings = Settings(
-        fastest_rps=state.setting.max_spin_rps,
+        fastest_rps=state.context["spin.max_spin_rps"],
         sigma=parameters.kernel_rad,
         floor=parameters.floor_events,
         fewest=parameters.fewest_events,
     )
     if full:
         events = _joined(state)
-        _estimate(parameters, state, events, settings, spin)
+        _estimate(parameters, state, events, settings, normal_flow.estimate.vector_rps)
         state.tried = count
         state.picture = picture(events, state.answer, settings) if parameters.curves else Picture.empty()
     elif state.answer is not None and state.reason is None:
         state.answer = follow_spin(_joined(state), _place(state), settings, state.answer)
         state.reason = _doubt(parameters, state.answer)
-    return _result(parameters, state, count, full, spin.estimates[FLOW_METHOD])
+    return _result(parameters, state, count, full, normal_flow.estimate)
 
 
-def _take(parameters: ContrastParameters, state: State, packet: Packet, track: TrackResult, logo: LogoResult) -> None:
+def _take(
+    parameters: ContrastParameters, state: ContrastState, packet: Packet, ball: BallTrack, logo: LogoResult
+) -> None:
     """Keep the tick's events that turn with the ball, and what is known of the ball's place."""
     turning = logo.turning
-    rays = state.setting.camera.rays(turning.centre_x_px, turning.centre_y_px)
+    rays = state.context.camera.rays(turning.centre_x_px, turning.centre_y_px)
     part = LogoEvents(
         (turning.t_us * 1e-6).astype(np.float64),
         np.ascontiguousarray(turning.normals.T),
@@ -190,13 +194,13 @@ def _take(parameters: ContrastParameters, state: State, packet: Packet, track: T
         np.full(len(turning), logo.radius_px),
     )
     state.parts.append((packet.end_us, part))
-    flown_px = math.hypot(track.mean[2], track.mean[3]) * LATENCY_SPREAD_S
+    flown_px = math.hypot(ball.mean[2], ball.mean[3]) * LATENCY_SPREAD_S
     state.places.append((logo.position_std_px, logo.radius_std_px, logo.velocity_std_px_s, flown_px))
     while state.parts[0][0] <= packet.end_us - parameters.window_us:
         del state.parts[0], state.places[0]
 
 
-def _joined(state: State) -> LogoEvents:
+def _joined(state: ContrastState) -> LogoEvents:
     parts = [part for _, part in state.parts]
     return LogoEvents(
         np.concatenate([part.t_s for part in parts]),
@@ -207,7 +211,7 @@ def _joined(state: State) -> LogoEvents:
     )
 
 
-def _place(state: State) -> Place:
+def _place(state: ContrastState) -> Place:
     """How well the ball's place is known over the stretch: the ticks' medians."""
     position, radius, velocity, flown = (float(value) for value in np.median(np.array(state.places), axis=0))
     return Place(
@@ -218,7 +222,7 @@ def _place(state: State) -> Place:
     )
 
 
-def _due(state: State, age_us: int, count: int) -> bool:
+def _due(state: ContrastState, age_us: int, count: int) -> bool:
     """Whether a full estimate is due: by the shot's age, or after a refusal as soon as there is much more to see."""
     if age_us >= state.full_us:
         later = [stage for stage in STAGES_US if stage > age_us]
@@ -229,15 +233,18 @@ def _due(state: State, age_us: int, count: int) -> bool:
 
 
 def _estimate(
-    parameters: ContrastParameters, state: State, events: LogoEvents, settings: Settings, spin: SpinResult
+    parameters: ContrastParameters,
+    state: ContrastState,
+    events: LogoEvents,
+    settings: Settings,
+    normal_flow_rps: Floats | None,
 ) -> None:
     """A full estimate: first from what is known already, and from a search where that does not convince."""
     starts = []
     if state.answer is not None and state.answer.spin_rps is not None:
         starts += [state.answer.spin_rps, *state.answer.rivals_rps]
-    normal_flow = spin.estimates[FLOW_METHOD].vector_rps
-    if normal_flow is not None and np.any(normal_flow):
-        starts.append(normal_flow)
+    if normal_flow_rps is not None and np.any(normal_flow_rps):
+        starts.append(normal_flow_rps)
     answer = None
     if starts:
         scanning = not _settled(parameters, state)
@@ -251,7 +258,7 @@ def _estimate(
     state.answer, state.reason = answer, _doubt(parameters, answer)
 
 
-def _settled(parameters: ContrastParameters, state: State) -> bool:
+def _settled(parameters: ContrastParameters, state: ContrastState) -> bool:
     """Whether the last answer has no rival worth looking for."""
     answer = state.answer
     if answer is None or answer.spin_rps is None or state.reason is not None:
@@ -264,10 +271,10 @@ def _doubt(parameters: ContrastParameters, answer: Answer) -> str | None:
     """Why an answer is not to be trusted, in words; None if it is."""
     if answer.spin_rps is None:
         return f"the logo was not seen: {answer.events} logo events, {parameters.fewest_events} are needed"
-    if answer.contrast < parameters.weakest:
+    if answer.contrast < parameters.min_gain:
         return (
             f"no pattern turns with the ball: the best spin gains {answer.contrast:.2f} an event over chance, "
-            f"{parameters.weakest:g} are needed"
+            f"{parameters.min_gain:g} are needed"
         )
     if answer.patch_rad < parameters.smallest_patch_rad:
         return (
@@ -302,14 +309,16 @@ def _words(spin_rps: Floats | None) -> str:
     return "nothing" if spin_rps is None else f"({', '.join(f'{value:.0f}' for value in spin_rps)}) rps"
 
 
-def _result(parameters: ContrastParameters, state: State, count: int, full: bool, flow: SpinEstimate) -> ContrastResult:
+def _result(
+    parameters: ContrastParameters, state: ContrastState, count: int, full: bool, flow: SpinEstimate
+) -> ContrastResult:
     answer = state.answer
     if answer is None or answer.spin_rps is None or answer.covariance_rps2 is None:
         return _nothing(SpinEstimate.refused(METHOD, state.reason or "no estimate yet", count))
     estimate = SpinEstimate(METHOD, frozen(answer.spin_rps.copy()), frozen(answer.covariance_rps2.copy()), None, count)
     if state.reason is not None:
         # Where nothing turns, the normal flow has seen no pattern either, but noise.
-        against = FLOW_METHOD if answer.contrast < parameters.weakest else None
+        against = FLOW_METHOD if answer.contrast < parameters.min_gain else None
         estimate = SpinEstimate.refused(METHOD, state.reason, count, against)
     elif (sigmas := _apart(estimate, flow)) > parameters.flow_sigmas:
         reason = f"the normal flow says {_words(flow.vector_rps)}, {sigmas:.0f} sigma from {_words(answer.spin_rps)}"
@@ -336,3 +345,24 @@ def _nothing(estimate: SpinEstimate) -> ContrastResult:
     none, no_spins = frozen(np.empty(0)), frozen(np.empty((0, 3)))
     unknown = frozen(np.full(3, np.nan))
     return ContrastResult(estimate, unknown, no_spins, none, 0, 0, math.nan, frozen(np.zeros(3)), 0.0, False, *curves)
+
+
+def is_trusted(estimates: Mapping[str, SpinEstimate]) -> bool:
+    """Whether contrast answers: it refuses by itself what it cannot stand for."""
+    return estimates[METHOD].status == "ok"
+
+
+STAGE = SpinMethod(
+    name=METHOD,
+    label="Contrast maximisation",
+    help="The spin whose derotation makes the logo sharpest on the ball, with its uncertainty.",
+    inputs=("packet", "ball", "logo", FLOW_METHOD),
+    reads=("spin.max_spin_rps",),
+    parameters=ContrastParameters,
+    start=start,
+    step=step,
+    absent=absent,
+    is_slow=True,
+    colour=(236, 64, 122),
+    is_trusted=is_trusted,
+)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spinscope.pipeline.results import SpinEstimate
+from .results import SpinEstimate
 
 Vector = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from spinscope.pipeline.methods import best_of
+from spinscope.pipeline.registry import trusted_method
 from spinscope.pipeline.results import SpinEstimate
 
 
@@ -34,15 +34,15 @@ def test_contrast_comes_first_then_normal_flow_where_it_is_sure(
         "normal_flow": estimate("normal_flow", normal_flow_rps),
         "contrast": estimate("contrast", contrast_rps),
     }
-    assert best_of(estimates) == best
+    assert trusted_method(estimates) == best
 
 
 def test_what_contrast_speaks_against_is_not_trusted() -> None:
     against = SpinEstimate.refused("contrast", "the normal flow says otherwise", against="normal_flow")
-    assert best_of({"normal_flow": estimate("normal_flow", 1.0), "contrast": against}) is None
+    assert trusted_method({"normal_flow": estimate("normal_flow", 1.0), "contrast": against}) is None
 
 
 def test_methods_that_were_not_run_are_not_missed() -> None:
-    assert best_of({"normal_flow": estimate("normal_flow", 1.0)}) == "normal_flow"
-    assert best_of({"triplet": estimate("triplet", 0.1)}) is None
-    assert best_of({}) is None
+    assert trusted_method({"normal_flow": estimate("normal_flow", 1.0)}) == "normal_flow"
+    assert trusted_method({"triplet": estimate("triplet", 0.1)}) is None
+    assert trusted_method({}) is None

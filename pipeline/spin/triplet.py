@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..camera import Setting
 from ..kernels.sphere import surface_velocity
-from ..results import SpinEstimate
-from .flow import FlowResult
-from .rate import RateResult
-
-if TYPE_CHECKING:
-    from .spin import SpinParameters
+from ..results import MethodResult, Packet, SpinEstimate
+from ..stage import Context, SpinMethod
+from ..stages.flow import FlowResult
+from ..stages.rate import RateResult
+from .parameters import SpinParameters
 
 Floats = NDArray[np.float64]
 
@@ -41,9 +39,9 @@ class TripletSpin:
     alone.
     """
 
-    def __init__(self, parameters: SpinParameters, setting: Setting) -> None:
+    def __init__(self, parameters: SpinParameters, context: Context) -> None:
         self.parameters = parameters
-        self.setting = setting
+        self.context = context
         self.end_us: list[int] = []
         self.counts: list[int] = []
         self.moments: list[Floats] = []  # a slice's sum of e_r x v / |r|, rad/s
@@ -57,13 +55,10 @@ class TripletSpin:
             return SpinEstimate.refused("triplet", "no flow")
         counts = np.array(self.counts, np.float64)
         moments, squares = np.array(self.moments), np.array(self.squares)
-        if self.parameters.triplet_solve == "paper":
-            spin, covariance = _mean_of_slices(moments / counts[:, None])
-        else:
-            matrix = squares.sum(axis=0)
-            if np.linalg.eigvalsh(matrix)[0] < FEWEST_DIRECTIONS * counts.sum():
-                return SpinEstimate.refused("triplet", "the logo is seen from one side only", int(counts.sum()))
-            spin, covariance = _full_rank(matrix, moments, squares)
+        solved = _SOLVERS[self.parameters.triplet_solve](counts, moments, squares)
+        if solved is None:
+            return SpinEstimate.refused("triplet", "the logo is seen from one side only", int(counts.sum()))
+        spin, covariance = solved
         vector_rps, covariance_rps2 = spin / (2 * math.pi), covariance / (2 * math.pi) ** 2
         if self.parameters.magnitude_from == "rate" and rate.spin_rps is not None:
             vector_rps, covariance_rps2 = _with_magnitude(vector_rps, covariance_rps2, rate)
@@ -73,9 +68,9 @@ class TripletSpin:
         if not flow.t_us.size:
             return
         velocity = surface_velocity(
-            flow.points_m, flow.normals, flow.vx_px_s, flow.vy_px_s, self.setting.camera.focal_px
+            flow.points_m, flow.normals, flow.vx_px_s, flow.vy_px_s, self.context.camera.focal_px
         )
-        moment = np.cross(flow.normals, velocity) / self.setting.ball_radius_m
+        moment = np.cross(flow.normals, velocity) / self.context.ball_radius_m
         firsts = np.flatnonzero(np.diff(flow.slice_index, prepend=flow.slice_index[0] - 1))
         for first, last in zip(firsts, [*firsts[1:], flow.slice_index.size], strict=True):
             normals = flow.normals[first:last]
@@ -90,22 +85,32 @@ class TripletSpin:
             del column[:keep]
 
 
-def _mean_of_slices(spins: Floats) -> tuple[Floats, Floats]:
+def _mean_of_slices(counts: Floats, moments: Floats, squares: Floats) -> tuple[Floats, Floats]:
     """Mean over the slices and its covariance from their spread; a single slice is as uncertain as it is long."""
+    spins = moments / counts[:, None]
     mean = spins.mean(axis=0)
     if len(spins) == 1:
         return mean, np.eye(3) * float(mean @ mean)
     return mean, np.cov(spins.T) / len(spins)
 
 
-def _full_rank(matrix: Floats, moments: Floats, squares: Floats) -> tuple[Floats, Floats]:
-    """Least squares over all slices, with the covariance that the slices' own residuals give."""
+def _full_rank(counts: Floats, moments: Floats, squares: Floats) -> tuple[Floats, Floats] | None:
+    """Least squares over all slices, with the covariance from the slices' own residuals; None where rank is lost."""
+    matrix = squares.sum(axis=0)
+    if np.linalg.eigvalsh(matrix)[0] < FEWEST_DIRECTIONS * counts.sum():
+        return None
     inverse = np.linalg.inv(matrix)
     spin = inverse @ moments.sum(axis=0)
     if len(moments) == 1:
         return spin, np.eye(3) * float(spin @ spin)
     residuals = moments - squares @ spin
     return spin, inverse @ (residuals.T @ residuals) @ inverse * len(moments) / (len(moments) - 1)
+
+
+_SOLVERS: dict[str, Callable[[Floats, Floats, Floats], tuple[Floats, Floats] | None]] = {
+    "paper": _mean_of_slices,
+    "least_squares": _full_rank,
+}
 
 
 def _with_magnitude(vector_rps: Floats, covariance_rps2: Floats, rate: RateResult) -> tuple[Floats, Floats]:
@@ -118,3 +123,33 @@ def _with_magnitude(vector_rps: Floats, covariance_rps2: Floats, rate: RateResul
     across = np.eye(3) - np.outer(axis, axis)
     scaled = across @ covariance_rps2 @ across * (rate.spin_rps / length) ** 2
     return rate.spin_rps * axis, scaled + np.outer(axis, axis) * rate.spin_std_rps**2
+
+
+def start(parameters: SpinParameters, context: Context) -> TripletSpin:
+    """No slices yet."""
+    return TripletSpin(parameters, context)
+
+
+def absent(parameters: SpinParameters, reason: str) -> MethodResult:
+    """Refusal, because there is no ball."""
+    return MethodResult(SpinEstimate.refused("triplet", reason))
+
+
+def step(
+    parameters: SpinParameters, state: TripletSpin, packet: Packet, flow: FlowResult, rate: RateResult
+) -> MethodResult:
+    """The estimate from the shot up to the end of the tick."""
+    return MethodResult(state.estimate(packet.end_us, flow, rate))
+
+
+STAGE = SpinMethod(
+    name="triplet",
+    label="Triplet Matching",
+    help="The paper's method: mean of e_r x v / |r| over Triplet Matching's flow.",
+    inputs=("packet", "flow", "rate"),
+    parameters=SpinParameters,
+    start=start,
+    step=step,
+    absent=absent,
+    colour=(255, 167, 38),
+)

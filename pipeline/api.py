@@ -1,0 +1,102 @@
+"""What scripts and notebooks use: open a recording, estimate the spin of its shots."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from .errors import ParameterError
+from .events import EventBatch
+from .recordings.in_memory import RecordingInMemory
+from .registry import Parameters
+from .session import AnyRecording, Choices, Progress, Result, Session, check_method
+
+
+def estimate(
+    recording: AnyRecording | EventBatch | str | Path,
+    parameters: Parameters | Mapping[str, Mapping[str, Any]] | Sequence[str] | None = None,
+    *,
+    preset: str | Path | None = None,
+    method: str = "all",
+    window_us: tuple[int, int] | None = None,
+    fixed_ball: tuple[float, float, float] | str | None = None,
+    sensor_px: tuple[int, int] | None = None,
+    on_progress: Progress | None = None,
+) -> Result:
+    """Estimate track and spin of every shot in a recording.
+
+    Parameters
+    ----------
+    recording : path, Recording or EventBatch
+        File of any format that `open_recording` reads, an opened recording, or events in memory (then `sensor_px` says
+        how large the sensor is).
+    parameters : Parameters, mapping or sequence of str, optional
+        All parameters, or changes to the preset: `{"logo": {"pad_px": 3.0}}` or `["logo.pad_px=3"]`. What the
+        recording states of its camera is taken unless it is changed here; `Parameters` are taken as they are.
+    preset : str or Path, optional
+        `default`, `paper`, or a TOML file of [group] tables.
+    method : str
+        Name of one spin method (`triplet`, `normal_flow`, `contrast`), or `all`; only what it needs is computed.
+    window_us : (int, int), optional
+        [start, end) in us of the file's own time: only these events are used.
+    fixed_ball : (float, float, float) or "auto", optional
+        Centre x, y and radius in px of a ball spinner's ball.
+    sensor_px : (int, int), optional
+        Width and height of the sensor, where the file does not say it.
+    on_progress : callable, optional
+        Called with the share done (0..1) and what is being done.
+
+    Returns
+    -------
+    Result
+        `shots` with their tracks and estimates (empty where no ball was found, `no_shot_reason` says why), `ticks`
+        with every stage's result on demand, `to_dict()` as `spinscope analyze` writes it.
+
+    Raises
+    ------
+    RecordingError
+        When the recording cannot be read or holds no events.
+    ParameterError
+        For an unknown parameter, method or preset, or a value out of range.
+
+    Examples
+    --------
+    >>> result = estimate("shot.raw", {"camera": {"focal_length_mm": 16.0}})  # doctest: +SKIP
+    >>> result.shots[0].estimates["contrast"].vector_rps  # doctest: +SKIP
+    """
+    check_method(method)
+    assignments: tuple[str, ...] = ()
+    if isinstance(parameters, Mapping):
+        assignments = tuple(
+            f"{group}.{field}={_assigned(value)}"
+            for group, fields in parameters.items()
+            for field, value in fields.items()
+        )
+    elif isinstance(parameters, Sequence):
+        assignments = tuple(parameters)
+    if isinstance(recording, EventBatch):
+        recording = _in_memory(recording, sensor_px)
+    choices = Choices(preset, assignments, window_us, None, sensor_px)
+    session = Session.open(recording, choices, on_progress)
+    if isinstance(parameters, Parameters):
+        session.parameters = parameters
+    session.place_fixed_ball(fixed_ball)
+    return session.estimate(method, on_progress)
+
+
+def _in_memory(events: EventBatch, sensor_px: tuple[int, int] | None) -> RecordingInMemory:
+    if sensor_px is None:
+        raise ParameterError("events in memory do not say how large the sensor is: give sensor_px=(width, height)")
+    width_px, height_px = sensor_px
+    for name, column, size in (("x", events.x_px, width_px), ("y", events.y_px, height_px)):
+        if column.size and int(column.max()) >= size:
+            raise ParameterError(f"{name} = {int(column.max())} px lies outside sensor_px = {width_px} x {height_px}")
+    return RecordingInMemory(events, width_px, height_px)
+
+
+def _assigned(value: Any) -> str:
+    """A value as `--set` takes it."""
+    if isinstance(value, (list, tuple)):
+        return ",".join(repr(float(item)) for item in value)
+    return "none" if value is None else str(value)

@@ -1,0 +1,43 @@
+"""Presets: named parameters of the program, and TOML files of [group] tables."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+from ..errors import ParameterError
+from ..registry import Parameters
+
+FOLDER = Path(__file__).parent
+
+
+def preset_names() -> tuple[str, ...]:
+    """Names of the presets that ship with the program."""
+    return tuple(sorted(file.stem for file in FOLDER.glob("*.toml")))
+
+
+def preset(name: str | Path, on_rename: Callable[[str], None] | None = None) -> Parameters:
+    """Parameters of a preset.
+
+    Parameters
+    ----------
+    name : str or Path
+        `default`, `paper`, or the path of a TOML file of [group] tables.
+    on_rename : callable, optional
+        Told of parameters under a former name, one sentence each.
+
+    Raises
+    ------
+    ParameterError
+        When there is no such preset, or the file holds something that is not allowed.
+    """
+    path = Path(name) if str(name).endswith(".toml") else FOLDER / f"{name}.toml"
+    try:
+        values = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        known = ", ".join(preset_names())
+        raise ParameterError(f"there is no preset {str(name)!r}: use {known} or the path of a .toml file") from None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ParameterError(f"the preset cannot be read ({error}): {path}") from None
+    return Parameters().with_values(values, on_rename)

@@ -1,0 +1,98 @@
+"""The stages of the chain and the spin methods among them: the one place where they are listed.
+
+A new stage or method is one record (`Stage`, `SpinMethod`), registered here or by whoever brings it; parameters,
+`--set`, sliders, results, plots and tests follow from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from .camera import BallParameters, CameraParameters
+from .extensions import Registry
+from .parameters import ParameterGroup, ParameterSet
+from .results import SpinEstimate
+from .spin import contrast, normal_flow, triplet
+from .stage import SpinMethod, Stage
+from .stages import filter, flow, logo, rate, surface, track
+
+if TYPE_CHECKING:
+    from .spin.contrast.stage import ContrastParameters
+    from .spin.parameters import SpinParameters
+
+STAGES: Registry[Stage] = Registry("stage")
+for _stage in (
+    filter.STAGE,
+    surface.STAGE,
+    track.STAGE,
+    logo.STAGE,
+    rate.STAGE,
+    flow.STAGE,
+    triplet.STAGE,
+    normal_flow.STAGE,
+    contrast.STAGE,
+):
+    STAGES.register(_stage)
+
+
+class Parameters(ParameterSet):
+    """Everything that can be set: camera, ball, and one group for each stage; the defaults are ours."""
+
+    if TYPE_CHECKING:  # the groups of the stages above, for type checkers; others are found all the same
+        camera: CameraParameters
+        ball: BallParameters
+        filter: filter.FilterParameters
+        surface: surface.SurfaceParameters
+        track: track.TrackParameters
+        logo: logo.LogoParameters
+        rate: rate.RateParameters
+        flow: flow.FlowParameters
+        spin: SpinParameters
+        contrast: ContrastParameters
+
+    @classmethod
+    def group_types(cls) -> dict[str, type[ParameterGroup]]:
+        """Class of each group by name: camera and ball, then by stage."""
+        types: dict[str, type[ParameterGroup]] = {"camera": CameraParameters, "ball": BallParameters}
+        for stage in STAGES:
+            types.setdefault(stage.group, stage.parameters)
+        return types
+
+
+def methods() -> tuple[SpinMethod, ...]:
+    """The spin methods, in the order of registration."""
+    return tuple(stage for stage in STAGES if isinstance(stage, SpinMethod))
+
+
+def needed_stages(targets: Iterable[str]) -> tuple[Stage, ...]:
+    """The stages that must run to give these stages' results, in the order of the chain; raises ParameterError."""
+    needed: set[str] = set()
+
+    def add(name: str) -> None:
+        name = "track" if name == "ball" else name
+        if name != "packet" and name not in needed:
+            needed.add(name)
+            stage = STAGES[name]
+            for other in (*stage.inputs, *(("ball",) if stage.scope == "ball" else ())):
+                add(other)
+
+    for target in targets:
+        add(target)
+    return tuple(stage for stage in STAGES if stage.name in needed)
+
+
+def trusted_method(estimates: Mapping[str, SpinEstimate]) -> str | None:
+    """Name of the method whose estimate the program itself trusts; None where it trusts none.
+
+    The methods are asked from the last registered to the first: the most accurate one comes last.
+    """
+    for method in reversed(methods()):
+        if method.name in estimates and method.is_trusted(estimates):
+            return method.name
+    return None
+
+
+def quick_stages() -> tuple[str, ...]:
+    """Names of the stages that are neither slow nor need a slow one: what an interactive run shows first."""
+    return tuple(stage.name for stage in STAGES if not any(needed.is_slow for needed in needed_stages([stage.name])))

@@ -1,0 +1,345 @@
+"""One open recording with its parameters and chain, and the result of running it."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from .camera import Camera, CameraParameters
+from .chain import Chain, EventsInMemory, Tick
+from .errors import ParameterError, RecordingError
+from .presets import preset
+from .recordings import Recording, open_recording
+from .recordings.in_memory import RecordingInMemory
+from .registry import STAGES, Parameters, methods
+from .results import Truth
+from .shots import Shot, ShotLog
+from .stages.fixed_ball import find_fixed_ball
+
+SAMPLES = Path(__file__).parents[1] / "sample_recordings"
+DEFAULT_SAMPLE = SAMPLES / "flight_fast_top.h5"
+SCHEMA = 1
+FRAMES_BYTES = 1_500_000_000  # full frames held for the viewer: 8 s of the paper's sensor at 200 Hz
+WARM_UP_TICKS = 4  # with flow, until the spin has been solved for and solved again
+TICKS_TOGETHER = 4  # ticks that a stage works through at a time: tracking costs a quarter less; more surfaces cost more
+MARGIN_US = 50_000  # shown before and after a shot of a long recording
+
+AnyRecording = Recording | RecordingInMemory
+Progress = Callable[[float, str], None]  # share done (0..1) and what is being done
+
+
+@dataclass(frozen=True, slots=True)
+class Choices:
+    """Options of a session, as the command line gives them.
+
+    Attributes
+    ----------
+    preset : str or Path, optional
+        Name of a preset, or a TOML file.
+    assignments : sequence of str
+        `group.field=value`, applied in order.
+    window_us : (int, int), optional
+        [start, end) in file time: only these events are used.
+    fixed_ball : (x_px, y_px, radius_px) or "auto", optional
+        Circle of a ball spinner's ball.
+    sensor_px : (int, int), optional
+        Width and height of the sensor.
+    """
+
+    preset: str | Path | None = None
+    assignments: Sequence[str] = ()
+    window_us: tuple[int, int] | None = None
+    fixed_ball: tuple[float, float, float] | str | None = None
+    sensor_px: tuple[int, int] | None = None
+
+    @property
+    def for_others(self) -> Choices:
+        """The options that go for other recordings too: neither the window nor the fixed ball's circle."""
+        return dataclasses.replace(self, window_us=None, fixed_ball=None)
+
+    def parameters(self, on_rename: Callable[[str], None] | None = None) -> Parameters:
+        """The preset's parameters, changed by the assignments."""
+        return preset(self.preset or "default", on_rename).with_assignments(self.assignments, on_rename)
+
+
+@dataclass(slots=True)
+class Session:
+    """An open recording, its events of the window, the parameters, and the chain that runs over them."""
+
+    recording: AnyRecording
+    source: EventsInMemory
+    parameters: Parameters
+    chain: Chain
+    warnings: list[str] = field(default_factory=list)
+    read_seconds: float = 0.0
+
+    @classmethod
+    def open(
+        cls,
+        recording: AnyRecording | str | Path,
+        choices: Choices = Choices(),  # frozen
+        on_progress: Progress | None = None,
+    ) -> Session:
+        """Open and read a recording; raises SpinscopeError with a remedy for whatever is wrong with it."""
+        warnings: list[str] = []
+        parameters = choices.parameters(warnings.append)
+        begin = time.perf_counter()
+        if isinstance(recording, (str, Path)):
+            recording = open_recording(Path(recording), sensor=choices.sensor_px)
+        start_us, end_us = choices.window_us or (None, None)
+        events = recording.read(
+            start_us,
+            end_us,
+            on_progress=(lambda share: on_progress(share, "reading")) if on_progress else None,
+        )
+        if not len(events):
+            raise RecordingError(_no_events(choices.window_us, recording.path))
+        window_us = choices.window_us or (int(events.t_us[0]), int(events.t_us[-1]) + 1)
+        source = EventsInMemory(
+            (recording.identity(), window_us), events, recording.width_px, recording.height_px, *window_us
+        )
+        read_seconds = time.perf_counter() - begin
+        parameters = _with_attributes(parameters, recording.attributes, choices)
+        warnings += recording.warnings
+        session = cls(recording, source, parameters, _timed(source), warnings, read_seconds)
+        session.place_fixed_ball(choices.fixed_ball)
+        return session
+
+    @property
+    def camera(self) -> Camera:
+        """The camera on this sensor."""
+        return Camera.of(self.parameters.camera, self.source.width_px, self.source.height_px)
+
+    @property
+    def ball_radius_m(self) -> float:
+        """Radius of the ball, metres."""
+        return self.parameters.ball.diameter_mm / 2000.0
+
+    @property
+    def truth(self) -> Truth | None:
+        """The simulator's truth, if the recording carries it."""
+        return self.recording.truth
+
+    def ticks(
+        self,
+        targets: Collection[str] | None = None,
+        on_progress: Progress | None = None,
+        forget: Collection[str] = (),
+    ) -> Iterator[Tick]:
+        """Run the chain over the whole window, telling progress tick by tick; see `Chain.run`."""
+        count = self.chain.tick_count(self.parameters)
+        ticks = self.chain.run(self.parameters, targets, forget=forget, together=TICKS_TOGETHER)
+        for index, tick in enumerate(ticks):
+            yield tick
+            if on_progress:
+                on_progress((index + 1) / count, "running the stages")
+
+    def load_kernels(self, method: str = "all") -> float:
+        """Run a throw-away chain until every stage has had work, so that compiled kernels are in memory; seconds."""
+        begin, worked, targets = time.perf_counter(), 0, method_targets(method)
+        has_contrasted = "contrast" not in targets
+        ticks = Chain(self.source).run(self.parameters, targets, forget=("surface",), together=TICKS_TOGETHER)
+        for index, tick in enumerate(ticks):
+            flow, contrast = tick.get("flow"), tick.get("contrast")
+            worked += flow is not None and len(flow.t_us) > 0
+            has_contrasted |= contrast is not None and contrast.full
+            if (worked >= WARM_UP_TICKS and has_contrasted) or index == 20 * WARM_UP_TICKS:
+                break
+        return time.perf_counter() - begin
+
+    def estimate(self, method: str = "all", on_progress: Progress | None = None) -> Result:
+        """Estimate the spin of every shot of the window.
+
+        Keeps no full frames, so that it works for recordings of any length.
+
+        Parameters
+        ----------
+        method : str
+            Name of one spin method, or "all"; only what it needs runs.
+        on_progress : callable, optional
+            Told the share done and what is being done.
+        """
+        log = ShotLog.of(self.ticks(method_targets(method), on_progress, forget=("surface",)))
+        return Result(self, tuple(log.shots), log.no_shot_reason, method=method)
+
+    def estimate_keeping_ticks(self, on_progress: Progress | None = None) -> Result:
+        """Estimate by all methods and keep every tick with all its results, as the viewer needs them."""
+        return Result.of(self, self.ticks(on_progress=on_progress))
+
+    def clip_for_viewing(self, on_progress: Progress | None = None) -> Session:
+        """This session, or for a long recording one of its first shot, with a warning that says so."""
+        frame_bytes = self.source.width_px * self.source.height_px
+        if self.chain.tick_count(self.parameters) * frame_bytes <= FRAMES_BYTES:
+            return self
+        shots = self.estimate(on_progress=on_progress).shots
+        begin, end = self.source.start_us, self.source.end_us
+        if shots:
+            start_us = max(begin, shots[0].start_us - MARGIN_US)
+            end_us = min(end, shots[0].end_us + MARGIN_US)
+            what = f"its first shot of {len(shots)}"
+        else:
+            start_us, end_us, what = begin, end, "its beginning, for no ball was found in it"
+        max_us = int(FRAMES_BYTES / frame_bytes) * self.parameters.track.tick_us
+        end_us = min(end_us, start_us + max_us)
+        warning = (
+            f"the recording is {(end - begin) / 1e6:.1f} s long; shown is {what}, {start_us} to {end_us} us: "
+            "choose another part with --window START_US END_US"
+        )
+        clip = self.clip(start_us, end_us)
+        return dataclasses.replace(clip, warnings=[*self.warnings, warning])
+
+    def clip(self, start_us: int, end_us: int, **chain_options: Any) -> Session:
+        """A session of the part [start_us, end_us), with a chain of its own (`chain_options`: see `Chain`)."""
+        whole = self.source
+        source = whole
+        if (start_us, end_us) != (whole.start_us, whole.end_us):
+            identity = (self.recording.identity(), (start_us, end_us))
+            part = whole.events.between(start_us, end_us)
+            source = EventsInMemory(identity, part, whole.width_px, whole.height_px, start_us, end_us)
+        return dataclasses.replace(self, source=source, chain=_timed(source, **chain_options))
+
+    def place_fixed_ball(self, fixed_ball: tuple[float, float, float] | str | None) -> None:
+        """Keep the ball in a circle (x, y, radius in px), in the one found ("auto"), or let it fly (None)."""
+        if fixed_ball is None:
+            return
+        values: dict[str, Any] = {"ball": "fixed"}
+        if fixed_ball == "auto":
+            track = self.parameters.track
+            circle, std_px = find_fixed_ball(self.source.events, self.camera, track.radius_min_px, track.radius_max_px)
+            values |= {
+                "fixed_x_px": circle.x_px,
+                "fixed_y_px": circle.y_px,
+                "fixed_radius_px": circle.radius_px,
+                "fixed_std_px": std_px,
+            }
+            self.warnings.append(
+                f"fixed ball found at x {circle.x_px:.1f}, y {circle.y_px:.1f}, radius {circle.radius_px:.1f} px, "
+                f"each +-{std_px:.1f} px: give --fixed-ball X_PX Y_PX RADIUS_PX where you know better"
+            )
+        else:
+            x, y, radius = (float(number) for number in fixed_ball)
+            if not (-radius < x < self.source.width_px + radius and -radius < y < self.source.height_px + radius):
+                raise ParameterError(
+                    f"--fixed-ball {x:g} {y:g} {radius:g} lies outside the image of "
+                    f"{self.source.width_px} x {self.source.height_px} px: give X_PX Y_PX RADIUS_PX in pixels"
+                )
+            names = ("fixed_x_px", "fixed_y_px", "fixed_radius_px")
+            values |= dict(zip(names, fixed_ball, strict=True))
+        self.parameters = self.parameters.with_values({"track": values})
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """The shots found in a session, each with its track and its spin by every method.
+
+    Attributes
+    ----------
+    session : Session
+        Recording, parameters and chain behind it.
+    shots : tuple of Shot
+        In order of their start.
+    no_shot_reason : str, optional
+        Why there is no shot, in words; None when there are some.
+    method : str
+        The method asked for, or "all".
+    """
+
+    session: Session
+    shots: tuple[Shot, ...]
+    no_shot_reason: str | None
+    method: str = "all"
+
+    @classmethod
+    def of(cls, session: Session, ticks: Iterable[Tick]) -> Result:
+        """The result that these ticks make, all there are or the first ones; they are kept."""
+        kept = list(ticks)
+        log = ShotLog.of(kept)
+        result = cls(session, tuple(log.shots), log.no_shot_reason)
+        result.__dict__["ticks"] = kept
+        return result
+
+    @cached_property
+    def ticks(self) -> list[Tick]:
+        """Every tick with all stages' results, full frames among them; computed when first asked for."""
+        return list(self.session.ticks())
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON object of `spinscope analyze` (its schema is in the contract of the command line).
+
+        `seconds` are what reading and the stages took so far; `total` is their sum.
+        """
+        session, seconds = self.session, self.session.chain.seconds
+        of_recording = [stage.name for stage in STAGES if stage.scope == "recording"]
+        tracking = (*of_recording, "logo")
+        shots = [shot.to_dict(session.camera, session.ball_radius_m) for shot in self.shots]
+        for shot in shots:
+            shot["spin"] = {name: estimate for name, estimate in shot["spin"].items() if self.method in ("all", name)}
+            shot["best"] = shot["best"] if shot["best"] in shot["spin"] else None
+        return {
+            "schema": SCHEMA,
+            "recording": {
+                "path": str(session.recording.path),
+                "events": len(session.source.events),
+                "duration_us": session.source.end_us - session.source.start_us,
+                "width": session.source.width_px,
+                "height": session.source.height_px,
+            },
+            "parameters": session.parameters.as_dict(),
+            "shots": shots,
+            "no_shot_reason": self.no_shot_reason,
+            "warnings": session.warnings,
+            "seconds": {
+                "read": session.read_seconds,
+                "track": sum(seconds.get(stage, 0.0) for stage in tracking),
+                "spin": sum(taken for stage, taken in seconds.items() if stage not in tracking),
+                "total": session.read_seconds + sum(seconds.values()),
+            },
+        }
+
+
+def method_targets(method: str) -> tuple[str, ...]:
+    """The stages that give the estimates of a method (a name, or "all"), and the logo's events."""
+    if method == "all":
+        return STAGES.names
+    STAGES[method]
+    return ("logo", method)
+
+
+def check_method(method: str) -> str:
+    """The name of a spin method, or "all"; raises ParameterError for any other."""
+    known = ("all", *(one.name for one in methods()))
+    if method not in known:
+        raise ParameterError(f"there is no spin method {method!r}: use {', '.join(known)}")
+    return method
+
+
+def _timed(source: EventsInMemory, **options: Any) -> Chain:
+    return Chain(source, clock=time.perf_counter, **options)
+
+
+def _with_attributes(parameters: Parameters, attributes: dict[str, Any], choices: Choices) -> Parameters:
+    """Take camera values that the recording states, unless the user set them."""
+    chosen = {text.partition("=")[0].strip() for text in choices.assignments}
+    stated = {
+        name: attributes[f"camera.{name}"]
+        for name in CameraParameters.tunables()
+        if f"camera.{name}" in attributes and f"camera.{name}" not in chosen
+    }
+    if choices.preset:
+        default = CameraParameters()
+        stated = {k: v for k, v in stated.items() if getattr(parameters.camera, k) == getattr(default, k)}
+    return parameters.with_groups(camera=parameters.camera.with_values(stated))
+
+
+def _no_events(window_us: tuple[int, int] | None, path: Path) -> str:
+    if window_us:
+        return (
+            f"there are no events from {window_us[0]} to {window_us[1]} us: "
+            f"`spinscope info` shows the recording's own times: {path}"
+        )
+    return f"the recording holds no events: {path}"
