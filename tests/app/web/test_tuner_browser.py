@@ -159,7 +159,7 @@ GROUPS = [
     ("spin.max_spin_rps", {"spin"}),
     ("contrast.kernel_rad", {"contrast"}),
 ]
-ORDER = list(STAGES)
+ORDER = list(STAGES.names)
 
 
 def test_every_group_of_sliders_changes_its_stages_and_nothing_above(tab: Tab) -> None:
