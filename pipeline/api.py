@@ -1,4 +1,4 @@
-"""What scripts and notebooks use: open a recording, estimate the spin of its shots."""
+"""Entry point for scripts and notebooks: estimate the spin of the shots of a recording."""
 
 from __future__ import annotations
 

@@ -40,11 +40,14 @@ MAX_TICKS = 4_000_000  # 5.5 hours at 200 Hz; more is a damaged clock, not a rec
 
 
 @dataclass(frozen=True, eq=False)
-class BallTick:
-    """Results of one ball in one tick: its track, and by name those of the stages of one ball."""
+class StageResults:
+    """Results by stage name, of the stages that were run."""
 
-    track: BallTrack
     results: Mapping[str, Any]
+
+    def get(self, name: str) -> Any:
+        """Result of a stage, None where it was not run."""
+        return self.results.get(name)
 
     @cached_property
     def estimates(self) -> dict[str, SpinEstimate]:
@@ -58,7 +61,14 @@ class BallTick:
 
 
 @dataclass(frozen=True, eq=False)
-class Tick:
+class BallTick(StageResults):
+    """Results of one ball in one tick: its track, and by name those of the stages of one ball."""
+
+    track: BallTrack
+
+
+@dataclass(frozen=True, eq=False)
+class Tick(StageResults):
     """Results of one tick: attributes by stage name, of the stages that were run.
 
     Results of one ball are those of the ball that the detail views follow, the first one; without a ball they say why.
@@ -74,7 +84,6 @@ class Tick:
     """
 
     packet: Packet
-    results: Mapping[str, Any]
     balls: tuple[BallTick, ...]
 
     if TYPE_CHECKING:  # results of the stages that ship; no fields, and not the only ones
@@ -95,20 +104,6 @@ class Tick:
             return self.results[name]
         except KeyError:
             raise AttributeError(f"{name} is not among the targets of this run: {', '.join(self.results)}") from None
-
-    def get(self, name: str) -> Any:
-        """Result of a stage, None where it was not run."""
-        return self.results.get(name)
-
-    @cached_property
-    def estimates(self) -> dict[str, SpinEstimate]:
-        """Spin estimates of the followed ball from the present shot so far, by method, of the methods that were run."""
-        return {method.name: self.results[method.name].estimate for method in methods() if method.name in self.results}
-
-    @cached_property
-    def best(self) -> str | None:
-        """Method whose estimate is trusted, None where none is."""
-        return trusted_method(self.estimates)
 
 
 class EventSource(Protocol):
@@ -237,7 +232,7 @@ class Chain:
         return Camera.of(parameters.camera, self.source.width_px, self.source.height_px)
 
     def context(self, parameters: Parameters, stage: Stage) -> Context:
-        """What a stage is started with: camera, ball, and the parameters of other groups that it declares."""
+        """Context of a stage: camera, ball, and the parameters of other groups that it declares."""
         return Context(
             self.camera(parameters),
             parameters.ball.diameter_mm / 2000.0,
@@ -436,11 +431,11 @@ class _Run:
         """The tick with all results."""
         packet = results.pop("packet")
         names = [stage.name for stage in of_ball]
-        flying = tuple(BallTick(ball["ball"], {name: ball[name] for name in names}) for ball in balls)
+        flying = tuple(BallTick({name: ball[name] for name in names}, ball["ball"]) for ball in balls)
         if flying:
             results.update(flying[0].results)
         else:
             for stage in of_ball:
                 assert stage.absent is not None, stage.name
                 results[stage.name] = stage.absent(self._parameters.group(stage.group), results["track"].reason)
-        return Tick(packet, results, flying)
+        return Tick(results, packet, flying)

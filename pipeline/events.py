@@ -15,12 +15,17 @@ from .errors import RecordingError
 class EventBatch:
     """Events in order of time.
 
-    t_us : (n,) int64, microseconds in the file's own time, never falling
-    x_px, y_px : (n,) uint16, pixel column (to the right) and row (down)
-    on : (n,) bool, True = ON (brighter), False = OFF (darker)
-
     All columns are read-only. The constructor trusts its arguments; data from outside the program comes in
     through `checked`.
+
+    Attributes
+    ----------
+    t_us : (n,) int64
+        Microseconds in the file's own time, never falling.
+    x_px, y_px : (n,) uint16
+        Pixel column (to the right) and row (down).
+    on : (n,) bool
+        True = ON (brighter), False = OFF (darker).
     """
 
     t_us: NDArray[np.int64]

@@ -20,7 +20,7 @@ Group = TypeVar("Group", bound="ParameterGroup")
 
 @dataclass(frozen=True, slots=True)
 class Tunable:
-    """What is known of one parameter besides its value."""
+    """Declaration of one parameter: default, range, unit, choices and help."""
 
     default: Any
     help: str
@@ -81,7 +81,7 @@ class Tunable:
 
     @property
     def allowed(self) -> str:
-        """What may be given, in words."""
+        """Allowed values, in words."""
         if self.kind == "choice":
             return f"one of {', '.join(self.choices)}"
         if self.kind == "switch":

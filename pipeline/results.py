@@ -1,4 +1,4 @@
-"""What stages and recordings hand on to each other and to people: frozen, and never sharing memory with state."""
+"""Value types that stages and recordings hand on: frozen, and never sharing memory with state."""
 
 from __future__ import annotations
 
@@ -37,13 +37,20 @@ class Circle:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpinEstimate:
-    """What one method says of the spin, or why it says nothing.
+    """Spin estimate of one method, or the reason for its refusal.
 
-    vector_rps : (3,) float64, angular velocity in the camera frame (right-hand rule), rps; None when refused
-    covariance_rps2 : (3, 3) float64, 1-sigma covariance of the vector, rps^2; None when refused
-    reason : why it is refused, in words for people; None when it is ok
-    events : number of events (or constraints) behind the answer
-    against : the method whose answer excludes this one, which is refused for that; neither is then to be trusted
+    Attributes
+    ----------
+    vector_rps : (3,) float64
+        Angular velocity in the camera frame (right-hand rule), rps; None when refused.
+    covariance_rps2 : (3, 3) float64
+        1-sigma covariance of the vector, rps^2; None when refused.
+    reason : str, optional
+        Why it is refused, in words for people; None when it is ok.
+    events : int
+        Number of events (or constraints) behind the answer.
+    against : str, optional
+        The method whose answer excludes this one, which is refused for that; neither is then to be trusted.
     """
 
     method: str
@@ -112,12 +119,18 @@ class MethodResult:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Truth:
-    """What a simulator knows of the ball named first in its scene.
+    """Ground truth of a simulation, of the ball named first in its scene.
 
-    t_us : (n,) int64, rising
-    x_px, y_px, radius_px : (n,) float64, centre of the silhouette and geometric mean of its semi-axes
-    position_m, velocity_m_s, spin_rps : (n, 3) float64, camera frame
-    label : one uint8 an event: 0 noise, 1 ball edge and shading, 2 logo, 3 other object, 4 hot pixel
+    Attributes
+    ----------
+    t_us : (n,) int64
+        Rising.
+    x_px, y_px, radius_px : (n,) float64
+        Centre of the silhouette and geometric mean of its semi-axes.
+    position_m, velocity_m_s, spin_rps : (n, 3) float64
+        Camera frame.
+    label : (events,) uint8
+        0 noise, 1 ball edge and shading, 2 logo, 3 other object, 4 hot pixel.
     """
 
     t_us: NDArray[np.int64]

@@ -23,13 +23,24 @@ Floats = NDArray[np.float64]
 class Shot:
     """One ball from the tick in which it was found to the last tick in which it was there.
 
-    start_us, end_us : time of the first packet's start and the last one's end (file time)
-    t_us : (n,) float64, scene time of each tick's state
-    state : (n, 5) float64, [x_px, y_px, vx_px_s, vy_px_s, radius_px]: the causal filter's values
-    std : (n, 5) float64, their 1 sigma
-    measured : (n,) bool, whether a circle was measured in the tick (else the filter coasted)
-    logo_events : number of events inside the circle less pad; None where the logo was not asked for
-    estimates : the spin by method, from the whole shot; best : the method that is trusted, None where none is
+    Attributes
+    ----------
+    start_us, end_us : int
+        Time of the first packet's start and the last one's end (file time).
+    t_us : (n,) float64
+        Scene time of each tick's state.
+    state : (n, 5) float64
+        [x_px, y_px, vx_px_s, vy_px_s, radius_px]: the causal filter's values.
+    std : (n, 5) float64
+        Their 1 sigma.
+    measured : (n,) bool
+        Whether a circle was measured in the tick (else the filter coasted).
+    logo_events : int, optional
+        Number of events inside the circle less pad; None where the logo was not asked for.
+    estimates : dict[str, SpinEstimate]
+        The spin by method, from the whole shot.
+    best : str, optional
+        The method that is trusted, None where none is.
     """
 
     start_us: int

@@ -31,11 +31,16 @@ _AXES = (
 class Kind:
     """The kind of a spin relative to the flight, or its axis alone where there is no flight.
 
-    name : of the dominant component: topspin, backspin, left sidespin, right sidespin, corkscrew, reverse corkscrew;
-        "axis to the right in the image" and the like without a direction of flight; "no spin" for zero
-    off_deg : angle between the spin and the pure kind of that name
-    parts_rps : every named component (by its positive name: topspin, left sidespin, corkscrew), signed; empty
-        without a direction of flight
+    Attributes
+    ----------
+    name : str
+        Of the dominant component: topspin, backspin, left sidespin, right sidespin, corkscrew, reverse corkscrew;
+        "axis to the right in the image" and the like without a direction of flight; "no spin" for zero.
+    off_deg : float
+        Angle between the spin and the pure kind of that name.
+    parts_rps : dict[str, float]
+        Every named component (by its positive name: topspin, left sidespin, corkscrew), signed; empty without a
+        direction of flight.
     """
 
     name: str

@@ -62,11 +62,18 @@ RATE_FLOOR, STEADY_SIGHT = 0.01, 0.5
 class _Fit:
     """A spin (rad/s) with the constraints behind it.
 
-    events, rows, speeds, weights : the constraints rows . spin = speeds (kernels.comoving) with their final weights
-    matrix : (3, 3) normal matrix of these
-    scale : their residuals in predicted standard deviations
-    share : of the events looked at, how many carry the spin
-    overlap : in how many of the constraints the same event takes part
+    Attributes
+    ----------
+    events, rows, speeds, weights : int64 array
+        The constraints rows . spin = speeds (kernels.comoving) with their final weights.
+    matrix : (3, 3)
+        Normal matrix of these.
+    scale : float
+        Their residuals in predicted standard deviations.
+    share : float
+        Of the events looked at, how many carry the spin.
+    overlap : float
+        In how many of the constraints the same event takes part.
     """
 
     spin: Floats
@@ -89,7 +96,7 @@ class NormalFlowSpin:
     1. Start: planes fitted in the ball's frame and in the image (flow), RANSAC, iteratively reweighted least squares.
     2. Refinement: the same constraints as an observer sees them who turns with the start (kernels.comoving), which
        keeps apart the strokes of the logo, and again from there.
-    3. Magnitude: where the rhythm of the event rate agrees, it sharpens the length of the vector.
+    3. Magnitude: where the period of the event rate agrees, it sharpens the length of the vector.
     4. Uncertainty: see `_covariance`.
     """
 

@@ -35,7 +35,7 @@ class TripletSpin:
 
     Magnitude: section 3.3 takes "a better estimate of the spin magnitude" from the event rate, and only that explains
     the errors of 0.5 rps with 0.1 rps spread at 100 ms beside 30 rps at 10 ms (table 1). So once the event rate has
-    a rhythm, it gives the magnitude (and t_acc) and the flow gives the axis; `magnitude_from = flow` uses it for t_acc
+    a period, it gives the magnitude (and t_acc) and the flow gives the axis; `magnitude_from = flow` uses it for t_acc
     alone.
     """
 

@@ -1,4 +1,4 @@
-"""Where a ball spinner's ball is, from the events that its turning logo leaves over a whole recording.
+"""Circle of a ball spinner's ball, from the events that its turning logo leaves over a whole recording.
 
 In steady light a ball that turns in place shows nothing of its outline: only its logo's path lights up. The path
 lies inside the disc and mostly touches its limb where the logo comes round, so the ball is taken as the circle on

@@ -33,7 +33,7 @@ TRIPLET_NEAR_PX, TRIPLET_MISMATCH_PX, TRIPLET_MISMATCH_SHARE, TRIPLET_NEIGHBOURS
 
 @dataclass(frozen=True, kw_only=True)
 class FlowParameters(ParameterGroup):
-    """How long a slice is, and what the matching accepts."""
+    """Length of a slice, and limits of the matching."""
 
     t_acc_from: str = choice("rate", ("expected", "rate", "fixed"), "where t_acc = 1/(10 spin) takes the spin from")
     t_acc_us: int = tunable(2000, 100, 100_000, 100, "us", "length of a slice when t_acc_from = fixed")
@@ -47,20 +47,32 @@ class FlowResult:
 
     All positions and velocities are in the ball's frame: relative to the ball's centre at the event's own time.
 
-    t_acc_us : length of the slices now begun; None without a ball
-    speed_bound_px_s : highest speed looked for, 2 pi max_spin radius; NaN without a ball
-    radius_px : radius of the ball; NaN without a ball
-    t_us : (n,) int64; x_px, y_px : (n,) float64
-    points_m, normals : (n, 3) float64, where the event lies on the ball (camera frame), and e_r there
-    vx_px_s, vy_px_s : (n,) float64, Triplet Matching's flow
-    slice_index : (n,) int64, which slice (from the shot's start)
-    normal_t_us, normal_x_px, normal_y_px, normal_points_m, normal_normals : the same for the m events with normal
-        flow of a local plane; these come PLANE_REACH t_acc late, when their neighbours after them are known. Of a
-        dense logo only a part of the events is tried (PLANES_PER_MS), and none that may be the outline's.
-    normal_direction, normal_speed_px_s : (m, 2) float64 unit vectors across the edge, (m,) float64 speed along them
-    normal_in_image : (m,) bool, the plane was fitted in the image and the ball's motion taken off afterwards; an
-        event can have both kinds. A logo that turns against the flight hardly moves in the image: few pixels then see
-        it pass, too far apart in the ball's frame to be neighbours there.
+    Attributes
+    ----------
+    t_acc_us : int, optional
+        Length of the slices now begun; None without a ball.
+    speed_bound_px_s : float
+        Highest speed looked for, 2 pi max_spin radius; NaN without a ball.
+    radius_px : float
+        Radius of the ball; NaN without a ball.
+    t_us : (n,) int64
+    x_px, y_px : (n,) float64
+    points_m, normals : (n, 3) float64
+        Where the event lies on the ball (camera frame), and e_r there.
+    vx_px_s, vy_px_s : (n,) float64
+        Triplet Matching's flow.
+    slice_index : (n,) int64
+        Which slice (from the shot's start).
+    normal_t_us, normal_x_px, normal_y_px, normal_points_m, normal_normals : int64 array
+        The same for the m events with normal flow of a local plane; these come PLANE_REACH t_acc late, when their
+        neighbours after them are known. Of a dense logo only a part of the events is tried (PLANES_PER_MS), and
+        none that may be the outline's.
+    normal_direction, normal_speed_px_s : (m, 2) float64
+        Unit vectors across the edge, (m,) float64 speed along them.
+    normal_in_image : (m,) bool
+        The plane was fitted in the image and the ball's motion taken off afterwards; an event can have both kinds.
+        A logo that turns against the flight hardly moves in the image: few pixels then see it pass, too far apart
+        in the ball's frame to be neighbours there.
     """
 
     t_acc_us: int | None
@@ -153,7 +165,7 @@ def step(
     from the tick in which it ends, and may span several ticks. The last, unfinished slice of a shot is left out.
 
     t_acc = 1 / (10 spin): the paper prints ceil(omega / 10), which is not a time; "we divided each rotation into 10
-    time slices" is. Until the event rate has a rhythm, t_acc_from = rate uses the expected spin.
+    time slices" is. Until the event rate is periodic, t_acc_from = rate uses the expected spin.
     """
     if state.slice_start_us is None:
         state.slice_start_us, state.planes_until_us = packet.start_us, packet.start_us

@@ -33,7 +33,7 @@ OUTLINE_SHARE, OUTLINE_SPEED_PX_S = 0.66, 100.0
 
 @dataclass(frozen=True, kw_only=True)
 class LogoParameters(ParameterGroup):
-    """How far from the outline an event must be to count as the logo's, and how late it comes."""
+    """Distance from the outline (pad) and latency of the logo's events."""
 
     pad_px: float = tunable(2.5, 0.0, 100.0, 0.1, "px", "distance kept from the outline (pad of the paper)")
     # A ball that stays leaves no outline, only what its logo does: three more of 24 simulated spinners are answered
@@ -53,9 +53,14 @@ class LogoParameters(ParameterGroup):
 class TurningEvents:
     """Events that turn with the ball: none that its outline may have made, but also some nearer to it than pad.
 
-    t_us : (m,) int64; on : (m,) bool
-    normals : (m, 3) float64, outward unit normals where they lie on the ball (camera frame)
-    centre_x_px, centre_y_px : (m,) float64, the ball's centre when the event happened
+    Attributes
+    ----------
+    t_us : (m,) int64
+    on : (m,) bool
+    normals : (m, 3) float64
+        Outward unit normals where they lie on the ball (camera frame).
+    centre_x_px, centre_y_px : (m,) float64
+        The ball's centre when the event happened.
     """
 
     t_us: NDArray[np.int64]
@@ -72,18 +77,32 @@ class TurningEvents:
 class LogoResult:
     """The logo events of the tick, each with the ball at its own time.
 
-    events : the n events inside the circle less pad
-    centre_x_px, centre_y_px : (n,) float64, the ball's centre when the event happened, by the logo's latency
-    x_px, y_px : (n,) float64, the event relative to that centre, the lens's distortion undone
-    radius_px : radius of the ball in this tick; NaN without a ball
-    pad_px : what the mask leaves out along the outline
-    points_m : (n, 3) float64, where the events' camera rays meet the ball (camera frame)
-    normals : (n, 3) float64, outward unit normals e_r of the ball's surface there (the visible side has e_r . c < 0)
-    of_outline : (n,) bool, the event may well be the moving ball's own outline, see `_of_outline`
-    turning : what is left of them without those, and the rim's that are not the outline's either: `_logo_events`
-    position_std_px : 1 sigma of the centre across one axis, NaN without a ball
-    radius_std_px : 1 sigma of the radius, NaN without a ball
-    velocity_std_px_s : 1 sigma of the centre's velocity along one axis, NaN without a ball
+    Attributes
+    ----------
+    events : EventBatch
+        The n events inside the circle less pad.
+    centre_x_px, centre_y_px : (n,) float64
+        The ball's centre when the event happened, by the logo's latency.
+    x_px, y_px : (n,) float64
+        The event relative to that centre, the lens's distortion undone.
+    radius_px : float
+        Radius of the ball in this tick; NaN without a ball.
+    pad_px : float
+        What the mask leaves out along the outline.
+    points_m : (n, 3) float64
+        Where the events' camera rays meet the ball (camera frame).
+    normals : (n, 3) float64
+        Outward unit normals e_r of the ball's surface there (the visible side has e_r . c < 0).
+    of_outline : (n,) bool
+        The event may well be the moving ball's own outline, see `_of_outline`.
+    turning : TurningEvents
+        What is left of them without those, and the rim's that are not the outline's either: `_logo_events`.
+    position_std_px : float
+        1 sigma of the centre across one axis, NaN without a ball.
+    radius_std_px : float
+        1 sigma of the radius, NaN without a ball.
+    velocity_std_px_s : float
+        1 sigma of the centre's velocity along one axis, NaN without a ball.
     """
 
     events: EventBatch

@@ -1,4 +1,4 @@
-"""Rate: spin magnitude and t_acc from the rhythm of the logo's event rate (section 3.3)."""
+"""Rate: spin magnitude and t_acc from the period of the logo's event rate (section 3.3)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..results import Packet, frozen
 from ..stage import Context, Stage
 from .logo import LogoResult
 
-# Fewer logo events than this in the window have no rhythm that could be told from chance.
+# Fewer logo events than this in the window have no period that could be told from chance.
 FEWEST_EVENTS = 100
 # A period must repeat the curve to this correlation, and be within this share of the best of its multiples.
 REPEATS, SHARE_OF_BEST = 0.5, 0.8
@@ -39,13 +39,22 @@ class RateParameters(ParameterGroup):
 class RateResult:
     """The event rate of the present shot so far (the last window of it).
 
-    t_us : (n,) int64, the bins' starts; only bins that lie wholly in the shot and have ended
-    rate_hz, ema_hz, smooth_hz : (n,) float64, histogram, its moving average, and that less its mean and low-passed
-    low_pass_hz : the cut-off used for smooth_hz
-    crossings_us : (m,) float64, times at which smooth_hz falls through zero
-    spin_rps : magnitude from the crossings; None with its reason when there is no rhythm
-    spin_std_rps : its 1 sigma; None with spin_rps
-    reason : why spin_rps is None
+    Attributes
+    ----------
+    t_us : (n,) int64
+        The bins' starts; only bins that lie wholly in the shot and have ended.
+    rate_hz, ema_hz, smooth_hz : (n,) float64
+        Histogram, its moving average, and that less its mean and low-passed.
+    low_pass_hz : float
+        The cut-off used for smooth_hz.
+    crossings_us : (m,) float64
+        Times at which smooth_hz falls through zero.
+    spin_rps : float, optional
+        Magnitude from the crossings; None with its reason when there is no period.
+    spin_std_rps : float, optional
+        Its 1 sigma; None with spin_rps.
+    reason : str, optional
+        Why spin_rps is None.
     """
 
     t_us: NDArray[np.int64]
@@ -79,7 +88,7 @@ def absent(parameters: RateParameters, reason: str) -> RateResult:
 
 
 def step(parameters: RateParameters, state: RateState, packet: Packet, logo: LogoResult) -> RateResult:
-    """The event rate up to the end of the tick and, once it has a rhythm, the spin magnitude behind it.
+    """The event rate up to the end of the tick and, once it is periodic, the spin magnitude behind it.
 
     The magnitude is the rate of the logo's reappearance, seen from the camera: while the ball flies past, the line
     of sight turns too, which adds or takes up to speed / (2 pi distance), about 0.7 rps at 9 m/s and 2 m.
@@ -109,7 +118,7 @@ def _count(parameters: RateParameters, state: RateState, packet: Packet, logo: L
 def _without_period(
     parameters: RateParameters, t_us: NDArray[np.int64], rate_hz: NDArray[np.float64], reason: str
 ) -> RateResult:
-    """A result without rhythm, with the curves as far as they go."""
+    """A result without a period, with the curves as far as they go."""
     ema_hz = moving_average(rate_hz, _ema_weight(parameters))
     nothing = frozen(np.zeros(rate_hz.size))
     return RateResult(
@@ -153,7 +162,7 @@ def _with_period(
 def _spin(
     crossings_us: NDArray[np.float64], repeats: bool, parameters: RateParameters, max_spin_rps: float
 ) -> tuple[float | None, float | None, str | None]:
-    """(magnitude, its 1 sigma, reason): 1 / the mean interval, unless the crossings make no rhythm."""
+    """(magnitude, its 1 sigma, reason): 1 / the mean interval, unless the crossings are irregular."""
     if crossings_us.size < 2:
         return None, None, f"{crossings_us.size} falling crossings, two are needed"
     intervals_s = np.diff(crossings_us) * 1e-6

@@ -23,7 +23,7 @@ CLEANINGS = {"off": None, "isolated": False, "printed": True}
 
 @dataclass(frozen=True, kw_only=True)
 class SurfaceParameters(ParameterGroup):
-    """Which surface, and how it is cleaned."""
+    """Kind of surface, and its cleaning."""
 
     kind: str = choice("eros", KINDS, "EROS, accumulated frame or linear time surface")
     k_px: int = tunable(
@@ -37,8 +37,12 @@ class SurfaceParameters(ParameterGroup):
 class SurfaceResult:
     """The surface at the end of the tick.
 
-    values : (height, width) uint8, 0 = nothing, 255 = an event just now; not cleaned
-    cleaning : the rule by which `cleaned` removes isolated pixels
+    Attributes
+    ----------
+    values : (height, width) uint8
+        0 = nothing, 255 = an event just now; not cleaned.
+    cleaning : str
+        The rule by which `cleaned` removes isolated pixels.
     """
 
     values: NDArray[np.uint8]

@@ -25,7 +25,7 @@ from .surface import SurfaceResult
 from .track_hough import hough_near
 from .track_kalman import OBSERVED, OBSERVED_BLOCK, BallFilter, load_filter
 from .track_outline import VOTE_US, Edge, Limits, Sighting, measure
-from .track_search import MOST_CANDIDATES, Rivals, agree, look
+from .track_search import MOST_CANDIDATES, OtherBalls, agree, look
 
 Status = Literal["searching", "starting", "tracking", "coasting", "lost"]
 
@@ -173,14 +173,14 @@ FREE = np.full(5, 1e9)
 
 @dataclass(slots=True)
 class TrackState:
-    """What the tracker carries from tick to tick."""
+    """State of the tracker from tick to tick."""
 
     context: Context
     limits: Limits
     contour: EventBatch = field(default_factory=EventBatch.empty)
     ball: BallFilter | None = None
     pending: tuple[int, Sighting] | None = None
-    rivals: Rivals = field(default_factory=Rivals)
+    others: OtherBalls = field(default_factory=OtherBalls)
     seen_us: int = 0
     shots: int = 0
 
@@ -268,7 +268,7 @@ def _search(parameters: TrackParameters, state: TrackState, packet: Packet, surf
 
 
 def _wait_us(parameters: TrackParameters, state: TrackState, sighting: Sighting) -> int:
-    """How long such a sighting must have been there before it is a shot."""
+    """Time for which such a sighting must have been seen before it is a shot, us."""
     camera, (x, y, _, _, radius) = state.context.camera, sighting.ring
     inside = min(x, y, camera.width_px - 1 - x, camera.height_px - 1 - y)
     if sighting.speed_px_s / radius * state.context.ball_radius_m < SLOW_M_S and inside > COMING_IN * radius:
@@ -296,9 +296,9 @@ def _follow(
         if bounced is not None and bounced.trusted and abs(bounced.ring[4] / expected[4] - 1) < 0.1:
             return _begin(parameters, state, packet, bounced, hough, state.shots - 1)
     now = ball.mean
-    if measured is None or state.rivals.due(packet.end_us):
+    if measured is None or state.others.due(packet.end_us):
         least = (RIVAL_SPEED if measured else RIVAL_SPEED_UNSEEN) * math.hypot(now[2], now[3])
-        other = state.rivals.fastest(
+        other = state.others.fastest(
             surface, state.contour, packet.end_us, camera, state.limits, now if measured else None
         )
         if other is not None and other[0].speed_px_s > least:
@@ -352,7 +352,7 @@ def _begin(
     covariance[[2, 3], [2, 3]] += (0.2 * per_m) ** 2
     growth = parameters.approach_m_s * per_m * mean[4] / state.context.camera.focal_px
     state.ball = BallFilter(mean, covariance, parameters.acceleration_m_s2 * per_m, growth)
-    state.pending, state.rivals = None, Rivals()
+    state.pending, state.others = None, OtherBalls()
     state.seen_us = packet.end_us
     state.shots = shot + 1
     measured = _circle(parameters, sighting)

@@ -60,8 +60,12 @@ def candidates(
 ) -> Iterator[Circle]:
     """Circles anywhere, best first: a coarse vote of the cells with fresh edges, refined pixel by pixel.
 
-    events : the contour events that may belong to an edge (where the surface is bright)
     Nothing comes when fewer than five cells are active.
+
+    Parameters
+    ----------
+    events : EventBatch
+        The contour events that may belong to an edge (where the surface is bright).
     """
     columns, rows = kernels.active_cells(surface.values, events.x_px, events.y_px, EDGE_LEVEL, CELL_PX)
     if columns.size < 5:
@@ -96,10 +100,14 @@ def candidates(
 def find_circle(image: NDArray[Any], radius_min_px: float, radius_max_px: float) -> Circle | None:
     """The circle that the set pixels of one image draw best, to sub-pixel; None when they draw none.
 
-    image : (height, width) bool or uint8; pixels of at least half its maximum count. For single frames
-        without times and polarities, such as accumulated events; the centre may lie outside the image.
     The score is the share of the outline's directions (out of 24) that have a pixel within 1.5 px; less than
     half is no circle.
+
+    Parameters
+    ----------
+    image : (height, width) bool
+        Or uint8; pixels of at least half its maximum count. For single frames without times and polarities, such as
+        accumulated events; the centre may lie outside the image.
     """
     pixels = np.ascontiguousarray(image).view(np.uint8)
     brightest = int(pixels.max(initial=0))

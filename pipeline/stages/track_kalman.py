@@ -25,9 +25,14 @@ def load_filter() -> Any:
 class BallFilter:
     """filterpy's Kalman equations with the paper's F and H, and process noise from what moves a ball.
 
-    acceleration_px_s2 : 1 sigma of the ball's acceleration, constant over one step
-    growth_px_s : 1 sigma of the rate at which the radius changes, constant over one step
-    mean, covariance : (5,) and (5, 5) float64, never written into
+    Parameters
+    ----------
+    acceleration_px_s2 : float
+        1 sigma of the ball's acceleration, constant over one step.
+    growth_px_s : float
+        1 sigma of the rate at which the radius changes, constant over one step.
+    mean, covariance : (5,)
+        And (5, 5) float64, never written into.
     """
 
     def __init__(self, mean: Floats, covariance: Floats, acceleration_px_s2: float, growth_px_s: float) -> None:

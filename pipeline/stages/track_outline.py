@@ -26,7 +26,7 @@ VOTE_US = 1500
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What may be a ball: radii in px, speeds in ball radii a second (so that they hold at any distance)."""
+    """Limits of what may be a ball: radii in px, speeds in ball radii a second (so that they hold at any distance)."""
 
     radius_min_px: float
     radius_max_px: float
@@ -36,7 +36,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """How the outline that the pixels report differs from the ball's.
+    """Difference between the outline that the pixels report and the ball's.
 
     It lies outline_px outside, because a pixel answers as soon as part of it sees the ball, and lag_px
     behind.
@@ -64,14 +64,24 @@ class Edge:
 class Sighting:
     """One measured outline at the end of a tick.
 
-    ring : (5,) float64 [x, y, vx, vy, radius] of the outline as the events show it (px, px/s)
-    covariance : (5, 5) float64, from the scatter of the events alone
-    scatter_px : 1 sigma of the events' distances from the outline
-    events : events on the outline, both halves
-    ahead, behind : share of the visible outline that has events, where it moves outwards and inwards
-    contrast : share of ON events ahead less that behind: +1 for a bright ball, -1 for a dark one
-    visible : share of the outline that is in the image
-    clutter : events just outside the outline, for each one on it
+    Attributes
+    ----------
+    ring : (5,) float64
+        [x, y, vx, vy, radius] of the outline as the events show it (px, px/s).
+    covariance : (5, 5) float64
+        From the scatter of the events alone.
+    scatter_px : float
+        1 sigma of the events' distances from the outline.
+    events : int
+        Events on the outline, both halves.
+    ahead, behind : float
+        Share of the visible outline that has events, where it moves outwards and inwards.
+    contrast : float
+        Share of ON events ahead less that behind: +1 for a bright ball, -1 for a dark one.
+    visible : float
+        Share of the outline that is in the image.
+    clutter : float
+        Events just outside the outline, for each one on it.
     """
 
     ring: Floats
@@ -139,8 +149,12 @@ def measure(
 ) -> Sighting | None:
     """Fit the outline near an expected ring (5,) at end_us; None with too few events or without a result.
 
-    gate_px : events this near the expected outline take part
-    prior_std : (5,) how firmly the expectation holds
+    Parameters
+    ----------
+    gate_px : float
+        Events this near the expected outline take part.
+    prior_std : (5,)
+        How firmly the expectation holds.
     """
     ring, covariance, scatter, found = kernels.measured(
         expected,

@@ -43,7 +43,7 @@ def look(
 
 
 @dataclass(slots=True)
-class Rivals:
+class OtherBalls:
     """The search beside a track, and the balls it came upon lately."""
 
     looked_us: int = 0
@@ -69,7 +69,7 @@ class Rivals:
         if tracked is not None:
             rings.append(tracked)
         for ring in rings:
-            margin = 0.3 * ring[4] + 2.0  # room for trails, and for errors of the older ones
+            margin = 0.3 * ring[4] + 2.0  # for trails, and for errors of the older ones
             rows = kernels.clear_of(ring, events.t_us, events.x_px, events.y_px, end_us, margin)
             events = EventBatch(*taken(rows, *events.columns))
         _, found = look(surface, events, end_us, camera, limits, MOST_RIVALS)

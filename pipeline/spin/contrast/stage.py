@@ -85,17 +85,30 @@ class ContrastParameters(ParameterGroup):
 class ContrastResult:
     """The estimate from the present shot so far, and what it rests on.
 
-    estimate : the spin, or the reason for refusing
-    best_rps : (3,) float64, the best spin, also of a refused answer; NaN without one
-    rivals_rps : (k, 3) float64, other tops of the score
-    rival_sigmas : (k,) float64, by how many standard deviations the best one beats each
-    start_us, end_us : stretch of the events used (event time); 0, 0 without events
-    reference_us : the event time to which the events are turned back
-    offsets_px : (3,) float64, centre x, y and radius of the ball, refined less tracked
-    contrast : score an event less that of exchanged times; 0 = nothing turns with the spin
-    full : whether this tick made a full estimate, or followed the last one
-    magnitudes_rps, magnitude_scores : (m,) float64, the score an event along the best axis, at the last full estimate
-    directions, direction_scores : (d, 3) and (d,) float64, the same over all axes at the best magnitude
+    Attributes
+    ----------
+    estimate : SpinEstimate
+        The spin, or the reason for refusing.
+    best_rps : (3,) float64
+        The best spin, also of a refused answer; NaN without one.
+    rivals_rps : (k, 3) float64
+        Other tops of the score.
+    rival_sigmas : (k,) float64
+        By how many standard deviations the best one beats each.
+    start_us, end_us : int
+        Stretch of the events used (event time); 0, 0 without events.
+    reference_us : float
+        The event time to which the events are turned back.
+    offsets_px : (3,) float64
+        Centre x, y and radius of the ball, refined less tracked.
+    contrast : float
+        Score an event less that of exchanged times; 0 = nothing turns with the spin.
+    full : bool
+        Whether this tick made a full estimate, or followed the last one.
+    magnitudes_rps, magnitude_scores : (m,) float64
+        The score an event along the best axis, at the last full estimate.
+    directions, direction_scores : (d, 3)
+        And (d,) float64, the same over all axes at the best magnitude.
     """
 
     estimate: SpinEstimate
@@ -118,9 +131,14 @@ class ContrastResult:
 class ContrastState:
     """The shot's logo events, tick by tick, and the last answers.
 
-    start_us : start of the shot; None before its first tick
-    full_us : age of the shot, us, at which the next full estimate is due
-    tried, searched : number of events at the last full estimate and at the last search over all spins
+    Attributes
+    ----------
+    start_us : int, optional
+        Start of the shot; None before its first tick.
+    full_us : float
+        Age of the shot, us, at which the next full estimate is due.
+    tried, searched : int
+        Number of events at the last full estimate and at the last search over all spins.
     """
 
     context: Context
@@ -212,7 +230,7 @@ def _joined(state: ContrastState) -> LogoEvents:
 
 
 def _place(state: ContrastState) -> Place:
-    """How well the ball's place is known over the stretch: the ticks' medians."""
+    """Uncertainty of the ball's place over the stretch: the ticks' medians."""
     position, radius, velocity, flown = (float(value) for value in np.median(np.array(state.places), axis=0))
     return Place(
         centre_std_px=max(math.hypot(position, flown), 0.01),
@@ -348,7 +366,7 @@ def _nothing(estimate: SpinEstimate) -> ContrastResult:
 
 
 def is_trusted(estimates: Mapping[str, SpinEstimate]) -> bool:
-    """Whether contrast answers: it refuses by itself what it cannot stand for."""
+    """Whether contrast answers: it has trust rules of its own."""
     return estimates[METHOD].status == "ok"
 
 
