@@ -10,7 +10,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from spinscope.pipeline.kernels.still import CELLS, Canvas, centroid, paint, turn_back_and_count
+from spinscope.pipeline.kernels.derotated_logo import CELLS, Canvas, centroid, count_derotated, paint
 
 from . import entities as at
 from .rerun_api import Chunk, columns_at, once, styled
@@ -88,7 +88,7 @@ class _Shot:
     def _middle(self, seen: slice) -> Floats:
         """The direction in which the logo lies, by the shot's last estimate; to the camera where there is none."""
         density = np.empty((CELLS, CELLS, CELLS, 3), np.float32)
-        turn_back_and_count(density, self.normals[seen], self.on[seen], self.seconds[seen], self.spins_rps[-1])
+        count_derotated(density, self.normals[seen], self.on[seen], self.seconds[seen], self.spins_rps[-1])
         direction = centroid(density)
         return direction if direction.any() else TO_CAMERA
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from ..camera import Camera
+from ..kernels.rotation import rotations
 from ..simulator.logos import Logo, Texture, texture
-from ..simulator.motion import rotations
 from .frame_camera import Frame
 from .frame_ink import Ink, inks
 

@@ -2,13 +2,13 @@
 
 The reference multiplies the k x k block (k odd) around each event by d = 0.3^(1/k) and sets the event's pixel
 to 255, in float64, and rounds when the surface is read. After n such fades a pixel holds 255 d^n, which reads
-0 from some n on (57 for k = 11). So it is enough to count: an event sets its pixel's life to that n, each
-fade takes one off, never below 0, and a table turns lives into values. Equal to the reference bit for bit;
+0 from some n on (57 for k = 11). So it is enough to count: an event sets its pixel's level to that n, each
+fade takes one off, never below 0, and a table turns levels into values. Equal to the reference bit for bit;
 the benchmark compares the speed with the reference and with the naive loop in float32 (16 x slower at k =
 21).
 
 Lives are kept flat, the rows MARGIN_PX apart and so many rows above and below them: a block needs no check
-for the image's border. The margins' lives are always 0, for no event sets them.
+for the image's border. The margins' levels are always 0, for no event sets them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-# Widest block: its lives (254 at the event) still fit a byte. Half of it is the margin; being a multiple of
+# Widest block: its levels (254 at the event) still fit a byte. Half of it is the margin; being a multiple of
 # 8, it lets the image's rows start at whole words.
 K_MAX_PX = 49
 MARGIN_PX = K_MAX_PX // 2
@@ -27,12 +27,12 @@ WORD, ONE, TWO, THREE = np.uint64(8), np.uint64(1), np.uint64(2), np.uint64(3)
 
 
 def odd_px(k_px: int) -> int:
-    """The block's width as the reference uses it: the next odd number (10 -> 11)."""
+    """Width of the block as the reference uses it: the next odd number (10 -> 11)."""
     return k_px | 1
 
 
-def values_of_lives(k_px: int) -> NDArray[np.uint8]:
-    """(lives + 1,) uint8, what a pixel of each life reads; the last is 255, the life that an event sets.
+def value_table(k_px: int) -> NDArray[np.uint8]:
+    """Value of each level: (levels + 1,) uint8; the last is 255, at the level that an event sets.
 
     By multiplying again and again, as the reference does: 255 x 0.3 = 76.5 is a tie that rounding errors
     decide.
@@ -46,28 +46,38 @@ def values_of_lives(k_px: int) -> NDArray[np.uint8]:
 
 @njit(cache=True, nogil=True)
 def _stride_px(width_px: int) -> int:
-    """From one row of lives to the next: a margin, and the width rounded up to whole words."""
+    """Distance from one row of levels to the next: a margin, and the width rounded up to whole words."""
     return MARGIN_PX + (width_px + 7) // 8 * 8
 
 
-def no_lives(width_px: int, height_px: int) -> NDArray[np.uint8]:
+def empty_levels(width_px: int, height_px: int) -> NDArray[np.uint8]:
     """Lives of an empty surface: flat uint8, with margins, and room behind for the last block's last band."""
     return np.zeros((height_px + 2 * MARGIN_PX) * _stride_px(width_px) + 64, np.uint8)
 
 
 @njit(cache=True, nogil=True)
-def draw(
-    lives: NDArray[np.uint8],
+def update(
+    levels: NDArray[np.uint8],
     width_px: int,
     k_px: int,
     full: int,
     x_px: NDArray[np.uint16],
     y_px: NDArray[np.uint16],
 ) -> None:
-    """Add events in their order: fade the block around each, then set its pixel; changes lives.
+    """Add events in their order: fade the block around each, then set its pixel; writes into `levels` only.
 
-    lives : as made by `no_lives` for this width; k_px : odd, at most K_MAX_PX; full : life that an event sets
+    Parameters
+    ----------
+    levels : flat uint8
+        As made by `empty_levels` for this width.
+    width_px : int
+        Width of the image.
+    k_px : int
+        Width of the block, odd, at most K_MAX_PX.
+    full : int
+        Level that an event sets.
     x_px, y_px : (n,) uint16
+        Pixels of the events.
     """
     stride = np.uint64(_stride_px(width_px))
     corner_px, half = np.uint64(MARGIN_PX - k_px // 2), np.uint64(k_px // 2)
@@ -79,31 +89,31 @@ def draw(
                 start = corner + np.uint64(row) * stride + np.uint64(left)
                 for c in range(BAND_PX):
                     # `min` and unsigned indices make this one saturating subtraction of 32 bytes.
-                    life = lives[start + np.uint64(c)]
-                    lives[start + np.uint64(c)] = life - min(life, np.uint8(c < columns))
-        lives[corner + half * stride + half] = full
+                    level = levels[start + np.uint64(c)]
+                    levels[start + np.uint64(c)] = level - min(level, np.uint8(c < columns))
+        levels[corner + half * stride + half] = full
 
 
 @njit(cache=True, nogil=True)
-def read(values: NDArray[np.uint8], lives: NDArray[np.uint8], table: NDArray[np.uint8]) -> None:
-    """Write what the living pixels read into values, (height, width) uint8, which must hold zeros.
+def render(values: NDArray[np.uint8], levels: NDArray[np.uint8], table: NDArray[np.uint8]) -> None:
+    """Write the values of the levels into `values` (height, width) uint8, which must hold zeros.
 
     Skips what is empty, by whole rows and then 32 pixels at a time: on a flight's surface 5 x as fast as cv2.LUT over
     every pixel.
     """
     height_px, width_px = values.shape
     width, stride = np.uint64(width_px), np.uint64(_stride_px(width_px))
-    flat, words = values.reshape(-1), lives.view(np.uint64)
+    flat, words = values.reshape(-1), levels.view(np.uint64)
     for y in range(height_px):
         row = np.uint64(y + MARGIN_PX) * stride + np.uint64(MARGIN_PX)
         out = np.uint64(y) * width
-        living = np.uint64(0)
+        occupied = np.uint64(0)
         for n in range(row // WORD, (row + width + np.uint64(7)) // WORD):
-            living |= words[np.uint64(n)]
-        if living == 0:
+            occupied |= words[np.uint64(n)]
+        if occupied == 0:
             continue
         for left in range(np.uint64(0), width, BAND_PX):
             word = (row + np.uint64(left)) // WORD
             if (words[word] | words[word + ONE] | words[word + TWO] | words[word + THREE]) != 0:
                 for x in range(np.uint64(left), min(np.uint64(left) + BAND_PX, width)):
-                    flat[out + np.uint64(x)] = table[lives[row + np.uint64(x)]]
+                    flat[out + np.uint64(x)] = table[levels[row + np.uint64(x)]]

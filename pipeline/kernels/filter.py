@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 OFF, STC, TRAIL, STC_CUT_TRAIL = range(4)
 
-# State of a pixel, packed so that an event touches one word: 8 x the time of its last event (us) + one SPENT
+# State of a pixel, packed so that an event touches one word: 8 x the time of its last event (us) + one PASSED
 # bit a filter (set when the filter has passed an event since the polarity changed) + the polarity (1 = ON).
-SPENT, LOGO_SPENT = 2, 4
+PASSED, LOGO_PASSED = 2, 4
 # No event yet: an OFF event 18,000 years before time 0, so that no difference of times overflows.
 NEVER = np.int64(-(1 << 62))
 # Pixels fetched ahead of their use. Their cache misses then overlap: 3 x faster on events all over a 1280 x
@@ -30,19 +30,19 @@ AHEAD = np.uint64(64)
 
 
 @njit(cache=True, nogil=True)
-def _passes(mode: int, same: bool, pause_us: int, threshold_us: int, spent: bool) -> bool:
+def _passes(mode: int, same: bool, pause_us: int, threshold_us: int, passed_before: bool) -> bool:
     """Whether an event passes; same = polarity of the pixel's last event, pause_us = time since then."""
     if mode == STC:
         return same & (pause_us <= threshold_us)
     if mode == TRAIL:
         return (not same) | (pause_us >= threshold_us)
     if mode == STC_CUT_TRAIL:
-        return same & (pause_us <= threshold_us) & (not spent)
+        return same & (pause_us <= threshold_us) & (not passed_before)
     return True
 
 
 @njit(cache=True, nogil=True)
-def passing(
+def filter_events(
     last: NDArray[np.int64],
     width_px: int,
     t_us: NDArray[np.int64],
@@ -78,11 +78,11 @@ def passing(
             polarity = np.int64(on[i])
             same = (state & 1) == polarity
             pause_us = t_us[i] - (state >> 3)
-            spent = same & ((state & SPENT) != 0)
-            logo_spent = same & ((state & LOGO_SPENT) != 0)
-            passes = np.int64(_passes(mode, same, pause_us, threshold_us, spent))
-            logo_passes = np.int64(_passes(logo_mode, same, pause_us, logo_threshold_us, logo_spent))
-            bits = (passes | spent) * SPENT | (logo_passes | logo_spent) * LOGO_SPENT | polarity
+            passed_before = same & ((state & PASSED) != 0)
+            logo_passed_before = same & ((state & LOGO_PASSED) != 0)
+            passes = np.int64(_passes(mode, same, pause_us, threshold_us, passed_before))
+            logo_passes = np.int64(_passes(logo_mode, same, pause_us, logo_threshold_us, logo_passed_before))
+            bits = (passes | passed_before) * PASSED | (logo_passes | logo_passed_before) * LOGO_PASSED | polarity
             last[pixel] = t_us[i] * 8 | bits
             rows[m] = i  # stays only if counted: no branch to mispredict
             m += np.uint64(passes)

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 
 @numba.njit(cache=True, nogil=True)
-def meet_ball(
+def intersect_ball(
     rays: Floats,
     t_us: NDArray[np.int64],
     first_us: float,
@@ -57,23 +57,6 @@ def meet_ball(
         points[i, 1] = cy + ball_radius_m * normals[i, 1]
         points[i, 2] = cz + ball_radius_m * normals[i, 2]
     return points, normals
-
-
-@numba.njit(cache=True, nogil=True)
-def image_velocity(
-    points_m: Floats, normals: Floats, spin_rad_s: Floats, focal_px: float, ball_radius_m: float
-) -> Floats:
-    """Image velocities (n, 2) in px/s, in the ball's frame, of surface points that turn with the spin (3,)."""
-    n = points_m.shape[0]
-    velocity = np.empty((n, 2))
-    wx, wy, wz = spin_rad_s[0], spin_rad_s[1], spin_rad_s[2]
-    for i in range(n):
-        ex, ey, ez = normals[i, 0], normals[i, 1], normals[i, 2]
-        vz = wx * ey - wy * ex
-        scale = focal_px * ball_radius_m / points_m[i, 2]
-        velocity[i, 0] = scale * (wy * ez - wz * ey - points_m[i, 0] / points_m[i, 2] * vz)
-        velocity[i, 1] = scale * (wz * ex - wx * ez - points_m[i, 1] / points_m[i, 2] * vz)
-    return velocity
 
 
 @numba.njit(cache=True, nogil=True)

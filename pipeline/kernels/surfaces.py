@@ -11,7 +11,7 @@ NEVER_US = np.int64(-(1 << 62))
 
 
 @njit(cache=True, nogil=True)
-def remember(
+def update_last_times(
     last_us: NDArray[np.int64], t_us: NDArray[np.int64], x_px: NDArray[np.uint16], y_px: NDArray[np.uint16]
 ) -> None:
     """Note events in order of time in last_us, (height, width) int64, the time of each pixel's last event."""
@@ -20,7 +20,7 @@ def remember(
 
 
 @njit(cache=True, nogil=True)
-def read(values: NDArray[np.uint8], last_us: NDArray[np.int64], end_us: int, span_us: int, linear: bool) -> None:
+def render(values: NDArray[np.uint8], last_us: NDArray[np.int64], end_us: int, span_us: int, linear: bool) -> None:
     """Write the pixels with an event in [end - span, end) into values.
 
     values : (height, width) uint8, which must hold zeros; last_us : (height, width) int64

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..kernels.rotation import rotations
 from .scene import Air, Arm, Ball, Fixed, Flight, Quaternion, Scene, Vector3
 
 Floats = NDArray[np.float64]
@@ -55,19 +56,6 @@ class Path:
         spin = self.spin_rps[row]
         turned = rotations(spin * 2 * np.pi * (t - self.time_s[row])[:, None]) @ self.rotation[row]
         return Path(t, position, velocity, spin, turned)
-
-
-def rotations(vectors_rad: ArrayLike) -> Floats:
-    """(n, 3, 3) rotation matrices about these vectors (n, 3) by their lengths (Rodrigues)."""
-    vector = np.atleast_2d(np.asarray(vectors_rad, np.float64))
-    angle = np.linalg.norm(vector, axis=1)
-    axis = np.divide(vector, angle[:, None], out=np.zeros_like(vector), where=angle[:, None] > 0)
-    cross = np.zeros((vector.shape[0], 3, 3))
-    cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = -axis[:, 2], axis[:, 1], -axis[:, 0]
-    cross[:, 1, 0], cross[:, 2, 0], cross[:, 2, 1] = axis[:, 2], -axis[:, 1], axis[:, 0]
-    sine, cosine = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
-    matrix: Floats = np.eye(3) + sine * cross + (1 - cosine) * (cross @ cross)
-    return matrix
 
 
 def matrix_of(quaternion: Quaternion) -> Floats:

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from ..camera import Camera
 from ..errors import ParameterError
+from ..kernels.rotation import rotations
 from .logos import Logo
-from .motion import quaternion_of, rotations
+from .motion import quaternion_of
 from .scene import Air, Arm, Background, Ball, Fixed, Flight, Light, Scene
 from .shots import HEADING_DEG, Shots, mounted, triple, vector
 from .simulation import default_camera

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from ..camera import Camera
 from ..errors import ParameterError
-from .motion import Path, path, quaternion_of, rotations
+from ..kernels.rotation import rotations
+from .motion import Path, path, quaternion_of
 from .scene import Air, Background, Ball, Flight, Scene, Vector3
 
 Floats = NDArray[np.float64]

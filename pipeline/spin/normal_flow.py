@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.comoving import comoving_constraints, position_response
+from ..kernels.derotated_normal_flow import derotated_constraints, position_response
 from ..kernels.sphere import spin_rows
 from ..kernels.spin import robust_spin, sampled_spin
 from ..results import MethodResult, Packet, SpinEstimate
@@ -65,7 +65,7 @@ class _Fit:
     Attributes
     ----------
     events, rows, speeds, weights : int64 array
-        The constraints rows . spin = speeds (kernels.comoving) with their final weights.
+        The constraints rows . spin = speeds with their final weights.
     matrix : (3, 3)
         Normal matrix of these.
     scale : float
@@ -94,7 +94,7 @@ class NormalFlowSpin:
     constraint on the spin. Averaging such normal flow as if it were full flow is what costs the paper its axis.
 
     1. Start: planes fitted in the ball's frame and in the image (flow), RANSAC, iteratively reweighted least squares.
-    2. Refinement: the same constraints as an observer sees them who turns with the start (kernels.comoving), which
+    2. Refinement: the same constraints as an observer sees them who turns with the start (derotated), which
        keeps apart the strokes of the logo, and again from there.
     3. Magnitude: where the period of the event rate agrees, it sharpens the length of the vector.
     4. Uncertainty: see `_covariance`.
@@ -193,7 +193,7 @@ class NormalFlowSpin:
         """Share of the events that lie on a line which stands still for so long if the ball turns like this."""
         radius_px = self._track()[0]
         (t_us, normals, on), stride, looked_at = self._looked_at()
-        _, rows, speeds, _, _ = comoving_constraints(
+        _, rows, speeds, _, _ = derotated_constraints(
             t_us, normals, on, spin, stride, REACH_PX / radius_px, turn_s * 1e6, WIDTH_PX / radius_px, SHARPEST
         )
         return float(np.sum(np.abs(speeds - rows @ spin) * turn_s * radius_px < STANDS_PX)) / looked_at
@@ -221,7 +221,7 @@ class NormalFlowSpin:
             speed = float(np.linalg.norm(spin))
             if not 1.0 < speed < 1.3 * TAU * self.parameters.max_spin_rps:
                 return None
-            events, rows, speeds, variances, sizes = comoving_constraints(
+            events, rows, speeds, variances, sizes = derotated_constraints(
                 t_us, normals, on, spin, stride, REACH_PX / radius_px, min(turn / speed * 1e6, LONGEST_US),
                 WIDTH_PX / radius_px, SHARPEST,
             )  # fmt: skip

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ..events import EventBatch
 from ..kernels.logo import logo_rows, outline_like
-from ..kernels.rows import taken
-from ..kernels.sphere import meet_ball
+from ..kernels.sphere import intersect_ball
+from ..kernels.take_events import take_events
 from ..parameters import ParameterGroup, tunable
 from ..results import Packet, frozen
 from ..stage import Context, Stage
@@ -155,7 +155,7 @@ def step(
     middles = camera.rays(centre_x, centre_y)
     x, y = (rays[:, 0] - middles[:, 0]) * camera.focal_px, (rays[:, 1] - middles[:, 1]) * camera.focal_px
     knots_m = _knots_m(packet, ball, parameters.delay_us, state)
-    points, normals = meet_ball(rays, events.t_us, packet.start_us, packet.end_us, knots_m, state.ball_radius_m)
+    points, normals = intersect_ball(rays, events.t_us, packet.start_us, packet.end_us, knots_m, state.ball_radius_m)
     of_outline = _of_outline(x, y, events.on, ball)
     rows, own = np.flatnonzero(inside), np.flatnonzero(~of_outline)
     return LogoResult(
@@ -199,7 +199,7 @@ def _logo_events(
     )
     if (vx or vy) and others > MIXED_OUTLINE * likes:
         rows, inside = rows[inside], inside[inside]
-    return EventBatch(*taken(rows, *events.columns)), inside
+    return EventBatch(*take_events(rows, *events.columns)), inside
 
 
 def _of_outline(x_px: Floats, y_px: Floats, on: NDArray[np.bool_], ball: BallTrack) -> NDArray[np.bool_]:

@@ -72,14 +72,14 @@ class ErosSurface:
     def __init__(self, parameters: SurfaceParameters, width_px: int, height_px: int) -> None:
         self._width_px, self._height_px = width_px, height_px
         self._k_px = eros.odd_px(parameters.k_px)
-        self._lives = eros.no_lives(width_px, height_px)  # flat uint8, see the kernel
-        self._table = eros.values_of_lives(parameters.k_px)
+        self._levels = eros.empty_levels(width_px, height_px)  # flat uint8, see the kernel
+        self._table = eros.value_table(parameters.k_px)
 
     def update(self, packet: Packet, events: EventBatch) -> NDArray[np.uint8]:
         """Draw the tick's events and return the (height, width) uint8 surface at its end."""
         values = np.zeros((self._height_px, self._width_px), np.uint8)
-        eros.draw(self._lives, self._width_px, self._k_px, len(self._table) - 1, events.x_px, events.y_px)
-        eros.read(values, self._lives, self._table)
+        eros.update(self._levels, self._width_px, self._k_px, len(self._table) - 1, events.x_px, events.y_px)
+        eros.render(values, self._levels, self._table)
         return values
 
 
@@ -99,8 +99,8 @@ class LastEventSurface:
     def update(self, packet: Packet, events: EventBatch) -> NDArray[np.uint8]:
         """Remember the tick's events and return the (height, width) uint8 surface at its end."""
         values = np.zeros(self._last_us.shape, np.uint8)
-        surfaces.remember(self._last_us, events.t_us, events.x_px, events.y_px)
-        surfaces.read(values, self._last_us, packet.end_us, self._span_us, self._is_linear)
+        surfaces.update_last_times(self._last_us, events.t_us, events.x_px, events.y_px)
+        surfaces.render(values, self._last_us, packet.end_us, self._span_us, self._is_linear)
         return values
 
 

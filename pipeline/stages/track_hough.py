@@ -1,17 +1,14 @@
-"""Hough circles for the tracker: near a prediction, anywhere in the surface, and in a single image."""
+"""Hough circles for the tracker: near a prediction and anywhere in the surface."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..events import EventBatch
-from ..kernels import circle as kernels
-from ..kernels import contour
+from ..kernels import hough as kernels
 from ..results import Circle
 from .surface import SurfaceResult
 
@@ -95,51 +92,6 @@ def candidates(
         )
         if found is not None:
             yield found
-
-
-def find_circle(image: NDArray[Any], radius_min_px: float, radius_max_px: float) -> Circle | None:
-    """The circle that the set pixels of one image draw best, to sub-pixel; None when they draw none.
-
-    The score is the share of the outline's directions (out of 24) that have a pixel within 1.5 px; less than
-    half is no circle.
-
-    Parameters
-    ----------
-    image : (height, width) bool
-        Or uint8; pixels of at least half its maximum count. For single frames without times and polarities, such as
-        accumulated events; the centre may lie outside the image.
-    """
-    pixels = np.ascontiguousarray(image).view(np.uint8)
-    brightest = int(pixels.max(initial=0))
-    if brightest == 0:
-        return None
-    xs, ys = kernels.bright_pixels(pixels, (brightest + 1) // 2, 4000)
-    first_radius = max(1, math.floor(radius_min_px))
-    radii = math.ceil(radius_max_px) - first_radius + 1
-    height, width = pixels.shape
-    start = _circle(
-        kernels.best_circle(xs, ys, -radii, -radii, width + 2 * radii, height + 2 * radii, first_radius, radii)
-    )
-    if start is None:
-        return None
-    x, y, still = xs.astype(np.float64), ys.astype(np.float64), np.zeros(xs.size)
-    ring, _, _, weight = contour.fit_ring(
-        np.array([start.x_px, start.y_px, 0.0, 0.0, start.radius_px]),
-        np.array([1e6, 1e6, 0.0, 0.0, 1e6]),
-        np.zeros(2),
-        still,
-        x,
-        y,
-        0.25 * start.radius_px + 1.0,
-        1.5,
-        10,
-    )
-    if weight < 5 or not radius_min_px <= ring[4] <= radius_max_px:
-        ring = np.array([start.x_px, start.y_px, 0.0, 0.0, start.radius_px])
-    near = np.abs(contour.residuals(ring, np.zeros(2), still, x, y)) < 1.5
-    angle = np.arctan2(y[near] - ring[1], x[near] - ring[0]) % (2 * math.pi)
-    score = np.unique((angle * 12 / math.pi).astype(np.int64)).size / 24
-    return Circle(float(ring[0]), float(ring[1]), float(ring[4]), score) if score >= 0.5 else None
 
 
 def _circle(found: tuple[float, float, float, float]) -> Circle | None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.contour import inverse_of
+from ..kernels.moving_circle import inverse_matrix
 
 Floats = NDArray[np.float64]
 OBSERVED = np.array([0, 1, 4])
@@ -68,7 +68,7 @@ class BallFilter:
         prediction exceeds most_surprise.
         """
         off = observed - self.mean[OBSERVED]
-        if off @ inverse_of(self.covariance[OBSERVED_BLOCK] + noise) @ off > most_surprise:
+        if off @ inverse_matrix(self.covariance[OBSERVED_BLOCK] + noise) @ off > most_surprise:
             return False
         self.mean, self.covariance = load_filter().update(self.mean, self.covariance, observed, noise, OBSERVATION)
         return True

@@ -126,7 +126,7 @@ class Sighting:
 
 
 def oval_of(camera: Camera, x_px: float, y_px: float) -> Floats:
-    """(2,) float64 departure from a circle of a sphere's outline around this pixel (see the contour kernels).
+    """(2,) float64 departure from a circle of a sphere's outline around this pixel (see kernels.moving_circle).
 
     The semi-axes are as 1 to cos(theta), the longer one pointing away from the principal point (`Camera`).
     """
@@ -156,7 +156,7 @@ def measure(
     prior_std : (5,)
         How firmly the expectation holds.
     """
-    ring, covariance, scatter, found = kernels.measured(
+    ring, covariance, scatter, found = kernels.fit_outline(
         expected,
         prior_std,
         oval_of(camera, expected[0], expected[1]),
@@ -188,7 +188,7 @@ def sight(events: EventBatch, end_us: int, camera: Camera, circle: Circle, limit
     radius = circle.radius_px
     fastest = limits.speed_max_radii_s * radius
     recent = events.between(end_us - VOTE_US, end_us)
-    ring, gate = kernels.moving(
+    ring, gate = kernels.find_moving_circle(
         circle.x_px,
         circle.y_px,
         radius,

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ..camera import Camera
 from ..events import EventBatch
-from ..kernels import contour as kernels
-from ..kernels.rows import taken
+from ..kernels import moving_circle as kernels
+from ..kernels.take_events import take_events
 from ..results import Circle
 from .surface import SurfaceResult
 from .track_hough import candidates
@@ -70,8 +70,8 @@ class OtherBalls:
             rings.append(tracked)
         for ring in rings:
             margin = 0.3 * ring[4] + 2.0  # for trails, and for errors of the older ones
-            rows = kernels.clear_of(ring, events.t_us, events.x_px, events.y_px, end_us, margin)
-            events = EventBatch(*taken(rows, *events.columns))
+            rows = kernels.outside_circle(ring, events.t_us, events.x_px, events.y_px, end_us, margin)
+            events = EventBatch(*take_events(rows, *events.columns))
         _, found = look(surface, events, end_us, camera, limits, MOST_RIVALS)
         self.known += [(end_us, one) for one, _ in found]
         return found[0] if found and found[0][0].trusted else None

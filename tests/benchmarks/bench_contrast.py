@@ -12,14 +12,13 @@ import numpy as np
 import pytest
 
 from spinscope.pipeline.chain import Tick
-from spinscope.pipeline.kernels.contrast import score
-from spinscope.pipeline.kernels.contrast_window import whole
-from spinscope.pipeline.results import SpinEstimate
+from spinscope.pipeline.results import MethodResult, SpinEstimate
 from spinscope.pipeline.session import Choices, Session
 from spinscope.pipeline.spin.contrast import stage as contrast
+from spinscope.pipeline.spin.contrast.events import whole_window
+from spinscope.pipeline.spin.contrast.score import score
 from spinscope.pipeline.stage import Context
-from spinscope.pipeline.stages.spin import SpinResult
-from tests.naive_contrast import dotted_ball, naive_score
+from tests.reference.contrast import dotted_ball, naive_score
 
 # The thread's own time: what other programs do on a shared machine does not count.
 pytestmark = pytest.mark.benchmark(timer=time.thread_time)
@@ -35,7 +34,9 @@ def say(text: str) -> None:
 def recorded(name: str) -> tuple[list[Tick], Context]:
     """The chain's results up to the spin, where there is a ball."""
     session = Session.open(SAMPLES / f"{name}.h5", Choices(fixed_ball=BALLS.get(name)))
-    ticks = [tick for tick in session.ticks(forget=("surface",)) if tick.track.has_ball]
+    ticks = [
+        tick for tick in session.ticks(("logo", "normal_flow"), forget=("surface",)) if tick.track.ball is not None
+    ]
     return ticks, session.chain.context(session.parameters, contrast.STAGE)
 
 
@@ -52,11 +53,11 @@ def costs_ms(ticks: list[Tick], context: Context) -> tuple[list[float], list[flo
 
 def test_the_score(benchmark: Any) -> None:
     events = dotted_ball(SPIN_RAD_S / (2 * np.pi), events=300)
-    part, _ = whole(events.t_s, events.normals, events.layers, 1)
+    window = whole_window(events.columns, 1)
     ratios = np.empty(len(events))
-    benchmark.pedantic(lambda: score(ratios, SPIN_RAD_S, *part, 0.06, 1.5), rounds=200, warmup_rounds=2)
+    benchmark.pedantic(lambda: score(ratios, SPIN_RAD_S, window, 0.06, 1.5), rounds=200, warmup_rounds=2)
     started = time.thread_time()
-    expected, _ = naive_score(SPIN_RAD_S, *part[:4], 1, 0.06, 1.5)
+    expected, _ = naive_score(SPIN_RAD_S, *window.events, 1, 0.06, 1.5)
     twin_s = time.thread_time() - started
     assert float(ratios.sum()) == pytest.approx(expected, abs=0.1)
     fast_s = benchmark.stats.stats.median
@@ -75,9 +76,9 @@ def test_100_ms_of_spinner(benchmark: Any, name: str) -> None:
 
 
 def _report(benchmark: Any, name: str, most_ms: float) -> None:
-    ticks, setting = recorded(name)
+    ticks, context = recorded(name)
     runs: list[tuple[list[float], list[float]]] = []
-    benchmark.pedantic(lambda: runs.append(costs_ms(ticks, setting)), rounds=5, warmup_rounds=1)
+    benchmark.pedantic(lambda: runs.append(costs_ms(ticks, context)), rounds=5, warmup_rounds=1)
     full, followed = min(runs, key=lambda run: sum(run[0]) + sum(run[1]))
     total = sum(full) + sum(followed)
     usual = float(np.median(followed)) if followed else 0.0
@@ -90,13 +91,13 @@ def _report(benchmark: Any, name: str, most_ms: float) -> None:
 
 def test_a_window_of_10_ms(benchmark: Any) -> None:
     """From nothing: a new shot, two ticks, no normal flow to start from."""
-    ticks, setting = recorded("spinner_ball2_side")
-    nothing = SpinResult({"normal_flow": SpinEstimate.refused("normal_flow", "not asked")})
-    ticks = [replace(tick, spin=nothing) for tick in ticks]
+    ticks, context = recorded("spinner_ball2_side")
+    nothing = MethodResult(SpinEstimate.refused("normal_flow", "not asked"))
+    ticks = [replace(tick, results={**tick.results, "normal_flow": nothing}) for tick in ticks]
     runs: list[float] = []
 
     def one(at: int) -> None:
-        full, followed = costs_ms(ticks[at : at + 2], setting)
+        full, followed = costs_ms(ticks[at : at + 2], context)
         runs.append(sum(full) + sum(followed))
 
     benchmark.pedantic(lambda: [one(at) for at in range(0, len(ticks) - 1, 2)], rounds=3, warmup_rounds=1)

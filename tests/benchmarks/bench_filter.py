@@ -17,7 +17,7 @@ from spinscope.pipeline.results import Packet
 from spinscope.pipeline.stage import Context
 from spinscope.pipeline.stages import filter as stage
 from spinscope.pipeline.stages.filter import FilterParameters
-from tests.naive_filter import NaiveFilter
+from tests.reference.filter import NaiveFilter
 
 # The thread's own time: what other programs do on a shared machine does not count.
 pytestmark = pytest.mark.benchmark(timer=time.thread_time)

@@ -19,14 +19,14 @@ from spinscope.pipeline.spin import normal_flow, triplet
 from spinscope.pipeline.spin.parameters import SpinParameters
 from spinscope.pipeline.stages import flow, logo, rate
 from spinscope.pipeline.stages.filter import FilterResult
-from tests.naive_spin import (
+from tests.pipeline.stages.test_spin_samples import track_of, truth_of
+from tests.reference.spin import (
     naive_logo_rows,
     naive_low_pass,
     naive_neighbours,
     naive_plane,
     naive_triplets,
 )
-from tests.pipeline.stages.test_spin_samples import track_of, truth_of
 from tests.spinning_ball import CONTEXT, packets
 
 # The thread's own time: what other programs do on a shared machine does not count.

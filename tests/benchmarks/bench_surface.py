@@ -24,7 +24,7 @@ from spinscope.pipeline.stages import filter as filter_stage
 from spinscope.pipeline.stages import surface as stage
 from spinscope.pipeline.stages.filter import FilterParameters
 from spinscope.pipeline.stages.surface import SurfaceParameters
-from tests.naive_surface import eros_float32_loop
+from tests.reference.surface import eros_float32_loop
 
 WIDTH, HEIGHT = 1280, 720
 PACKET_EVENTS = 25_000  # 5 ms at 5 Mev/s
@@ -65,22 +65,22 @@ def events() -> EventBatch:
 
 @pytest.fixture(scope="module")
 def flight_surface(events: EventBatch) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Lives, table and values of EROS (k = 11) after the whole flight, filtered as by default."""
+    """Levels, table and values of EROS (k = 11) after the whole flight, filtered as by default."""
     filters = FilterParameters()
     state = filter_stage.start(filters, CONTEXT)
     filtered = filter_stage.step(filters, state, Packet(0, 0, 0, events)).surface_events
-    lives, table = eros.no_lives(WIDTH, HEIGHT), eros.values_of_lives(11)
-    eros.draw(lives, WIDTH, 11, len(table) - 1, filtered.x_px, filtered.y_px)
+    levels, table = eros.empty_levels(WIDTH, HEIGHT), eros.value_table(11)
+    eros.update(levels, WIDTH, 11, len(table) - 1, filtered.x_px, filtered.y_px)
     values = np.zeros((HEIGHT, WIDTH), np.uint8)
-    eros.read(values, lives, table)
-    return lives, table, values
+    eros.render(values, levels, table)
+    return levels, table, values
 
 
 @pytest.mark.parametrize("k_px", [11, 21, 49])
 def test_eros_events(benchmark: Any, events: EventBatch, k_px: int) -> None:
-    lives, full, half = eros.no_lives(WIDTH, HEIGHT), len(eros.values_of_lives(k_px)) - 1, k_px // 2
+    levels, full, half = eros.empty_levels(WIDTH, HEIGHT), len(eros.value_table(k_px)) - 1, k_px // 2
     benchmark.pedantic(
-        lambda: eros.draw(lives, WIDTH, k_px, full, events.x_px, events.y_px), rounds=30, warmup_rounds=2
+        lambda: eros.update(levels, WIDTH, k_px, full, events.x_px, events.y_px), rounds=30, warmup_rounds=2
     )
     fast_ns = benchmark.stats.stats.median / len(events) * 1e9
 
@@ -100,11 +100,11 @@ def test_eros_events(benchmark: Any, events: EventBatch, k_px: int) -> None:
 
 
 def test_reading_the_surface(benchmark: Any, flight_surface: tuple[np.ndarray, ...]) -> None:
-    lives, table, values = flight_surface
+    levels, table, values = flight_surface
 
     def run() -> np.ndarray:
         fresh = np.zeros((HEIGHT, WIDTH), np.uint8)
-        eros.read(fresh, lives, table)
+        eros.render(fresh, levels, table)
         return fresh
 
     benchmark.pedantic(run, rounds=200, warmup_rounds=5)
@@ -112,7 +112,7 @@ def test_reading_the_surface(benchmark: Any, flight_surface: tuple[np.ndarray, .
     whole = np.zeros(256, np.uint8)
     whole[: table.size] = table
     margin = eros.MARGIN_PX
-    rows = lives[:-64].reshape(HEIGHT + 2 * margin, WIDTH + margin)[margin:-margin, margin:]
+    rows = levels[:-64].reshape(HEIGHT + 2 * margin, WIDTH + margin)[margin:-margin, margin:]
     assert np.array_equal(cv2.LUT(rows, whole), run())
     lut_us = median_s(lambda: cv2.LUT(rows, whole), 100) * 1e6
     sys.stdout.write(

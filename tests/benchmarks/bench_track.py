@@ -12,12 +12,12 @@ import cv2
 import numpy as np
 import pytest
 
-from spinscope.pipeline.kernels import circle, contour, outline
+from spinscope.pipeline.kernels import hough, moving_circle, outline
 from spinscope.pipeline.stages import filter, surface, track
 from spinscope.pipeline.stages.filter import FilterParameters
 from spinscope.pipeline.stages.surface import SurfaceParameters
 from spinscope.pipeline.stages.track import TrackParameters
-from tests import naive_circle
+from tests.reference import hough as reference
 from tests.track_runs import PAPER_CONTEXT, inputs, run, sample, tracked
 
 # The thread's own time: what other programs do on a shared machine does not count.
@@ -47,20 +47,20 @@ def test_vote_near_a_prediction(benchmark: Any) -> None:
     x, y, _, _, radius = tracked(NAME)[TICK].mean
     left, top = round(x) - 30, round(y) - 30
     window = shown.cleaned(left, top, left + 60, top + 60)
-    xs, ys = circle.bright_pixels(window, 128, 250)
+    xs, ys = hough.bright_pixels(window, 128, 250)
     first = round(radius) - 2
 
     def fast() -> None:
         votes = np.zeros((13, 13, 5), np.uint16)
-        circle.vote(votes, xs, ys, 24, 24, first)
-        circle.peak(votes, first)
+        hough.vote(votes, xs, ys, 24, 24, first)
+        hough.peak(votes, first)
 
     def opencv() -> None:
         cv2.HoughCircles(window, cv2.HOUGH_GRADIENT, 1, 60, param1=200, param2=8, minRadius=first, maxRadius=first + 4)
 
     benchmark(fast)
     ours = median_s(fast, 200)
-    slow = median_s(lambda: naive_circle.vote((13, 13, 5), xs, ys, 24, 24, first), 5)
+    slow = median_s(lambda: reference.vote((13, 13, 5), xs, ys, 24, 24, first), 5)
     say(
         f"vote: {ours * 1e6:.0f} us, twin {slow / ours:.0f} x as long, "
         f"cv2.HoughCircles {median_s(opencv, 100) / ours:.1f} x as long"
@@ -74,16 +74,16 @@ def test_fit_of_an_outline(benchmark: Any) -> None:
     ring = tracked(NAME)[TICK].mean.copy()
     events = filtered.logo_events
     columns = events.t_us, events.x_px, events.y_px
-    chosen = contour.near_outline(ring, *columns, packet.end_us, 3.0, outline.MOST_EVENTS, True)
+    chosen = moving_circle.near_outline(ring, *columns, packet.end_us, 3.0, outline.MOST_EVENTS, True)
     columns = (
         (events.t_us[chosen] - packet.end_us) * 1e-6,
         events.x_px[chosen].astype(np.float64),
         events.y_px[chosen].astype(np.float64),
     )
     args = (ring + 0.5, np.full(5, 1e9), np.zeros(2), *columns, 3.0, 0.6, 9)
-    benchmark(contour.fit_ring, *args)
-    ours = median_s(lambda: contour.fit_ring(*args), 200)
-    slow = median_s(lambda: naive_circle.fit_ring(*args), 5)
+    benchmark(moving_circle.fit_circle, *args)
+    ours = median_s(lambda: moving_circle.fit_circle(*args), 200)
+    slow = median_s(lambda: reference.fit_circle(*args), 5)
     say(f"fit of {chosen.size} events: {ours * 1e6:.0f} us, twin {slow / ours:.0f} x as long")
     assert slow > 10 * ours
 

@@ -1,3 +1,10 @@
-"""Contrast maximisation on the sphere: the spin whose derotation makes the logo sharpest, with its uncertainty."""
+"""Contrast maximisation on the sphere: the spin whose derotated logo events are sharpest, with its uncertainty.
+
+Notes
+-----
+Not in the paper; it takes the place of the averaged flow of section 3.3. `stage` runs the method tick by tick;
+`events` holds what goes in and comes out, `score` the objective, `search` its maximisation (over a grid of all spins,
+then by Newton's method), `estimate` the order of these steps, the aliases of whole turns and the covariance.
+"""
 
 from .stage import STAGE as STAGE

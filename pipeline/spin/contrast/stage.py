@@ -2,7 +2,7 @@
 
 Not in the paper; it takes the place of the averaged flow of section 3.3. Every event is a point on the ball
 (`logo`: exact ray-sphere intersection with the track at the event's own time). The method is contrast maximisation
-(Gallego et al., CVPR 2018) on the sphere, scored as a likelihood ratio (kernels.contrast), searched in magnitude and
+(Gallego et al., CVPR 2018) on the sphere, scored as a likelihood ratio (`score`), searched in magnitude and
 direction, started from `normal_flow` where that has an answer, else from a search over all spins, and over a stretch
 of time that grows with the shot.
 """
@@ -17,14 +17,13 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kernels.contrast_estimate import estimate_spin, follow_spin
-from ...kernels.contrast_events import Answer, LogoEvents, Place, Settings
-from ...kernels.contrast_picture import Picture, picture
 from ...parameters import ParameterGroup, switch, tunable
 from ...results import MethodResult, Packet, SpinEstimate, frozen
 from ...stage import Context, SpinMethod
 from ...stages.logo import LogoResult
 from ...stages.track import BallTrack
+from .estimate import ScoreMap, estimate_spin, follow_spin, score_map
+from .events import BallUncertainty, ContrastEstimate, ContrastSettings, SphereEvents
 
 METHOD, FLOW_METHOD = "contrast", "normal_flow"
 
@@ -102,7 +101,7 @@ class ContrastResult:
     offsets_px : (3,) float64
         Centre x, y and radius of the ball, refined less tracked.
     contrast : float
-        Score an event less that of exchanged times; 0 = nothing turns with the spin.
+        Score an event less that of permuted times; 0 = nothing turns with the spin.
     full : bool
         Whether this tick made a full estimate, or followed the last one.
     magnitudes_rps, magnitude_scores : (m,) float64
@@ -143,14 +142,14 @@ class ContrastState:
 
     context: Context
     start_us: int | None = None
-    parts: list[tuple[int, LogoEvents]] = field(default_factory=list)
-    places: list[tuple[float, float, float, float]] = field(default_factory=list)
+    parts: list[tuple[int, SphereEvents]] = field(default_factory=list)
+    ball_stds: list[tuple[float, float, float, float]] = field(default_factory=list)
     full_us: float = STAGES_US[0]
     tried: int = 0
     searched: int = 0
-    answer: Answer | None = None
+    answer: ContrastEstimate | None = None
     reason: str | None = None
-    picture: Picture = field(default_factory=Picture.empty)
+    score_map: ScoreMap = field(default_factory=ScoreMap.empty)
 
 
 def start(parameters: ContrastParameters, context: Context) -> ContrastState:
@@ -181,19 +180,19 @@ def step(
         reason = f"the logo was not seen: {count} logo events, {parameters.fewest_events} are needed"
         return _nothing(SpinEstimate.refused(METHOD, reason, count))
     full = _due(state, packet.end_us - state.start_us, count)
-    settings = Settings(
+    settings = ContrastSettings(
         fastest_rps=state.context["spin.max_spin_rps"],
-        sigma=parameters.kernel_rad,
+        sigma_rad=parameters.kernel_rad,
         floor=parameters.floor_events,
-        fewest=parameters.fewest_events,
+        min_events=parameters.fewest_events,
     )
     if full:
         events = _joined(state)
         _estimate(parameters, state, events, settings, normal_flow.estimate.vector_rps)
         state.tried = count
-        state.picture = picture(events, state.answer, settings) if parameters.curves else Picture.empty()
+        state.score_map = score_map(events, state.answer, settings) if parameters.curves else ScoreMap.empty()
     elif state.answer is not None and state.reason is None:
-        state.answer = follow_spin(_joined(state), _place(state), settings, state.answer)
+        state.answer = follow_spin(_joined(state), _uncertainty(state), settings, state.answer)
         state.reason = _doubt(parameters, state.answer)
     return _result(parameters, state, count, full, normal_flow.estimate)
 
@@ -204,7 +203,7 @@ def _take(
     """Keep the tick's events that turn with the ball, and what is known of the ball's place."""
     turning = logo.turning
     rays = state.context.camera.rays(turning.centre_x_px, turning.centre_y_px)
-    part = LogoEvents(
+    part = SphereEvents(
         (turning.t_us * 1e-6).astype(np.float64),
         np.ascontiguousarray(turning.normals.T),
         turning.on.astype(np.int64),
@@ -213,26 +212,26 @@ def _take(
     )
     state.parts.append((packet.end_us, part))
     flown_px = math.hypot(ball.mean[2], ball.mean[3]) * LATENCY_SPREAD_S
-    state.places.append((logo.position_std_px, logo.radius_std_px, logo.velocity_std_px_s, flown_px))
+    state.ball_stds.append((logo.position_std_px, logo.radius_std_px, logo.velocity_std_px_s, flown_px))
     while state.parts[0][0] <= packet.end_us - parameters.window_us:
-        del state.parts[0], state.places[0]
+        del state.parts[0], state.ball_stds[0]
 
 
-def _joined(state: ContrastState) -> LogoEvents:
+def _joined(state: ContrastState) -> SphereEvents:
     parts = [part for _, part in state.parts]
-    return LogoEvents(
+    return SphereEvents(
         np.concatenate([part.t_s for part in parts]),
         np.concatenate([part.normals for part in parts], axis=1),
-        np.concatenate([part.layers for part in parts]),
+        np.concatenate([part.polarity for part in parts]),
         np.concatenate([part.facing for part in parts], axis=1),
         np.concatenate([part.radius_px for part in parts]),
     )
 
 
-def _place(state: ContrastState) -> Place:
+def _uncertainty(state: ContrastState) -> BallUncertainty:
     """Uncertainty of the ball's place over the stretch: the ticks' medians."""
-    position, radius, velocity, flown = (float(value) for value in np.median(np.array(state.places), axis=0))
-    return Place(
+    position, radius, velocity, flown = (float(value) for value in np.median(np.array(state.ball_stds), axis=0))
+    return BallUncertainty(
         centre_std_px=max(math.hypot(position, flown), 0.01),
         radius_std_px=max(radius, 0.01),
         track_std_px=position,
@@ -253,8 +252,8 @@ def _due(state: ContrastState, age_us: int, count: int) -> bool:
 def _estimate(
     parameters: ContrastParameters,
     state: ContrastState,
-    events: LogoEvents,
-    settings: Settings,
+    events: SphereEvents,
+    settings: ContrastSettings,
     normal_flow_rps: Floats | None,
 ) -> None:
     """A full estimate: first from what is known already, and from a search where that does not convince."""
@@ -267,12 +266,12 @@ def _estimate(
     if starts:
         scanning = not _settled(parameters, state)
         answer = estimate_spin(
-            events, _place(state), settings, starts_rps=np.array(starts), searching=False, scanning=scanning
+            events, _uncertainty(state), settings, starts_rps=np.array(starts), searching=False, scanning=scanning
         )
     worth_it = len(events) >= SEARCH_MORE * state.searched
     if answer is None or (worth_it and _doubt(parameters, answer) is not None):
         state.searched = len(events)
-        answer = estimate_spin(events, _place(state), settings, starts_rps=np.array(starts) if starts else None)
+        answer = estimate_spin(events, _uncertainty(state), settings, starts_rps=np.array(starts) if starts else None)
     state.answer, state.reason = answer, _doubt(parameters, answer)
 
 
@@ -285,7 +284,7 @@ def _settled(parameters: ContrastParameters, state: ContrastState) -> bool:
     return clear and answer.span_s * float(np.linalg.norm(answer.spin_rps)) >= SETTLED_TURNS
 
 
-def _doubt(parameters: ContrastParameters, answer: Answer) -> str | None:
+def _doubt(parameters: ContrastParameters, answer: ContrastEstimate) -> str | None:
     """Why an answer is not to be trusted, in words; None if it is."""
     if answer.spin_rps is None:
         return f"the logo was not seen: {answer.events} logo events, {parameters.fewest_events} are needed"
@@ -353,13 +352,13 @@ def _result(
         frozen(answer.offsets_px.copy()),
         answer.contrast,
         full,
-        *(frozen(column.copy()) for column in state.picture),
+        *(frozen(column.copy()) for column in state.score_map),
     )
 
 
 def _nothing(estimate: SpinEstimate) -> ContrastResult:
     """Nothing to see of a shot."""
-    curves = (frozen(column.copy()) for column in Picture.empty())
+    curves = (frozen(column.copy()) for column in ScoreMap.empty())
     none, no_spins = frozen(np.empty(0)), frozen(np.empty((0, 3)))
     unknown = frozen(np.full(3, np.nan))
     return ContrastResult(estimate, unknown, no_spins, none, 0, 0, math.nan, frozen(np.zeros(3)), 0.0, False, *curves)

@@ -10,7 +10,7 @@ from spinscope.app.viewer.recorded import write_rrd
 from spinscope.app.viewer.run import ViewedRun, shown_estimate
 from spinscope.app.viewer.still import TEXTURE_PX
 from tests.app.viewer.reading import Rows, read_back
-from tests.naive_still import turned
+from tests.reference.rotation import turned
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from spinscope.app.viewer.run import ViewedRun
 from spinscope.app.viewer.still import MAP_PX, map_directions, map_frame
 from tests.app.viewer.conftest import with_results
 from tests.app.viewer.reading import read_back
-from tests.naive_still import turned
+from tests.reference.rotation import turned
 
 numbers = st.floats(-1, 1, allow_nan=False)
 vectors = st.tuples(numbers, numbers, numbers).map(np.array).filter(lambda v: np.linalg.norm(v) > 0.1)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from spinscope.pipeline.kernels import eros
-from tests.naive_surface import NaiveEros
+from tests.reference.surface import NaiveEros
 
 SAMPLES = sorted((Path(__file__).parents[3] / "sample_recordings").glob("*.h5"))
 
@@ -22,14 +22,14 @@ class Fast:
 
     def __init__(self, width_px: int, height_px: int, k_px: int) -> None:
         self.width_px, self.height_px, self.k_px = width_px, height_px, eros.odd_px(k_px)
-        self.lives, self.table = eros.no_lives(width_px, height_px), eros.values_of_lives(k_px)
+        self.levels, self.table = eros.empty_levels(width_px, height_px), eros.value_table(k_px)
 
     def draw(self, x_px: NDArray[np.uint16], y_px: NDArray[np.uint16]) -> None:
-        eros.draw(self.lives, self.width_px, self.k_px, len(self.table) - 1, x_px, y_px)
+        eros.update(self.levels, self.width_px, self.k_px, len(self.table) - 1, x_px, y_px)
 
     def read(self) -> NDArray[np.uint8]:
         values = np.zeros((self.height_px, self.width_px), np.uint8)
-        eros.read(values, self.lives, self.table)
+        eros.render(values, self.levels, self.table)
         return values
 
 
@@ -67,13 +67,13 @@ def test_a_pixel_fades_as_the_reference_from_255_to_0(k_px: int) -> None:
     """One event, then neighbours' events until nothing is left of it, read after each."""
     x = np.array([1], np.uint16) if k_px > 1 else np.array([0], np.uint16)
     one = (np.array([0], np.uint16), np.array([0], np.uint16))
-    assert_equal_streams(2, 1, k_px, [one] + [(x, one[1])] * (len(eros.values_of_lives(k_px)) + 1))
+    assert_equal_streams(2, 1, k_px, [one] + [(x, one[1])] * (len(eros.value_table(k_px)) + 1))
 
 
 def test_the_lives_that_the_facts_name() -> None:
-    assert len(eros.values_of_lives(10)) - 1 == 57
-    assert len(eros.values_of_lives(21)) - 1 == 109
-    assert len(eros.values_of_lives(eros.K_MAX_PX)) - 1 <= 255
+    assert len(eros.value_table(10)) - 1 == 57
+    assert len(eros.value_table(21)) - 1 == 109
+    assert len(eros.value_table(eros.K_MAX_PX)) - 1 <= 255
 
 
 @pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.stem)
@@ -90,4 +90,4 @@ def test_the_margins_stay_empty() -> None:
     fast = Fast(13, 5, eros.K_MAX_PX)
     rng = np.random.default_rng(5)
     fast.draw(rng.integers(0, 13, 500).astype(np.uint16), rng.integers(0, 5, 500).astype(np.uint16))
-    assert np.count_nonzero(fast.lives) == np.count_nonzero(fast.read())
+    assert np.count_nonzero(fast.levels) == np.count_nonzero(fast.read())

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spinscope.pipeline.kernels import filter as kernels
-from spinscope.pipeline.kernels.rows import taken
-from tests.naive_filter import NaiveFilter
+from spinscope.pipeline.kernels.take_events import take_events
+from tests.reference.filter import NaiveFilter
 
 MODES = ("off", "stc", "trail", "stc_cut_trail")
 WIDTH, HEIGHT = 4, 3
@@ -25,7 +25,7 @@ def passed_rows(
 ) -> tuple[list[int], list[int]]:
     """Rows that the two filters pass; events are (t_us, x_px, y_px, on)."""
     t, x, y, on = (np.array([e[c] for e in events]) for c in range(4))
-    rows, logo_rows = kernels.passing(
+    rows, logo_rows = kernels.filter_events(
         last,
         WIDTH,
         t.astype(np.int64),
@@ -99,6 +99,6 @@ def test_rows_are_taken_from_every_column() -> None:
         rng.random(1000) < 0.5,
     )
     for rows in (np.flatnonzero(rng.random(1000) < 0.3), np.empty(0, np.int64)):
-        for column, kept in zip(columns, taken(rows, *columns), strict=True):
+        for column, kept in zip(columns, take_events(rows, *columns), strict=True):
             assert kept.dtype == column.dtype
             assert np.array_equal(kept, column[rows])

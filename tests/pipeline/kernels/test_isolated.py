@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from spinscope.pipeline.kernels import isolated
-from tests.naive_surface import cleaned
+from tests.reference.surface import cleaned
 
 RULES = ("isolated", "printed")
 

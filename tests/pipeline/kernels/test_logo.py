@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spinscope.pipeline.kernels.logo import logo_rows, outline_like
-from tests.naive_spin import naive_logo_rows
+from tests.reference.spin import naive_logo_rows
 
 
 @given(

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spinscope.pipeline.kernels.plane_flow import FEWEST, SPREAD_PX, fit_plane, near_in_time, plane_flow
-from tests.naive_spin import naive_plane
 from tests.pipeline.kernels.test_triplet import moving_edge
+from tests.reference.spin import naive_plane
 
 SCALES_US = np.array([1200.0, 600.0, 300.0, 300.0])
 

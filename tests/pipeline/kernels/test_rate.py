@@ -14,7 +14,7 @@ from spinscope.pipeline.kernels.rate import (
     moving_average,
     shortest_period,
 )
-from tests.naive_spin import naive_autocorrelation, naive_low_pass
+from tests.reference.spin import naive_autocorrelation, naive_low_pass
 
 
 @given(seed=st.integers(0, 10_000), cutoff=st.floats(0.01, 0.45), count=st.integers(8, 300))

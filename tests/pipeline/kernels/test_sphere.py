@@ -6,7 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spinscope.pipeline.kernels.sphere import image_velocity, meet_ball, spin_rows, surface_velocity
+from spinscope.pipeline.kernels.sphere import intersect_ball, spin_rows, surface_velocity
+from tests.reference.sphere import image_velocity
 from tests.spinning_ball import CAMERA, turns
 
 RADIUS_M = 0.02
@@ -28,7 +29,7 @@ def test_a_ray_meets_the_point_it_was_aimed_at(seed: int) -> None:
     centre, points, e = on_the_ball(seed)
     visible = np.sum(e * points, axis=1) < -1e-3  # the side towards the camera, not just towards its half space
     rays = points / points[:, 2:]
-    met, normals = meet_ball(rays, np.zeros(len(rays), np.int64), 0.0, 1.0, centre[None], RADIUS_M)
+    met, normals = intersect_ball(rays, np.zeros(len(rays), np.int64), 0.0, 1.0, centre[None], RADIUS_M)
     np.testing.assert_allclose(met[visible], points[visible], atol=1e-7)
     np.testing.assert_allclose(normals[visible], e[visible], atol=1e-5)
     assert np.all(normals @ centre < 0)
@@ -36,7 +37,7 @@ def test_a_ray_meets_the_point_it_was_aimed_at(seed: int) -> None:
 
 def test_a_ray_that_misses_gives_the_outline_nearest_to_it() -> None:
     ray = np.array([[0.5, 0.0, 1.0]])
-    point, normal = meet_ball(ray, np.zeros(1, np.int64), 0.0, 1.0, np.array([[0.0, 0.0, 2.0]]), RADIUS_M)
+    point, normal = intersect_ball(ray, np.zeros(1, np.int64), 0.0, 1.0, np.array([[0.0, 0.0, 2.0]]), RADIUS_M)
     assert abs(float(normal[0] @ ray[0])) < 1e-12
     np.testing.assert_allclose(np.linalg.norm(point[0] - [0, 0, 2]), RADIUS_M)
 
@@ -45,7 +46,7 @@ def test_the_centre_moves_evenly_between_its_knots() -> None:
     knots = np.array([[0.0, 0.0, 2.0], [0.02, 0.0, 2.0], [0.02, 0.02, 1.9]])
     t_us = np.array([0, 250, 500, 750, 1000], np.int64)
     expected = np.array([[0, 0, 2], [0.01, 0, 2], [0.02, 0, 2], [0.02, 0.01, 1.95], [0.02, 0.02, 1.9]])
-    points, normals = meet_ball(expected / expected[:, 2:], t_us, 0.0, 1000.0, knots, RADIUS_M)
+    points, normals = intersect_ball(expected / expected[:, 2:], t_us, 0.0, 1000.0, knots, RADIUS_M)
     np.testing.assert_allclose(points - RADIUS_M * normals, expected, atol=1e-12)
 
 

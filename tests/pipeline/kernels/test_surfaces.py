@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spinscope.pipeline.kernels import surfaces
-from tests.naive_surface import recent_events
+from tests.reference.surface import recent_events
 
 event = st.tuples(st.integers(0, 40), st.integers(0, 5), st.integers(0, 3))
 
@@ -28,9 +28,9 @@ def test_every_tick_equals_the_twin(
     last_us = np.full((4, 6), surfaces.NEVER_US)
     for end_us in range(start_us + tick_us, start_us + 5 * tick_us + 1, tick_us):
         now = (t >= end_us - tick_us) & (t < end_us)
-        surfaces.remember(last_us, t[now], x[now], y[now])
+        surfaces.update_last_times(last_us, t[now], x[now], y[now])
         values = np.zeros((4, 6), np.uint8)
-        surfaces.read(values, last_us, end_us, span_us, linear)
+        surfaces.render(values, last_us, end_us, span_us, linear)
         expected = recent_events(t.tolist(), x.tolist(), y.tolist(), (4, 6), end_us, span_us, linear)
         assert np.array_equal(values, expected)
 
@@ -38,5 +38,5 @@ def test_every_tick_equals_the_twin(
 @pytest.mark.parametrize(("age_us", "value"), [(1, 255), (500, 191), (1000, 128), (1999, 0), (2000, 0)])
 def test_linear_falls_from_255_to_0_over_the_span(age_us: int, value: int) -> None:
     values = np.zeros((1, 1), np.uint8)
-    surfaces.read(values, np.array([[10_000 - age_us]]), 10_000, 2000, True)
+    surfaces.render(values, np.array([[10_000 - age_us]]), 10_000, 2000, True)
     assert values[0, 0] == value

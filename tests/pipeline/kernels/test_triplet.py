@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spinscope.pipeline.kernels.triplet import earlier_neighbours, triplet_flow
-from tests.naive_spin import naive_neighbours, naive_triplets
+from tests.reference.spin import naive_neighbours, naive_triplets
 
 LIMITS = (0.7, 3.0, 1000.0, 20_000.0)
 

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 from spinscope.pipeline.camera import Camera, CameraParameters
 from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.kernels.rotation import rotations
 from spinscope.pipeline.simulator import Air, Ball, Flight, Scene, flight, human_shot, rally, spinner, thrown
-from spinscope.pipeline.simulator.motion import bounced, matrix_of, path, quaternion_of, rotations
+from spinscope.pipeline.simulator.motion import bounced, matrix_of, path, quaternion_of
 from spinscope.pipeline.simulator.shots import SPINNER_BALLS, mounted
 from spinscope.pipeline.simulator.thrower import THROWER_BACKTOP_RPS, THROWER_SIDE_RPS, thrower_spin
 

@@ -19,6 +19,7 @@ import pytest
 from spinscope.pipeline.biases import FACTORY
 from spinscope.pipeline.camera import Camera, CameraParameters
 from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.kernels.rotation import rotations
 from spinscope.pipeline.simulator import (
     Background,
     Ball,
@@ -34,7 +35,6 @@ from spinscope.pipeline.simulator import (
     spinner,
 )
 from spinscope.pipeline.simulator.logos import Logo, texture
-from spinscope.pipeline.simulator.motion import rotations
 from spinscope.pipeline.simulator.sensor import hot_rates_hz, thresholds
 
 SMALL = Camera.of(CameraParameters(), 160, 120)

@@ -13,7 +13,7 @@ from spinscope.pipeline.results import Packet
 from spinscope.pipeline.stage import Context
 from spinscope.pipeline.stages import filter as stage
 from spinscope.pipeline.stages.filter import MODES, FilterParameters
-from tests.naive_filter import NaiveFilter
+from tests.reference.filter import NaiveFilter
 
 WIDTH, HEIGHT, TICK_US = 9, 7, 1000
 CONTEXT = Context(Camera.of(CameraParameters(), WIDTH, HEIGHT), 0.02, {"spin.max_spin_rps": 150.0})

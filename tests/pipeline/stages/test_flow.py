@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from spinscope.pipeline.kernels.sphere import image_velocity
 from spinscope.pipeline.kernels.triplet import earlier_neighbours, triplet_flow
 from spinscope.pipeline.stages.flow import FlowParameters, FlowResult
+from tests.reference.sphere import image_velocity
 from tests.spinning_ball import CAMERA, after_track, known_track, no_track, packets, spinning_ball
 
 SPIN_RPS = np.array([40.0, 5.0, -20.0])

@@ -16,13 +16,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spinscope.pipeline.events import EventBatch
-from spinscope.pipeline.kernels.sphere import image_velocity
 from spinscope.pipeline.registry import trusted_method
 from spinscope.pipeline.results import SpinEstimate
 from spinscope.pipeline.spin.parameters import SpinParameters
 from spinscope.pipeline.spin.triplet import TripletSpin
 from spinscope.pipeline.stages.flow import FlowResult
 from spinscope.pipeline.stages.rate import RateResult
+from tests.reference.sphere import image_velocity
 from tests.spinning_ball import (
     CAMERA,
     CONTEXT,

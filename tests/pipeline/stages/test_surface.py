@@ -22,7 +22,7 @@ from spinscope.pipeline.stages import filter as filter_stage
 from spinscope.pipeline.stages import surface as stage
 from spinscope.pipeline.stages.filter import FilterParameters, FilterResult
 from spinscope.pipeline.stages.surface import SurfaceParameters, SurfaceResult
-from tests.naive_surface import NaiveEros, cleaned, recent_events
+from tests.reference.surface import NaiveEros, cleaned, recent_events
 
 WIDTH, HEIGHT, TICK_US = 45, 31, 1000  # neither is a multiple of a word
 CONTEXT = Context(Camera.of(CameraParameters(), WIDTH, HEIGHT), 0.02, {"spin.max_spin_rps": 150.0})

@@ -1,4 +1,4 @@
-"""The contour kernels equal their slow twins, and the fit finds moving circles under noise."""
+"""The kernels of moving circles equal their slow twins, and the fit finds moving circles under noise."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from spinscope.pipeline.kernels import contour, outline
-from tests import naive_circle
+from spinscope.pipeline.kernels import moving_circle, outline
+from tests.reference import hough as reference
 
 ROUND = np.zeros(2)
 FREE = np.full(5, 1e9)
@@ -58,13 +58,13 @@ def test_measures_equal_the_twins(seed: int, oval: tuple[float, float]) -> None:
     ring, tau, x, y, on = scene(seed)
     bent = np.array(oval)
     assert np.allclose(
-        contour.residuals(ring, bent, tau, x, y), naive_circle.residuals(ring, bent, tau, x, y), atol=1e-9
+        moving_circle.residuals(ring, bent, tau, x, y), reference.residuals(ring, bent, tau, x, y), atol=1e-9
     )
     args = (ring, bent, tau, x, y, on, 60, 40, 1.2, 3.0, 32)
-    assert np.allclose(contour.support(*args), naive_circle.support(*args))
+    assert np.allclose(moving_circle.support(*args), reference.support(*args))
     votes = np.zeros((9, 9))
     outline.vote_velocity(votes, ring, tau, x, y, on, 700.0, 2.5)
-    assert np.allclose(votes, naive_circle.vote_velocity(4, ring, tau, x, y, on, 700.0, 2.5))
+    assert np.allclose(votes, reference.vote_velocity(4, ring, tau, x, y, on, 700.0, 2.5))
 
 
 @given(
@@ -79,10 +79,10 @@ def test_choices_of_events_equal_the_twins(seed: int, gate: float, most: int, ah
     t_us = np.rint(tau * 1e6).astype(np.int64) + 7_000_000
     columns = [np.clip(np.rint(column), 0, 1000).astype(np.uint16) for column in (x, y)]
     exact = [(t_us - 7_000_000) * 1e-6, *(column.astype(np.float64) for column in columns)]
-    near = contour.near_outline(ring, t_us, *columns, 7_000_000, gate, most, ahead_only)
-    assert np.array_equal(near, naive_circle.near_outline(ring, *exact, gate, most, ahead_only))
-    clear = contour.clear_of(ring, t_us, *columns, 7_000_000, margin)
-    assert np.array_equal(clear, naive_circle.clear_of(ring, *exact, margin))
+    near = moving_circle.near_outline(ring, t_us, *columns, 7_000_000, gate, most, ahead_only)
+    assert np.array_equal(near, reference.near_outline(ring, *exact, gate, most, ahead_only))
+    clear = moving_circle.outside_circle(ring, t_us, *columns, 7_000_000, margin)
+    assert np.array_equal(clear, reference.outside_circle(ring, *exact, margin))
 
 
 @given(
@@ -95,15 +95,15 @@ def test_fit_equals_the_twin(seed: int, rounds: int, held: list[float]) -> None:
     start = ring + np.array([0.5, -0.4, 150.0, -100.0, 0.3])
     prior = np.array(held) * np.array([1, 1, 1000, 1000, 1])
     args = (start, prior, ROUND, tau, x, y, 2.5, 0.6, rounds)
-    fitted, _, _, _ = contour.fit_ring(*args)
-    assert np.allclose(fitted, naive_circle.fit_ring(*args), atol=np.array([1e-4, 1e-4, 0.1, 0.1, 1e-4]), rtol=0)
+    fitted, _, _, _ = moving_circle.fit_circle(*args)
+    assert np.allclose(fitted, reference.fit_circle(*args), atol=np.array([1e-4, 1e-4, 0.1, 0.1, 1e-4]), rtol=0)
 
 
 @given(n=st.integers(1, 6), seed=st.integers(0, 2**32 - 1))
 def test_inverse_equals_numpys(n: int, seed: int) -> None:
     root = np.random.default_rng(seed).normal(size=(n, n + 2))
     matrix = root @ root.T + 0.01 * np.eye(n)
-    assert np.allclose(contour.inverse_of(matrix) @ matrix, np.eye(n), atol=1e-8)
+    assert np.allclose(moving_circle.inverse_matrix(matrix) @ matrix, np.eye(n), atol=1e-8)
 
 
 @given(seed=st.integers(0, 2**32 - 1), ahead_only=st.booleans())
@@ -114,7 +114,7 @@ def test_fit_finds_the_ring_and_knows_how_well(seed: int, ahead_only: bool) -> N
     tau, x, y, _ = on_ring(ring, 300, rng, ahead_only=ahead_only)
     x[::10] += rng.uniform(-10, 10, x[::10].size)  # a tenth are the logo's, or noise
     start = ring + np.array([1.0, -1.0, 300.0, -300.0, 0.8])
-    fitted, covariance, scatter, weight = contour.fit_ring(start, FREE, ROUND, tau, x, y, 3.0, 0.6, 12)
+    fitted, covariance, scatter, weight = moving_circle.fit_circle(start, FREE, ROUND, tau, x, y, 3.0, 0.6, 12)
     off = fitted - ring
     assert off @ np.linalg.solve(covariance, off) < 45  # five degrees of freedom: 1e-8 by chance
     assert np.hypot(*off[:2]) < 0.3
@@ -126,7 +126,7 @@ def test_a_circle_at_rest_is_fitted_with_its_velocity_held() -> None:
     rng = np.random.default_rng(1)
     tau, x, y, _ = on_ring(np.array([20.0, 30.0, 1e-9, 0.0, 10.0]), 200, rng)
     start = np.array([20.5, 29.5, 0.0, 0.0, 9.5])
-    fitted, *_ = contour.fit_ring(start, np.array([1e9, 1e9, 0, 0, 1e9]), ROUND, tau, x, y, 2.0, 0.6, 9)
+    fitted, *_ = moving_circle.fit_circle(start, np.array([1e9, 1e9, 0, 0, 1e9]), ROUND, tau, x, y, 2.0, 0.6, 9)
     assert np.allclose(fitted, [20, 30, 0, 0, 10], atol=0.05)
 
 
@@ -154,7 +154,7 @@ def test_an_oval_outline_is_known() -> None:
     angle = np.linspace(0, 2 * math.pi, 240, endpoint=False)
     x, y = 50 + 20.8 * np.cos(angle), 40 + 19.2 * np.sin(angle)
     args: tuple[Any, ...] = (np.array([50.3, 39.8, 0, 0, 19.5]), np.array([1e9, 1e9, 0, 0, 1e9]))
-    fitted, _, scatter, _ = contour.fit_ring(*args, np.array([0.04, 0.0]), np.zeros(240), x, y, 3.0, 0.6, 12)
+    fitted, _, scatter, _ = moving_circle.fit_circle(*args, np.array([0.04, 0.0]), np.zeros(240), x, y, 3.0, 0.6, 12)
     assert np.allclose(fitted, [50, 40, 0, 0, 20], atol=0.05)
     assert scatter < 0.02
 
@@ -172,12 +172,12 @@ def test_a_moving_ring_is_measured_from_a_place_alone(bright: bool) -> None:
     columns = np.round(tau * 1e6).astype(np.int64), np.round(x).astype(np.uint16), np.round(y).astype(np.uint16)
     recent = tau > -1.5e-3
     events = (*(column[recent] for column in columns), (on if bright else ~on)[recent])
-    start, gate = outline.moving(60.8, 49.0, 15.5, *events, 0, 1.5e-3, 12_000.0)
+    start, gate = outline.find_moving_circle(60.8, 49.0, 15.5, *events, 0, 1.5e-3, 12_000.0)
     assert np.hypot(*(start - ring)[2:4]) < 1500
-    fitted, covariance, scatter, found = outline.measured(start, FREE, ROUND, *events, 0, 1.5 * gate, 1280, 720)
+    fitted, covariance, scatter, found = outline.fit_outline(start, FREE, ROUND, *events, 0, 1.5 * gate, 1280, 720)
     assert np.allclose(fitted[:2], ring[:2], atol=0.3) and abs(fitted[4] - 16) < 0.2
     assert np.hypot(*(fitted - ring)[2:4]) < 300 and scatter < 0.6 and np.all(np.diag(covariance) > 0)
     assert min(found[3], found[4]) > 0.8 and np.allclose(found[1:3], [bright, not bright], atol=0.03)
     nothing = tuple(column[:5] for column in events)
-    assert np.isnan(outline.moving(60.8, 49.0, 15.5, *nothing, 0, 1.5e-3, 12_000.0)[0][0])
-    assert np.isnan(outline.measured(start, FREE, ROUND, *nothing, 0, 3.0, 1280, 720)[0][0])
+    assert np.isnan(outline.find_moving_circle(60.8, 49.0, 15.5, *nothing, 0, 1.5e-3, 12_000.0)[0][0])
+    assert np.isnan(outline.fit_outline(start, FREE, ROUND, *nothing, 0, 3.0, 1280, 720)[0][0])

@@ -13,16 +13,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from spinscope.pipeline.kernels.still import (
+from spinscope.pipeline.kernels.derotated_logo import (
     Canvas,
     centroid,
     colour_counts,
+    count_derotated,
     full_count,
     paint,
-    read_density,
-    turn_back_and_count,
+    sample_density,
 )
-from tests.naive_still import CELLS, Sampler, density, tone, turned
+from tests.reference.derotated_logo import CELLS, Sampler, density, tone
+from tests.reference.rotation import turned
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -51,7 +52,7 @@ def test_turning_is_by_the_right_hand_rule() -> None:
 
 def counted(normals: np.ndarray, on: np.ndarray, seconds: np.ndarray, spin_rps: np.ndarray) -> np.ndarray:
     made = np.full((CELLS, CELLS, CELLS, 3), np.nan, np.float32)  # whatever was in it before is gone
-    turn_back_and_count(made, normals, on, seconds, spin_rps)
+    count_derotated(made, normals, on, seconds, spin_rps)
     return made
 
 
@@ -80,7 +81,7 @@ def test_reading_is_linear_between_the_cells_in_any_frame(seed: int) -> None:
     frame, _ = np.linalg.qr(random.normal(size=(3, 3)))
     directions = unit_vectors(random, 500)
     found = np.empty((2, 500), np.float32)
-    read_density(found, made, directions, frame)
+    sample_density(found, made, directions, frame)
     sampler = Sampler(directions @ frame)
     for polarity, chosen in ((0, ~on), (1, on)):
         np.testing.assert_allclose(found[polarity], sampler(density(normals[chosen])), rtol=1e-5, atol=1e-7)
@@ -129,7 +130,7 @@ def test_density_peaks_where_the_events_are_and_nowhere_else(direction: np.ndarr
     made = counted(np.tile(np.array(direction, float), (100, 1)), np.ones(100, np.bool_), np.zeros(100), np.zeros(3))
     directions = unit_vectors(np.random.default_rng(0), 20_000)
     found = np.empty((2, 20_000), np.float32)
-    read_density(found, made, directions, np.eye(3))
+    sample_density(found, made, directions, np.eye(3))
     assert not found[0].any()
     assert directions[np.argmax(found[1])] @ direction > np.cos(np.radians(3))
     assert np.all((directions @ direction)[found[1] > 0] > np.cos(np.radians(10)))
@@ -150,7 +151,7 @@ def painting(seed: int, spins_rps: np.ndarray, seen: np.ndarray, colours: int) -
     for (first, last), spin_rps, frame in zip(seen, spins_rps, frames, strict=True):
         counted_cells = counted(normals[first:last], on[first:last], seconds[first:last], spin_rps)
         counts, picture = np.empty((2, 50), np.float32), np.full((70, 3), 7, np.uint8)
-        read_density(counts, counted_cells, directions, frame)
+        sample_density(counts, counted_cells, directions, frame)
         counts = counts.sum(axis=0, keepdims=True) if colours == 1 else counts
         colour_counts(picture, places, counts, canvas.colours, canvas.ground)
         expected.append(picture)
@@ -183,7 +184,7 @@ def digest() -> list[float]:
     random = np.random.default_rng(5)
     made = counted(unit_vectors(random, 60), random.random(60) < 0.5, np.linspace(-0.1, 0, 60), np.array([9.0, -4, 3]))
     counts, picture = np.empty((2, 200), np.float32), np.zeros((200, 3), np.uint8)
-    read_density(counts, made, unit_vectors(random, 200), np.eye(3))
+    sample_density(counts, made, unit_vectors(random, 200), np.eye(3))
     colour_counts(picture, np.arange(200), counts, np.full((2, 3), 250, np.float32), np.full(3, 20, np.float32))
     painted, _ = painting(5, np.array([[9.0, -4, 3], [0, 0, 0]]), np.array([[0, 20], [0, 60]]), 2)
     sums = [*map(float, made.sum(axis=(0, 1, 2))), *map(float, counts.sum(axis=1)), float(picture.sum())]
@@ -193,7 +194,7 @@ def digest() -> list[float]:
 def test_without_the_jit_everything_is_the_same_and_nothing_overflows() -> None:
     code = (
         "import json, sys, warnings\n"
-        "from tests.pipeline.kernels.test_still import digest\n"
+        "from tests.pipeline.kernels.test_derotated_logo import digest\n"
         "warnings.simplefilter('error')\n"
         "sys.stdout.write(json.dumps(digest()))"
     )

@@ -8,25 +8,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from spinscope.pipeline.kernels.contrast_events import LogoEvents
+from spinscope.pipeline.spin.contrast.events import SphereEvents
+from tests.reference.rotation import turned
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
-def turned(points: Floats, spin_rad_s: Floats, t_s: Floats) -> Floats:
-    """(n, 3) points, each turned by the spin for its time (Rodrigues)."""
-    out = []
-    for point, t in zip(points, t_s, strict=True):
-        angle = float(np.linalg.norm(spin_rad_s)) * t
-        axis = spin_rad_s / max(float(np.linalg.norm(spin_rad_s)), 1e-300)
-        across = np.cross(axis, point)
-        out.append(point * math.cos(angle) + across * math.sin(angle) + axis * (axis @ point) * (1 - math.cos(angle)))
-    return np.array(out).reshape(-1, 3)
-
-
-def naive_exchanged(t_s: Floats, starts: Integers, times_each: int) -> list[list[tuple[float, int]]]:
-    """For each segment the (time, row) of its exchanged events."""
+def naive_time_permuted(t_s: Floats, starts: Integers, times_each: int) -> list[list[tuple[float, int]]]:
+    """For each segment the (time, row) of its time-permuted events."""
     golden, segments = (math.sqrt(5) - 1) / 2, []
     for first, last in itertools.pairwise(starts):
         own = []
@@ -73,28 +63,29 @@ def naive_score(
     spin_rad_s: Floats,
     t_s: Floats,
     normals: Floats,
-    layers: Integers,
+    polarity: Integers,
     starts: Integers,
     times_each: int,
     cell: float,
     floor: float,
 ) -> tuple[float, Floats]:
     """The score and each event's share, straight from its definition; normals (3, n)."""
-    points = turned(normals.T, -spin_rad_s, t_s)
+    spin_rps = spin_rad_s / (2 * np.pi)
+    points = turned(normals.T, -spin_rps, t_s)
     some = points[:: max(1, len(points) // 64)].sum(axis=0) + np.array([0.0, 0.0, 1e-9])
     pole = some / np.linalg.norm(some)
     places, shares, added = _on_map(points, pole, cell), np.empty(t_s.size), floor * 0.55**2
-    exchanged = naive_exchanged(t_s, starts, times_each)
+    permuted = naive_time_permuted(t_s, starts, times_each)
     for segment, (first, last) in enumerate(itertools.pairwise(starts)):
-        others = exchanged[segment]
-        blurred = turned(normals.T[[row for _, row in others]], -spin_rad_s, np.array([time for time, _ in others]))
+        others = permuted[segment]
+        blurred = turned(normals.T[[row for _, row in others]], -spin_rps, np.array([time for time, _ in others]))
         weight = (last - first - 1) / max(len(others), 1)
         for i in range(first, last):
-            sharp = [(places[k], 1.0) for k in range(first, last) if k != i and layers[k] == layers[i]]
+            sharp = [(places[k], 1.0) for k in range(first, last) if k != i and polarity[k] == polarity[i]]
             blur = [
                 (place, weight)
                 for place, (_, row) in zip(_on_map(blurred, pole, cell), others, strict=True)
-                if layers[row] == layers[i]
+                if polarity[row] == polarity[i]
             ]
             shares[i] = math.log((_density(places[i], sharp) + added) / (_density(places[i], blur) + added))
     return float(shares.sum()), shares
@@ -102,7 +93,7 @@ def naive_score(
 
 def dotted_ball(
     spin_rps: Floats, *, duration_s: float = 0.03, events: int = 600, toward: Floats | None = None, seed: int = 0
-) -> LogoEvents:
+) -> SphereEvents:
     """Events of a logo of 40 dots on a turning ball, seen along `toward` (from the camera to the ball, +z if None).
 
     Each event is a dot at a random time, where it shows and is not near the rim; half of the dots are ON.
@@ -113,10 +104,10 @@ def dotted_ball(
     dots /= np.linalg.norm(dots, axis=1)[:, None]
     pick = random.integers(0, 40, 20 * events)
     t_s = random.uniform(-0.5, 0.5, pick.size) * duration_s
-    normals = turned(dots[pick], 2 * np.pi * np.asarray(spin_rps, np.float64), t_s)
+    normals = turned(dots[pick], np.asarray(spin_rps, np.float64), t_s)
     rows = np.flatnonzero(normals @ toward < -0.5)[:events]
     rows = rows[np.argsort(t_s[rows])]
     facing = np.repeat(toward[:, None], rows.size, axis=1)
-    return LogoEvents(
+    return SphereEvents(
         t_s[rows], np.ascontiguousarray(normals[rows].T), pick[rows] % 2, facing, np.full(rows.size, 17.0)
     )

@@ -13,23 +13,32 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from spinscope.pipeline.kernels import contrast_scan
-from spinscope.pipeline.kernels.contrast import score
-from spinscope.pipeline.kernels.contrast_estimate import estimate_spin, follow_spin
-from spinscope.pipeline.kernels.contrast_events import Answer, LogoEvents, Place, Settings
-from spinscope.pipeline.kernels.contrast_place import moved_normals, place_slopes
-from spinscope.pipeline.kernels.contrast_refine import solved
-from spinscope.pipeline.kernels.contrast_search import distinct
-from spinscope.pipeline.kernels.contrast_window import segment_starts, segmented, whole
-from tests.naive_contrast import dotted_ball, naive_score, turned
+from spinscope.pipeline.spin.contrast import estimate
+from spinscope.pipeline.spin.contrast.estimate import estimate_spin, follow_spin
+from spinscope.pipeline.spin.contrast.events import (
+    BallUncertainty,
+    ContrastEstimate,
+    ContrastSettings,
+    EventColumns,
+    SphereEvents,
+    offset_slopes,
+    segment_starts,
+    segmented_window,
+    shifted_normals,
+    whole_window,
+)
+from spinscope.pipeline.spin.contrast.score import score
+from spinscope.pipeline.spin.contrast.search import cholesky_solve, distinct
+from tests.reference.contrast import dotted_ball, naive_score
+from tests.reference.rotation import turned
 
-PLACE = Place(centre_std_px=0.2, radius_std_px=0.2)
+BALL = BallUncertainty(centre_std_px=0.2, radius_std_px=0.2)
 SPIN = np.array([40.0, -25.0, 20.0])
 MIRROR = np.array([1.0, -1.0, -1.0])  # of an axial vector, for x -> -x
 
 
-def answer_of(events: LogoEvents, place: Place = PLACE) -> Answer:
-    return estimate_spin(events, place, Settings())
+def answer_of(events: SphereEvents, ball: BallUncertainty = BALL) -> ContrastEstimate:
+    return estimate_spin(events, ball, ContrastSettings())
 
 
 def assert_same(spin: np.ndarray | None, expected: np.ndarray, part: float = 0.02) -> None:
@@ -52,17 +61,18 @@ def test_the_score_is_its_twins(seed, count, speed, spread, segment_s, times_eac
     random = np.random.default_rng(seed)
     normals = np.array([[0.0], [0.2], [-1.0]]) + spread * random.standard_normal((3, count))
     normals /= np.linalg.norm(normals, axis=0)
-    t_s, layers = np.sort(random.uniform(-0.01, 0.01, count)), random.integers(0, 2, count)
+    t_s, polarity = np.sort(random.uniform(-0.01, 0.01, count)), random.integers(0, 2, count)
+    events = EventColumns(t_s, normals, polarity, np.array([0, count]))
     direction = random.standard_normal(3)
     spin = speed * direction / np.linalg.norm(direction)
     if segment_s == 1.0:
-        part, _ = whole(t_s, normals, layers, times_each)
+        window = whole_window(events, times_each)
     else:
-        part, _ = segmented(t_s, normals, layers, segment_s, 10_000, 10_000)
+        window = segmented_window(events, segment_s, 10_000, 10_000)
         times_each = 1
     ratios = np.empty(count)
-    total = score(ratios, spin, *part, cell, floor)
-    expected, shares = naive_score(spin, t_s, normals, layers, part.starts, times_each, cell, floor)
+    total = score(ratios, spin, window, cell, floor)
+    expected, shares = naive_score(spin, *window.events, times_each, cell, floor)
     np.testing.assert_allclose(ratios, shares, atol=2e-4)
     assert total == pytest.approx(expected, abs=2e-4 * count)
 
@@ -84,7 +94,7 @@ def test_cholesky_solves(count, seed) -> None:
     random = np.random.default_rng(seed)
     root, right = random.standard_normal((count, count)), random.standard_normal(count)
     matrix = root @ root.T + np.eye(count)
-    np.testing.assert_allclose(solved(matrix, right), np.linalg.solve(matrix, right), atol=1e-9)
+    np.testing.assert_allclose(cholesky_solve(matrix, right), np.linalg.solve(matrix, right), atol=1e-9)
 
 
 def test_distinct_spins_are_apart() -> None:
@@ -107,7 +117,7 @@ def test_offsets_move_the_normals_as_a_shifted_disc_does(offsets) -> None:
 
     facing = np.repeat([[0.0], [0.0], [1.0]], 30, axis=1)
     before = normals_of(disc, radius)
-    moved = moved_normals(before, place_slopes(before, facing, np.full(30, radius)), np.array(offsets))
+    moved = shifted_normals(before, offset_slopes(before, facing, np.full(30, radius)), np.array(offsets))
     after = normals_of(disc - np.array([[x], [y]]), radius + wider)
     assert np.abs(moved - after).max() < 0.1 * np.abs(before - after).max() + 1e-4
     np.testing.assert_allclose(np.linalg.norm(moved, axis=0), 1.0, atol=1e-12)
@@ -122,34 +132,34 @@ def test_the_spin_is_found_from_nothing(spin) -> None:
 
 def test_a_start_with_the_wrong_number_of_turns_is_put_right() -> None:
     events = dotted_ball(SPIN, duration_s=0.06)
-    answer = estimate_spin(events, PLACE, Settings(), starts_rps=0.6 * SPIN[None], searching=False)
+    answer = estimate_spin(events, BALL, ContrastSettings(), starts_rps=0.6 * SPIN[None], searching=False)
     assert_same(answer.spin_rps, SPIN)
 
 
 def test_a_scan_where_nothing_turns_still_names_its_best(monkeypatch) -> None:
-    """Exchanged times can beat every spin: all scores are negative then."""
-    usual = contrast_scan.climb_all
+    """Permuted times can beat every spin: all scores are negative then."""
+    usual = estimate.maximise_each
 
     def lowered(hill, spins, iterations):
         tops, values, shares = usual(hill, spins, iterations)
         return tops, values - values.max() - 1.0, shares
 
-    monkeypatch.setattr(contrast_scan, "climb_all", lowered)
-    spins = contrast_scan.scanned(dotted_ball(SPIN), 2 * np.pi * SPIN[None], Settings())
+    monkeypatch.setattr(estimate, "maximise_each", lowered)
+    spins = estimate.alias_scan(dotted_ball(SPIN), 2 * np.pi * SPIN[None], ContrastSettings())
     assert_same(spins[0] / (2 * np.pi), SPIN)
 
 
 def test_following_goes_on_from_an_answer() -> None:
     events = dotted_ball(SPIN, duration_s=0.04, events=900)
     first = answer_of(events.at(events.t_s < 0.012))
-    answer = follow_spin(events, PLACE, Settings(), first)
+    answer = follow_spin(events, BALL, ContrastSettings(), first)
     assert_same(answer.spin_rps, SPIN, 0.01)
     assert answer.span_s > first.span_s
 
 
 def test_a_turned_scene_turns_the_spin() -> None:
     events = dotted_ball(SPIN)
-    turn = turned(np.eye(3), np.array([0.4, -0.9, 1.3]), np.ones(3)).T
+    turn = turned(np.eye(3), np.array([0.06, -0.14, 0.2]), np.ones(3)).T
     scene = replace(events, normals=turn @ events.normals, facing=turn @ events.facing)
     assert_same(answer_of(scene).spin_rps, turn @ answer_of(events).spin_rps, 0.01)
 
@@ -170,7 +180,7 @@ def test_a_mirrored_image_mirrors_the_spin() -> None:
 def test_a_larger_ball_turns_the_same() -> None:
     events = dotted_ball(SPIN)
     larger = replace(events, radius_px=2 * events.radius_px)
-    answer = answer_of(larger, Place(centre_std_px=0.4, radius_std_px=0.4))
+    answer = answer_of(larger, BallUncertainty(centre_std_px=0.4, radius_std_px=0.4))
     assert_same(answer.spin_rps, answer_of(events).spin_rps, 0.01)
 
 
@@ -184,7 +194,7 @@ def test_the_stated_error_grows_with_what_is_not_known() -> None:
     events = dotted_ball(SPIN, duration_s=0.01, events=300)
     spreads = []
     for some, px in ((events, 0.1), (events, 1.0), (events.thinned(100), 0.1)):
-        answer = answer_of(some, Place(centre_std_px=px, radius_std_px=px))
+        answer = answer_of(some, BallUncertainty(centre_std_px=px, radius_std_px=px))
         covariance = answer.covariance_rps2
         assert covariance is not None
         assert np.linalg.eigvalsh(covariance).min() > 0
@@ -207,20 +217,18 @@ def test_too_few_events_give_nothing() -> None:
 TINY = """
 import json
 import numpy as np
-from spinscope.pipeline.kernels.contrast_place import place_slopes
-from spinscope.pipeline.kernels.contrast_refine import Hill, climb
-from spinscope.pipeline.kernels.contrast_search import search, distinct
-from spinscope.pipeline.kernels.contrast_window import whole
-from tests.naive_contrast import dotted_ball
+from spinscope.pipeline.spin.contrast.events import offset_slopes, whole_window
+from spinscope.pipeline.spin.contrast.score import Objective
+from spinscope.pipeline.spin.contrast.search import distinct, grid_search, maximise
+from tests.reference.contrast import dotted_ball
 
 events = dotted_ball(np.array([20.0, 5.0, 5.0]), duration_s=0.01, events=30)
-part, others = whole(events.t_s, events.normals, events.layers, 2)
-slopes = place_slopes(events.normals, events.facing, events.radius_px)
+slopes = offset_slopes(events.normals, events.facing, events.radius_px)
 spin = 2 * np.pi * np.array([19.0, 5.0, 6.0])
-hill = Hill(part, others, slopes, 0.08, 1.5, np.full(3, 0.3), 0.1)
-spin, offsets, value, seen = climb(hill, spin, np.zeros(3), 1)
-grid, values = search(events.t_s, events.normals, events.layers, 4.0, 1.5, 30)
-print(json.dumps([*spin, *offsets, value, *seen.bend.ravel(), *grid[0], values[0]]))
+objective = Objective(whole_window(events.columns, 2), slopes, 0.08, 1.5, np.full(3, 0.3), 0.1)
+spin, offsets, value, model = maximise(objective, spin, np.zeros(3), 1)
+grid = grid_search(events.columns, 4.0, 1.5, 30, 1)
+print(json.dumps([*spin, *offsets, value, *model.curvature.ravel(), *grid[0]]))
 """
 
 

@@ -121,7 +121,7 @@ def naive_plane(
 
 
 def naive_line(u: Floats, v: Floats, t_s: Floats, width: float, rounds: int) -> tuple[Floats, float, float]:
-    """(normal (2,), drift, sharpness) of the drifting line by matrix algebra: see kernels.comoving.drifting_line."""
+    """(normal (2,), drift, sharpness) of a moving line by matrix algebra, see `fit_moving_line`."""
     points = np.stack([u, v], axis=1)
     weights = np.ones(len(t_s))
     normal, drift, constant, sharpness = np.zeros(2), 0.0, 0.0, 2.0

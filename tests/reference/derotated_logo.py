@@ -10,18 +10,6 @@ Floats = NDArray[np.float64]
 CELLS = 48
 
 
-def turned(vectors: Floats, spin_rps: Floats, seconds: Floats) -> Floats:
-    """(n, 3) vectors, each turned by the spin (3,) for its own time (n,) (Rodrigues' formula)."""
-    magnitude = float(np.linalg.norm(spin_rps))
-    if magnitude == 0:
-        return vectors
-    axis = spin_rps / magnitude
-    angle = (2 * np.pi * magnitude) * seconds[:, None]
-    along = (vectors @ axis)[:, None] * axis
-    turned_vectors: Floats = along + np.cos(angle) * (vectors - along) + np.sin(angle) * np.cross(axis, vectors)
-    return turned_vectors
-
-
 def density(normals: Floats) -> NDArray[np.float32]:
     """How often the unit vectors (n, 3) fall in each cell of the cube, smoothed: (CELLS**3,) float32."""
     cells = (_place(normals) + 0.5).astype(np.int64)

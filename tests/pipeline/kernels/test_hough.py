@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from spinscope.pipeline.kernels import circle
-from tests import naive_circle
+from spinscope.pipeline.kernels import hough
+from tests.reference import hough as reference
 
 
 def pixels_of_circle(x_px: float, y_px: float, radius_px: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -33,9 +33,9 @@ def test_votes_equal_the_twin(height: int, width: int, radii: int, radius0: int,
     rng = np.random.default_rng(seed)
     x, y = rng.integers(-15, 25, (2, rng.integers(0, 25)))
     votes = np.zeros((height, width, radii), np.uint16)
-    circle.vote(votes, x, y, x0, y0, radius0)
-    assert np.array_equal(votes, naive_circle.vote(votes.shape, x, y, x0, y0, radius0))
-    assert circle.peak(votes, radius0) == naive_circle.peak(votes, radius0)
+    hough.vote(votes, x, y, x0, y0, radius0)
+    assert np.array_equal(votes, reference.vote(votes.shape, x, y, x0, y0, radius0))
+    assert hough.peak(votes, radius0) == reference.peak(votes, radius0)
 
 
 @given(x=st.floats(-3, 33), y=st.floats(-3, 33), radius=st.floats(5, 14))
@@ -46,9 +46,9 @@ def test_the_peak_is_the_circle(x: float, y: float, radius: float) -> None:
     if np.count_nonzero(seen) < 0.6 * seen.size:
         return
     votes = np.zeros((50, 50, 14), np.uint16)
-    circle.vote(votes, xs[seen], ys[seen], -10, -10, 3)
-    _, a, b, k = circle.peak(votes, 3)
-    fine_a, fine_b, fine_k = circle.refined(votes, a, b, k)
+    hough.vote(votes, xs[seen], ys[seen], -10, -10, 3)
+    _, a, b, k = hough.peak(votes, 3)
+    fine_a, fine_b, fine_k = hough.refined(votes, a, b, k)
     assert math.hypot(fine_a - 10 - x, fine_b - 10 - y) < 1.5
     assert abs(fine_k + 3 - radius) < 1.5
 
@@ -56,16 +56,16 @@ def test_the_peak_is_the_circle(x: float, y: float, radius: float) -> None:
 def test_the_refined_peak_is_the_centre_of_mass_of_squares() -> None:
     votes = np.zeros((5, 6, 4), np.uint16)
     votes[2, 3, 1], votes[2, 4, 1], votes[2, 3, 2], votes[0, 0, 3] = 2, 1, 1, 9
-    a, b, k = circle.refined(votes, 3, 2, 1)
+    a, b, k = hough.refined(votes, 3, 2, 1)
     assert (a, b, k) == (3 + 1 / 6, 2.0, 1 + 1 / 6)
-    assert circle.refined(np.zeros((3, 3, 3), np.uint16), 1, 1, 1) == (1.0, 1.0, 1.0)
+    assert hough.refined(np.zeros((3, 3, 3), np.uint16), 1, 1, 1) == (1.0, 1.0, 1.0)
 
 
 @given(height=st.integers(1, 9), width=st.integers(1, 9), most=st.integers(1, 20), seed=st.integers(0, 2**32 - 1))
 def test_bright_pixels_equal_the_twin(height: int, width: int, most: int, seed: int) -> None:
     image = np.random.default_rng(seed).integers(0, 256, (height, width)).astype(np.uint8)
     for found, expected in zip(
-        circle.bright_pixels(image, 128, most), naive_circle.bright_pixels(image, 128, most), strict=True
+        hough.bright_pixels(image, 128, most), reference.bright_pixels(image, 128, most), strict=True
     ):
         assert np.array_equal(found, expected)
 
@@ -82,20 +82,20 @@ def test_active_cells_equal_the_twin(height: int, width: int, cell: int, events:
     values = rng.integers(0, 256, (height, width)).astype(np.uint8)
     x = rng.integers(0, width, events).astype(np.uint16)
     y = rng.integers(0, height, events).astype(np.uint16)
-    columns, rows = circle.active_cells(values, x, y, 100, cell)
-    assert list(zip(columns, rows, strict=True)) == naive_circle.active_cells(values, x, y, 100, cell)
+    columns, rows = hough.active_cells(values, x, y, 100, cell)
+    assert list(zip(columns, rows, strict=True)) == reference.active_cells(values, x, y, 100, cell)
 
 
 @given(seed=st.integers(0, 2**32 - 1))
 def test_the_best_circle_is_the_peak_of_the_vote(seed: int) -> None:
     rng = np.random.default_rng(seed)
     xs, ys = rng.integers(0, 40, (2, int(rng.integers(0, 60))))
-    votes = naive_circle.vote((9, 11, 4), xs, ys, 15, 16, 6)
-    support, a, b, k = naive_circle.peak(votes, 6)
-    found = circle.best_circle(xs, ys, 15, 16, 11, 9, 6, 4)
+    votes = reference.vote((9, 11, 4), xs, ys, 15, 16, 6)
+    support, a, b, k = reference.peak(votes, 6)
+    found = hough.best_circle(xs, ys, 15, 16, 11, 9, 6, 4)
     if support == 0.0:
         assert found == (0.0, 0.0, 0.0, 0.0)
         return
-    x, y, radius = circle.refined(votes, a, b, k)
+    x, y, radius = hough.refined(votes, a, b, k)
     share = min(1.0, votes[b, a, k] / (2 * math.pi * (6 + k)))
     assert np.allclose(found, (15 + x, 16 + y, 6 + radius, share))

@@ -1,9 +1,9 @@
-"""The outline of a moving ball in the events: a circle that moves at constant velocity, fitted to sub-pixel.
+"""Outline of a moving ball in the events: a circle that moves at constant velocity, fitted to sub-pixel.
 
-A `ring` is (5,) float64 [x_px, y_px, vx_px_s, vy_px_s, radius_px] at a reference time. `oval` (2,) float64 is
-the outline's known departure from a circle: at the angle phi (image frame) it lies
-radius * (1 + oval[0] cos 2phi + oval[1] sin 2phi) from the centre; a sphere seen off the optical axis is such an
-ellipse. Event times are tau_s, seconds after the reference time (mostly negative).
+A `circle` is (5,) float64 [x_px, y_px, vx_px_s, vy_px_s, radius_px] at a reference time. `ellipticity` (2,) float64
+is the outline's known departure from a circle: at the angle phi (image frame) it lies
+radius * (1 + ellipticity[0] cos 2phi + ellipticity[1] sin 2phi) from the centre; a sphere seen off the optical axis is
+such an ellipse. Event times are tau_s, seconds after the reference time (mostly negative).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 @njit(cache=True, nogil=True)
 def near_outline(
-    ring: Floats,
+    circle: Floats,
     t_us: NDArray[np.int64],
     x_px: NDArray[np.uint16],
     y_px: NDArray[np.uint16],
@@ -34,34 +34,34 @@ def near_outline(
     """
     near = np.empty(t_us.size, np.int64)
     m = 0
-    inner = max(ring[4] - gate_px, 0.0) ** 2
-    outer = (ring[4] + gate_px) ** 2
+    inner = max(circle[4] - gate_px, 0.0) ** 2
+    outer = (circle[4] + gate_px) ** 2
     for i in range(t_us.size):
         tau = (t_us[i] - reference_us) * 1e-6
-        dx = x_px[i] - (ring[0] + ring[2] * tau)
-        dy = y_px[i] - (ring[1] + ring[3] * tau)
+        dx = x_px[i] - (circle[0] + circle[2] * tau)
+        dy = y_px[i] - (circle[1] + circle[3] * tau)
         square = dx * dx + dy * dy
         near[m] = i  # stays only if counted: no branch to mispredict
-        m += (inner <= square) & (square <= outer) & ((not ahead_only) | (dx * ring[2] + dy * ring[3] >= 0.0))
+        m += (inner <= square) & (square <= outer) & ((not ahead_only) | (dx * circle[2] + dy * circle[3] >= 0.0))
     stride = max(1, -(-m // max(most_events, 1))) | 1  # odd: symmetric motion brings events in pairs
     return near[:m:stride].copy()
 
 
 @njit(cache=True, nogil=True)
-def residuals(ring: Floats, oval: Floats, tau_s: Floats, x_px: Floats, y_px: Floats) -> Floats:
+def residuals(circle: Floats, ellipticity: Floats, tau_s: Floats, x_px: Floats, y_px: Floats) -> Floats:
     """(n,) float64 distance (px, > 0 outside) of events from the outline."""
     out = np.empty(tau_s.size, np.float64)
     for i in range(tau_s.size):
-        dx = x_px[i] - (ring[0] + ring[2] * tau_s[i])
-        dy = y_px[i] - (ring[1] + ring[3] * tau_s[i])
+        dx = x_px[i] - (circle[0] + circle[2] * tau_s[i])
+        dy = y_px[i] - (circle[1] + circle[3] * tau_s[i])
         square = dx * dx + dy * dy + 1e-18
-        bulge = (oval[0] * (dx * dx - dy * dy) + oval[1] * 2.0 * dx * dy) / square
-        out[i] = math.sqrt(square) - ring[4] * (1.0 + bulge)
+        bulge = (ellipticity[0] * (dx * dx - dy * dy) + ellipticity[1] * 2.0 * dx * dy) / square
+        out[i] = math.sqrt(square) - circle[4] * (1.0 + bulge)
     return out
 
 
 @njit(cache=True, nogil=True)
-def inverse_of(matrix: Floats) -> Floats:
+def inverse_matrix(matrix: Floats) -> Floats:
     """Inverse of a positive definite matrix (n, n), by elimination.
 
     LAPACK's through NumPy is no faster on 5 x 5 and takes five times as long to compile with the fit.
@@ -87,8 +87,8 @@ def inverse_of(matrix: Floats) -> Floats:
 def _normal_equations(
     information: Floats,
     gradient: Floats,
-    ring: Floats,
-    oval: Floats,
+    circle: Floats,
+    ellipticity: Floats,
     tau_s: Floats,
     x_px: Floats,
     y_px: Floats,
@@ -98,7 +98,7 @@ def _normal_equations(
 
     Each sum in a variable of its own, not in the arrays: twice as fast.
     """
-    x0, y0, vx, vy, radius = ring[0], ring[1], ring[2], ring[3], ring[4]
+    x0, y0, vx, vy, radius = circle[0], circle[1], circle[2], circle[3], circle[4]
     weights, squares = 1e-9, 0.0
     ga, gb, gat, gbt, gc = 0.0, 0.0, 0.0, 0.0, 0.0
     aa, ab, bb, ac, bc, cc = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -109,7 +109,7 @@ def _normal_equations(
         dy = y_px[i] - (y0 + vy * tau_s[i])
         distance = math.sqrt(dx * dx + dy * dy) + 1e-9
         a, b = dx / distance, dy / distance
-        c = 1.0 + oval[0] * (a * a - b * b) + oval[1] * 2.0 * a * b
+        c = 1.0 + ellipticity[0] * (a * a - b * b) + ellipticity[1] * 2.0 * a * b
         error = distance - radius * c
         share = error / gate_px
         if share * share >= 1.0:
@@ -150,10 +150,10 @@ def _normal_equations(
 
 
 @njit(cache=True, nogil=True)
-def fit_ring(
+def fit_circle(
     start: Floats,
     prior_std: Floats,
-    oval: Floats,
+    ellipticity: Floats,
     tau_s: Floats,
     x_px: Floats,
     y_px: Floats,
@@ -163,49 +163,49 @@ def fit_ring(
 ) -> tuple[Floats, Floats, float, float]:
     """Robust fit of a moving circle to events: Gauss-Newton steps with Tukey's biweight.
 
-    start : (5,) ring to begin with
+    start : (5,) circle to begin with
     prior_std : (5,) 1 sigma by which the answer may leave it (large = freely, 0 = not at all: zeros for the
         velocity give the fit of a circle at rest)
     gate_px : Tukey's cut-off in the first round; it then shrinks to 4.7 robust sigma, by half a round at
         least (so that the sharp outline wins over a band of late events inside it), down to floor_px
-    Returns the ring, its covariance (5, 5) from the scatter of the residuals alone, that scatter (1 sigma,
+    Returns the circle, its covariance (5, 5) from the scatter of the residuals alone, that scatter (1 sigma,
     px) and the sum of the weights (about the number of events used).
     """
-    ring = start.copy()
+    circle = start.copy()
     information, gradient = np.zeros((5, 5)), np.zeros(5)
     gate, scatter, weight_sum = gate_px, gate_px, 0.0
     # The velocity is fitted in px/ms, so that all unknowns are of the same size.
     scale = np.array([1.0, 1.0, 1e3, 1e3, 1.0])
     for _ in range(most_rounds):
-        weight_sum, squares = _normal_equations(information, gradient, ring, oval, tau_s, x_px, y_px, gate)
+        weight_sum, squares = _normal_equations(information, gradient, circle, ellipticity, tau_s, x_px, y_px, gate)
         for k in range(5):
             firm = (scale[k] / max(prior_std[k], 1e-9)) ** 2 + 1e-9
             information[k, k] += firm
-            gradient[k] += firm * (start[k] - ring[k]) / scale[k]
-        inverse = inverse_of(information)
+            gradient[k] += firm * (start[k] - circle[k]) / scale[k]
+        inverse = inverse_matrix(information)
         moved = 0.0
         for j in range(5):
             step = 0.0
             for k in range(5):
                 step += inverse[j, k] * gradient[k]
-            ring[j] += step * scale[j]
+            circle[j] += step * scale[j]
             moved = max(moved, abs(step))
         # Tukey's weights at 4.7 sigma leave 0.83 of the variance of Gaussian residuals: 0.91 of sigma.
         scatter = math.sqrt(squares / weight_sum) / 0.91
         if gate <= floor_px and moved < 1e-3:
             break
         gate = max(min(4.7 * scatter, 0.5 * gate), floor_px)
-    covariance = inverse_of(information)
+    covariance = inverse_matrix(information)
     for j in range(5):
         for k in range(5):
             covariance[j, k] *= scatter * scatter * scale[j] * scale[k]
-    return ring, covariance, scatter, weight_sum
+    return circle, covariance, scatter, weight_sum
 
 
 @njit(cache=True, nogil=True)
 def support(
-    ring: Floats,
-    oval: Floats,
+    circle: Floats,
+    ellipticity: Floats,
     tau_s: Floats,
     x_px: Floats,
     y_px: Floats,
@@ -228,14 +228,14 @@ def support(
     """
     counts = np.zeros(bins, np.int64)
     ahead_on, ahead, behind_on, behind, outside, inside = 0, 0, 0, 0, 0, 0
-    error = residuals(ring, oval, tau_s, x_px, y_px)
+    error = residuals(circle, ellipticity, tau_s, x_px, y_px)
     for i in range(tau_s.size):
         if error[i] > tolerance_px:
             outside += error[i] < 4.0 * tolerance_px
             continue
-        dx = x_px[i] - (ring[0] + ring[2] * tau_s[i])
-        dy = y_px[i] - (ring[1] + ring[3] * tau_s[i])
-        is_ahead = dx * ring[2] + dy * ring[3] > 0.0
+        dx = x_px[i] - (circle[0] + circle[2] * tau_s[i])
+        dy = y_px[i] - (circle[1] + circle[3] * tau_s[i])
+        is_ahead = dx * circle[2] + dy * circle[3] > 0.0
         if error[i] < -(tolerance_px if is_ahead else max(tolerance_px, early_px)):
             inside += 1
             continue
@@ -246,7 +246,7 @@ def support(
             behind += 1
             behind_on += on[i]
         counts[int((math.atan2(dy, dx) / (2.0 * math.pi) + 1.0) * bins) % bins] += 1
-    speed = math.hypot(ring[2], ring[3]) + 1e-9
+    speed = math.hypot(circle[2], circle[3]) + 1e-9
     least = 2 if ahead + behind >= 3 * bins else 1
     seen = np.zeros(2)
     visible = np.zeros(2)
@@ -255,12 +255,12 @@ def support(
         angle = 2.0 * math.pi * (b + 0.5) / bins
         nx = math.cos(angle)
         ny = math.sin(angle)
-        x = ring[0] + ring[4] * nx
-        y = ring[1] + ring[4] * ny
+        x = circle[0] + circle[4] * nx
+        y = circle[1] + circle[4] * ny
         if x < 0.0 or y < 0.0 or x > width_px - 1 or y > height_px - 1:
             continue
         in_view += 1
-        across = (nx * ring[2] + ny * ring[3]) / speed
+        across = (nx * circle[2] + ny * circle[3]) / speed
         if abs(across) < 0.25:
             continue
         side = 0 if across > 0.0 else 1
@@ -281,22 +281,22 @@ def support(
 
 
 @njit(cache=True, nogil=True)
-def clear_of(
-    ring: Floats,
+def outside_circle(
+    circle: Floats,
     t_us: NDArray[np.int64],
     x_px: NDArray[np.uint16],
     y_px: NDArray[np.uint16],
     reference_us: float,
     margin_px: float,
 ) -> NDArray[np.int64]:
-    """(m,) int64 indices of events more than margin_px outside the moving ring."""
+    """(m,) int64 indices of events more than margin_px outside the moving circle."""
     chosen = np.empty(t_us.size, np.int64)
     m = 0
-    limit = (ring[4] + margin_px) ** 2
+    limit = (circle[4] + margin_px) ** 2
     for i in range(t_us.size):
         tau = (t_us[i] - reference_us) * 1e-6
-        dx = x_px[i] - (ring[0] + ring[2] * tau)
-        dy = y_px[i] - (ring[1] + ring[3] * tau)
+        dx = x_px[i] - (circle[0] + circle[2] * tau)
+        dy = y_px[i] - (circle[1] + circle[3] * tau)
         chosen[m] = i
         m += dx * dx + dy * dy > limit
     return chosen[:m].copy()

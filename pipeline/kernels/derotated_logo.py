@@ -15,6 +15,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .rotation import axis_and_length, rotate
+
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
@@ -31,7 +33,7 @@ def _place(direction: float, side: int) -> float:
 
 
 @njit(cache=True, nogil=True)
-def turn_back_and_count(
+def count_derotated(
     density: Singles, normals: Floats, on: NDArray[np.bool_], seconds: Floats, spin_rps: Floats
 ) -> None:
     """Fill density with events whose normals (n, 3) are turned by the spin (3,), each for its own seconds (n,).
@@ -44,18 +46,12 @@ def turn_back_and_count(
     counts = np.zeros((side, side, side, 2), np.int32)
     touched = np.empty((normals.shape[0], 4), np.int16)
     marked = 0
-    magnitude = math.sqrt(spin_rps[0] ** 2 + spin_rps[1] ** 2 + spin_rps[2] ** 2)
-    ax, ay, az = 0.0, 0.0, 1.0
-    if magnitude > 0.0:
-        ax, ay, az = spin_rps[0] / magnitude, spin_rps[1] / magnitude, spin_rps[2] / magnitude
+    ax, ay, az, magnitude = axis_and_length(spin_rps)
     for e in range(normals.shape[0]):
         angle = 2.0 * math.pi * magnitude * seconds[e]
-        cosine, sine = math.cos(angle), math.sin(angle)
-        nx, ny, nz = normals[e, 0], normals[e, 1], normals[e, 2]
-        along = (nx * ax + ny * ay + nz * az) * (1.0 - cosine)  # Rodrigues' formula
-        x = nx * cosine + (ay * nz - az * ny) * sine + ax * along
-        y = ny * cosine + (az * nx - ax * nz) * sine + ay * along
-        z = nz * cosine + (ax * ny - ay * nx) * sine + az * along
+        cosine = math.cos(angle)
+        normal = (normals[e, 0], normals[e, 1], normals[e, 2])
+        x, y, z = rotate(normal, (ax, ay, az), math.sin(angle), cosine, 1.0 - cosine)
         i, j, k = int(_place(x, side) + 0.5), int(_place(y, side) + 0.5), int(_place(z, side) + 0.5)
         p = 1 if on[e] else 0
         if counts[i, j, k, p] == 0:
@@ -74,7 +70,7 @@ def turn_back_and_count(
 
 
 @njit(cache=True, nogil=True)
-def read_density(found: Singles, density: Singles, directions: Floats, frame: Floats) -> None:
+def sample_density(found: Singles, density: Singles, directions: Floats, frame: Floats) -> None:
     """Fill found (2, n): the densities of OFF and ON in every direction, linear between the centres of the cells.
 
     directions : (n, 3) in the frame whose axes, in that of the density, are the rows of frame (3, 3)
@@ -171,11 +167,11 @@ def paint(
     density = np.empty((CELLS, CELLS, CELLS, 3), np.float32)
     for moment in range(spins_rps.shape[0]):
         first, last = seen[moment]
-        turn_back_and_count(density, normals[first:last], on[first:last], seconds[first:last], spins_rps[moment])
+        count_derotated(density, normals[first:last], on[first:last], seconds[first:last], spins_rps[moment])
         for kind in range(len(pictures)):
             canvas = canvases[kind]
             counts = np.empty((2, canvas.places.size), np.float32)
-            read_density(counts, density, canvas.directions, frames[kind][moment])
+            sample_density(counts, density, canvas.directions, frames[kind][moment])
             if canvas.colours.shape[0] == 1:
                 counts[0] += counts[1]
                 counts = counts[:1]

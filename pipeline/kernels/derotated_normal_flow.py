@@ -13,6 +13,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from .rotation import axis_and_length, rotate
+
 Floats = NDArray[np.float64]
 
 FEWEST = 8  # events for the line's two parameters, its drift, and enough left to judge it by
@@ -22,27 +24,20 @@ NO_LINE = 2.0
 
 
 @numba.njit(cache=True, nogil=True)
-def turned_back(normals: Floats, t_us: NDArray[np.int64], common_us: int, spin_rad_s: Floats) -> Floats:
+def derotated_normals(normals: Floats, t_us: NDArray[np.int64], common_us: int, spin_rad_s: Floats) -> Floats:
     """(n, 3) normals where they were at common_us, if the ball turns with this spin (3,)."""
-    n = t_us.size
-    turned = np.empty((n, 3))
-    speed = np.sqrt(spin_rad_s[0] ** 2 + spin_rad_s[1] ** 2 + spin_rad_s[2] ** 2)
-    ax, ay, az = 0.0, 0.0, 1.0
-    if speed > 0.0:
-        ax, ay, az = spin_rad_s[0] / speed, spin_rad_s[1] / speed, spin_rad_s[2] / speed
-    for i in range(n):
+    derotated = np.empty((t_us.size, 3))
+    ax, ay, az, speed = axis_and_length(spin_rad_s)
+    for i in range(t_us.size):
         angle = -speed * (t_us[i] - common_us) * 1e-6
-        cosine, sine = np.cos(angle), np.sin(angle)
-        x, y, z = normals[i, 0], normals[i, 1], normals[i, 2]
-        along = (ax * x + ay * y + az * z) * (1.0 - cosine)
-        turned[i, 0] = x * cosine + (ay * z - az * y) * sine + ax * along
-        turned[i, 1] = y * cosine + (az * x - ax * z) * sine + ay * along
-        turned[i, 2] = z * cosine + (ax * y - ay * x) * sine + az * along
-    return turned
+        cosine = np.cos(angle)
+        normal = (normals[i, 0], normals[i, 1], normals[i, 2])
+        derotated[i] = rotate(normal, (ax, ay, az), np.sin(angle), cosine, 1.0 - cosine)
+    return derotated
 
 
 @numba.njit(cache=True, nogil=True)
-def drifting_line(u: Floats, v: Floats, t_s: Floats, width: float) -> tuple[float, float, float, float, float]:
+def fit_moving_line(u: Floats, v: Floats, t_s: Floats, width: float) -> tuple[float, float, float, float, float]:
     """Line (nu, nv) . (u, v) = c + drift t through points, robustly: nu, nv, drift, its variance and sharpness.
 
     Total least squares in (u, v): the normal is the direction in which the points spread least once their linear
@@ -109,7 +104,7 @@ def _gather(
 
 
 @numba.njit(cache=True, nogil=True)
-def comoving_constraints(
+def derotated_constraints(
     t_us: NDArray[np.int64],
     normals: Floats,
     on: NDArray[np.bool_],
@@ -129,7 +124,7 @@ def comoving_constraints(
     """
     n = t_us.size
     common_us = t_us[n // 2] if n else 0
-    turned = turned_back(normals, t_us, common_us, spin_rad_s)
+    turned = derotated_normals(normals, t_us, common_us, spin_rad_s)
     events, lines = np.empty(n, np.int64), np.empty((n, 3))
     speeds, variances, sizes = np.empty(n), np.empty(n), np.empty(n, np.int64)
     near, frame = np.empty((3, NEIGHBOURS)), np.empty((3, 3))
@@ -149,7 +144,7 @@ def comoving_constraints(
             size = _gather(near, own, own_us, k, frame, reach, reach_us)
             if size < FEWEST:
                 continue
-            nu, nv, drift, variance, sharpness = drifting_line(near[0, :size], near[1, :size], near[2, :size], width)
+            nu, nv, drift, variance, sharpness = fit_moving_line(near[0, :size], near[1, :size], near[2, :size], width)
             if sharpness > sharpest:
                 continue
             # n . (missing x e) = drift with n in the tangent plane: missing . (e x n) = drift
@@ -162,7 +157,7 @@ def comoving_constraints(
             events[count], speeds[count], variances[count], sizes[count] = members[k], drift, variance, size
             count += 1
     events = events[:count].copy()
-    rows = turned_back(lines[:count], 2 * common_us - t_us[events], common_us, spin_rad_s)
+    rows = derotated_normals(lines[:count], 2 * common_us - t_us[events], common_us, spin_rad_s)
     for i in range(count):
         for axis in range(3):
             speeds[i] += rows[i, axis] * spin_rad_s[axis]
@@ -173,7 +168,7 @@ def comoving_constraints(
 def position_response(normals: Floats, sights: Floats, rows: Floats, spin_rad_s: Floats, radius_px: float) -> Floats:
     """(n, 3) by how much speeds - rows . spin changes (rad/s) per px of error in the ball's x, y and radius.
 
-    rows (n, 3) are e x n as from comoving_constraints, normals (n, 3) the e, sights (n, 3) unit vectors to the
+    rows (n, 3) are e x n as from derotated_constraints, normals (n, 3) the e, sights (n, 3) unit vectors to the
     camera, s. An error of the centre by d (px, across the line of sight) moves e by
 
         -d/r + s (e . d) / (r e . s)

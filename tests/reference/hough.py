@@ -1,4 +1,4 @@
-"""Slow twins of the circle and contour kernels: the definitions in a few lines of NumPy and plain loops."""
+"""Slow twins of the kernels of circles and moving circles: the definitions in a few lines of NumPy and plain loops."""
 
 from __future__ import annotations
 
@@ -51,34 +51,34 @@ def active_cells(values: NDArray[np.uint8], x_px: Ints, y_px: Ints, least: int, 
     return sorted(kept, key=lambda cell: (cell[1], cell[0]))
 
 
-def from_centre(ring: Floats, tau_s: Floats, x_px: Floats, y_px: Floats) -> tuple[Floats, Floats]:
+def from_centre(circle: Floats, tau_s: Floats, x_px: Floats, y_px: Floats) -> tuple[Floats, Floats]:
     """Each event relative to the centre at its time."""
-    return x_px - ring[0] - ring[2] * tau_s, y_px - ring[1] - ring[3] * tau_s
+    return x_px - circle[0] - circle[2] * tau_s, y_px - circle[1] - circle[3] * tau_s
 
 
-def residuals(ring: Floats, oval: Floats, tau_s: Floats, x_px: Floats, y_px: Floats) -> Floats:
+def residuals(circle: Floats, ellipticity: Floats, tau_s: Floats, x_px: Floats, y_px: Floats) -> Floats:
     """Distance from the centre less the outline's distance in that direction."""
-    dx, dy = from_centre(ring, tau_s, x_px, y_px)
+    dx, dy = from_centre(circle, tau_s, x_px, y_px)
     phi = np.arctan2(dy, dx)
-    return np.hypot(dx, dy) - ring[4] * (1 + oval[0] * np.cos(2 * phi) + oval[1] * np.sin(2 * phi))
+    return np.hypot(dx, dy) - circle[4] * (1 + ellipticity[0] * np.cos(2 * phi) + ellipticity[1] * np.sin(2 * phi))
 
 
 def near_outline(
-    ring: Floats, tau_s: Floats, x_px: Floats, y_px: Floats, gate_px: float, most_events: int, ahead_only: bool
+    circle: Floats, tau_s: Floats, x_px: Floats, y_px: Floats, gate_px: float, most_events: int, ahead_only: bool
 ) -> Ints:
     """Indices by mask, then every so many-th."""
-    dx, dy = from_centre(ring, tau_s, x_px, y_px)
-    near = np.abs(np.hypot(dx, dy) - ring[4]) <= gate_px
+    dx, dy = from_centre(circle, tau_s, x_px, y_px)
+    near = np.abs(np.hypot(dx, dy) - circle[4]) <= gate_px
     if ahead_only:
-        near &= dx * ring[2] + dy * ring[3] >= 0
+        near &= dx * circle[2] + dy * circle[3] >= 0
     chosen = np.flatnonzero(near)
     return chosen[:: max(1, math.ceil(chosen.size / most_events)) | 1]
 
 
-def fit_ring(
+def fit_circle(
     start: Floats,
     prior_std: Floats,
-    oval: Floats,
+    ellipticity: Floats,
     tau_s: Floats,
     x_px: Floats,
     y_px: Floats,
@@ -87,35 +87,31 @@ def fit_ring(
     most_rounds: int,
 ) -> Floats:
     """Reweighted least squares with a numerical Jacobian, solved by `lstsq`."""
-    ring, gate = start.astype(np.float64).copy(), gate_px
+    circle, gate = start.astype(np.float64).copy(), gate_px
     steps = np.array([1e-4, 1e-4, 1e-1, 1e-1, 1e-4])
     for _ in range(most_rounds):
-        error = residuals(ring, oval, tau_s, x_px, y_px)
+        error = residuals(circle, ellipticity, tau_s, x_px, y_px)
         weight = np.where(np.abs(error) < gate, (1 - (error / gate) ** 2) ** 2, 0.0)
-        slope = np.stack(
-            [
-                (residuals(ring + step, oval, tau_s, x_px, y_px) - residuals(ring - step, oval, tau_s, x_px, y_px))
-                / (2 * step.sum())
-                for step in np.diag(steps)
-            ],
-            axis=1,
-        )
+        slope = np.empty((tau_s.size, 5))
+        for k, step in enumerate(np.diag(steps)):
+            after, before = (residuals(circle + sign * step, ellipticity, tau_s, x_px, y_px) for sign in (1, -1))
+            slope[:, k] = (after - before) / (2 * step.sum())
         held = 1 / np.maximum(prior_std, 1e-9)
         rows = np.concatenate([np.sqrt(weight)[:, None] * slope, np.diag(held)])
-        target = np.concatenate([-np.sqrt(weight) * error, held * (start - ring)])
+        target = np.concatenate([-np.sqrt(weight) * error, held * (start - circle)])
         unit = np.array([1.0, 1.0, 1e3, 1e3, 1.0])
         change = np.linalg.lstsq(rows * unit, target, rcond=None)[0] * unit
-        ring = ring + change
+        circle = circle + change
         if gate <= floor_px and np.max(np.abs(change / unit)) < 1e-3:
             break
         scatter = math.sqrt(float(np.sum(weight * error**2)) / max(float(weight.sum()), 1e-9)) / 0.91
         gate = max(min(4.7 * scatter, 0.5 * gate), floor_px)
-    return ring
+    return circle
 
 
 def vote_velocity(
     m: int,
-    ring: Floats,
+    circle: Floats,
     tau_s: Floats,
     x_px: Floats,
     y_px: Floats,
@@ -128,17 +124,17 @@ def vote_velocity(
     for j in range(-m, m + 1):
         for i in range(-m, m + 1):
             if i * i + j * j <= m * m:
-                trial = ring + np.array([0.0, 0.0, i * step_px_s, j * step_px_s, 0.0])
+                trial = circle + np.array([0.0, 0.0, i * step_px_s, j * step_px_s, 0.0])
                 dx, dy = from_centre(trial, tau_s, x_px, y_px)
-                near = np.maximum(1 - np.abs(np.hypot(dx, dy) - ring[4]) / gate_px, 0.0)
+                near = np.maximum(1 - np.abs(np.hypot(dx, dy) - circle[4]) / gate_px, 0.0)
                 sign = np.sign(dx * trial[2] + dy * trial[3]) * np.where(on, 1, -1)
                 votes[m + j, m + i] = np.sum(near * sign)
     return votes
 
 
 def support(
-    ring: Floats,
-    oval: Floats,
+    circle: Floats,
+    ellipticity: Floats,
     tau_s: Floats,
     x_px: Floats,
     y_px: Floats,
@@ -150,18 +146,18 @@ def support(
     bins: int,
 ) -> Floats:
     """The eight numbers of the kernel, by masks."""
-    dx, dy = from_centre(ring, tau_s, x_px, y_px)
-    error = residuals(ring, oval, tau_s, x_px, y_px)
-    ahead = dx * ring[2] + dy * ring[3] > 0
+    dx, dy = from_centre(circle, tau_s, x_px, y_px)
+    error = residuals(circle, ellipticity, tau_s, x_px, y_px)
+    ahead = dx * circle[2] + dy * circle[3] > 0
     inner = np.where(ahead, tolerance_px, max(tolerance_px, early_px))
     on_it = (error <= tolerance_px) & (error >= -inner)
     sector = np.floor((np.arctan2(dy, dx) / (2 * math.pi) + 1) * bins).astype(np.int64) % bins
     counts = np.bincount(sector[on_it], minlength=bins)
     enough = counts >= (2 if np.count_nonzero(on_it) >= 3 * bins else 1)
     angle = 2 * math.pi * (np.arange(bins) + 0.5) / bins
-    x, y = ring[0] + ring[4] * np.cos(angle), ring[1] + ring[4] * np.sin(angle)
+    x, y = circle[0] + circle[4] * np.cos(angle), circle[1] + circle[4] * np.sin(angle)
     in_view = (x >= 0) & (y >= 0) & (x <= width_px - 1) & (y <= height_px - 1)
-    across = (np.cos(angle) * ring[2] + np.sin(angle) * ring[3]) / (math.hypot(ring[2], ring[3]) + 1e-9)
+    across = (np.cos(angle) * circle[2] + np.sin(angle) * circle[3]) / (math.hypot(circle[2], circle[3]) + 1e-9)
 
     def share(part: NDArray[np.bool_], whole: NDArray[np.bool_]) -> float:
         return float(np.count_nonzero(part & whole)) / max(np.count_nonzero(whole), 1)
@@ -180,7 +176,7 @@ def support(
     )
 
 
-def clear_of(ring: Floats, tau_s: Floats, x_px: Floats, y_px: Floats, margin_px: float) -> Ints:
-    """Indices of the events farther out than the ring and the margin."""
-    dx, dy = from_centre(ring, tau_s, x_px, y_px)
-    return np.flatnonzero(np.hypot(dx, dy) > ring[4] + margin_px)
+def outside_circle(circle: Floats, tau_s: Floats, x_px: Floats, y_px: Floats, margin_px: float) -> Ints:
+    """Indices of the events farther out than the circle and the margin."""
+    dx, dy = from_centre(circle, tau_s, x_px, y_px)
+    return np.flatnonzero(np.hypot(dx, dy) > circle[4] + margin_px)

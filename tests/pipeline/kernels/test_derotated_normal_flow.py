@@ -6,14 +6,14 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from spinscope.pipeline.kernels.comoving import (
+from spinscope.pipeline.kernels.derotated_normal_flow import (
     ROUNDS,
-    comoving_constraints,
-    drifting_line,
+    derotated_constraints,
+    derotated_normals,
+    fit_moving_line,
     position_response,
-    turned_back,
 )
-from tests.naive_spin import naive_line
+from tests.reference.spin import naive_line
 from tests.spinning_ball import turns
 
 spins = st.tuples(*[st.floats(-500, 500)] * 3).filter(lambda s: np.linalg.norm(s) > 60)
@@ -25,8 +25,8 @@ def test_turning_back_undoes_the_turning(seed: int, spin: tuple[float, float, fl
     t_us = np.sort(rng.integers(0, 100_000, 20))
     e = rng.normal(size=(20, 3))
     moved = np.einsum("nij,nj->ni", turns(np.array(spin), (t_us - 40_000) * 1e-6), e)
-    np.testing.assert_allclose(turned_back(moved, t_us, 40_000, np.array(spin)), e, atol=1e-9)
-    np.testing.assert_array_equal(turned_back(e, t_us, 0, np.zeros(3)), e)
+    np.testing.assert_allclose(derotated_normals(moved, t_us, 40_000, np.array(spin)), e, atol=1e-9)
+    np.testing.assert_array_equal(derotated_normals(e, t_us, 0, np.zeros(3)), e)
 
 
 @settings(max_examples=60)
@@ -37,7 +37,7 @@ def test_the_drifting_line_equals_its_twin(seed: int) -> None:
     along, angle = rng.uniform(-0.2, 0.2, 25), rng.uniform(0, np.pi)
     across = rng.uniform(-80, 80) * t + rng.normal(0, 0.015, 25)
     u, v = along * np.cos(angle) - across * np.sin(angle), along * np.sin(angle) + across * np.cos(angle)
-    nu, nv, drift, variance, sharpness = drifting_line(u, v, t, 0.15)
+    nu, nv, drift, variance, sharpness = fit_moving_line(u, v, t, 0.15)
     normal, slow_drift, slow_sharpness = naive_line(u, v, t, 0.15, ROUNDS)
     sense = np.sign(normal @ [nu, nv])
     np.testing.assert_allclose((nu, nv, drift), (*(sense * normal), sense * slow_drift), rtol=1e-5, atol=1e-5)
@@ -65,7 +65,7 @@ def test_the_drift_is_what_the_guess_is_missing(
     true = np.array(spin)
     t_us, e, on = edges(seed, true)
     guess = true - np.array(missing)
-    events, rows, speeds, variances, sizes = comoving_constraints(t_us, e, on, guess, 1, 0.18, 800.0, 0.07, 0.35)
+    events, rows, speeds, variances, sizes = derotated_constraints(t_us, e, on, guess, 1, 0.18, 800.0, 0.07, 0.35)
     assert events.size > 500 and np.all(sizes >= 8) and np.all(variances >= 0)
     np.testing.assert_allclose(np.sum(rows * e[events], axis=1), 0.0, atol=1e-9)  # a row lies in the tangent plane
     off = np.abs(speeds - rows @ true)

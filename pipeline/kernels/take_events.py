@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 
 @njit(cache=True, nogil=True)
-def taken(
+def take_events(
     rows: NDArray[np.int64],
     t_us: NDArray[np.int64],
     x_px: NDArray[np.uint16],
