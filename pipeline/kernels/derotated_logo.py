@@ -1,9 +1,11 @@
-"""The logo with the spin taken out: events turned back to one moment, counted around the ball, read and coloured.
+"""Picture of the derotated logo: events turned back to one moment, counted around the ball, read and coloured.
 
 Directions are unit vectors from the ball's centre. They are counted in the cells of a cube around the unit sphere, of
 `side` cells along an edge. A density is a float32 array (side, side, side, 3): how often OFF and ON events fall in each
 cell, smoothed with weights 1/4 1/2 1/4 along each axis (integers over 64, which float32 holds exactly), and 1 where a
 direction between this cell's centre and the next ones' has any density, else 0.
+
+A kernel that returns nothing writes into its first argument, and into nothing else.
 """
 
 from __future__ import annotations
@@ -28,7 +30,7 @@ FULL_RANK = 0.95  # of the marked places: what a twentieth of them exceed has fu
 
 @njit(cache=True, nogil=True)
 def _place(direction: float, side: int) -> float:
-    """Where a coordinate of a unit vector lies among the centres of the cells, two cells away from the cube's sides."""
+    """Place of a coordinate of a unit vector among the centres of the cells, two cells away from the cube's sides."""
     return direction * (0.5 * side - 3.0) + (0.5 * side - 0.5)
 
 
@@ -36,10 +38,23 @@ def _place(direction: float, side: int) -> float:
 def count_derotated(
     density: Singles, normals: Floats, on: NDArray[np.bool_], seconds: Floats, spin_rps: Floats
 ) -> None:
-    """Fill density with events whose normals (n, 3) are turned by the spin (3,), each for its own seconds (n,).
+    """Fill `density` with turned events.
 
-    Negative seconds turn back. Counts first, then spreads the few cells that have any: 3 x as fast as turning the
-    events and smoothing the whole cube with numpy.
+    Counts first, then spreads the few cells that have any: 3 x as fast as turning the events and smoothing the whole
+    cube with numpy.
+
+    Parameters
+    ----------
+    density : (side, side, side, 3) float32
+        Output.
+    normals : (n, 3) float64
+        Unit normals of the events.
+    on : (n,) bool
+        Polarity.
+    seconds : (n,) float64
+        Time for which each event is turned by the spin; negative turns back.
+    spin_rps : (3,) float64
+        The spin.
     """
     side = density.shape[0]
     density[:] = 0.0
@@ -71,9 +86,18 @@ def count_derotated(
 
 @njit(cache=True, nogil=True)
 def sample_density(found: Singles, density: Singles, directions: Floats, frame: Floats) -> None:
-    """Fill found (2, n): the densities of OFF and ON in every direction, linear between the centres of the cells.
+    """Fill `found` with the densities of OFF and ON in every direction, linear between the centres of the cells.
 
-    directions : (n, 3) in the frame whose axes, in that of the density, are the rows of frame (3, 3)
+    Parameters
+    ----------
+    found : (2, n) float32
+        Output.
+    density : (side, side, side, 3) float32
+        As made by `count_derotated`.
+    directions : (n, 3) float64
+        Unit vectors in the frame whose axes, in that of the density, are the rows of `frame`.
+    frame : (3, 3) float64
+        These axes.
     """
     side = density.shape[0]
     for n in range(directions.shape[0]):
@@ -100,7 +124,7 @@ def sample_density(found: Singles, density: Singles, directions: Floats, frame: 
 
 @njit(cache=True, nogil=True)
 def full_count(counts: Singles) -> float:
-    """The count (n,) that is shown in full colour: what a twentieth of the marked places exceed; 0 for none."""
+    """Count (n,) that is shown in full colour: what a twentieth of the marked places exceed; 0 for none."""
     marked = counts[counts > 0]
     if marked.size == 0:
         return 0.0
@@ -112,9 +136,22 @@ def full_count(counts: Singles) -> float:
 def colour_counts(
     picture: Bytes, places: NDArray[np.int64], counts: Singles, colours: Singles, ground: Singles
 ) -> None:
-    """Write into places (n,) of picture (m, 3) the ground's colour (3,), shifted to colours (k, 3) by counts (k, n).
+    """Write the ground's colour, shifted towards others by counts, into places of `picture`.
 
     Noise below a tenth of the full count has no colour, and from the full count on there is all of it.
+
+    Parameters
+    ----------
+    picture : (m, 3) uint8
+        Output.
+    places : (n,) int64
+        Pixels to write.
+    counts : (k, n) float32
+        Counts of each of k kinds of events.
+    colours : (k, 3) float32
+        Their colours.
+    ground : (3,) float32
+        Colour where there are no events.
     """
     scale = np.zeros(counts.shape[0])
     for k in range(counts.shape[0]):
@@ -135,10 +172,18 @@ def colour_counts(
 
 
 class Canvas(NamedTuple):
-    """What is painted of a picture, and how.
+    """Pixels of a picture that are painted, and their colours.
 
-    places : (n,) its pixels; directions : (n, 3) what lies behind them in the picture's own frame
-    colours : (1, 3) for both polarities, or (2, 3) OFF's and ON's; ground : (3,) where there are no events
+    Attributes
+    ----------
+    places : (n,) int64
+        The pixels.
+    directions : (n, 3) float64
+        Directions behind them, in the picture's own frame.
+    colours : (1, 3) or (2, 3) float32
+        Of both polarities, or of OFF and ON.
+    ground : (3,) float32
+        Colour where there are no events.
     """
 
     places: NDArray[np.int64]
@@ -158,11 +203,20 @@ def paint(
     seen: NDArray[np.int64],
     spins_rps: Floats,
 ) -> None:
-    """Paint the logo at several moments m, each in pictures (m, pixels, 3) of several kinds, in one call.
+    """Paint the logo at several moments m, in pictures of several kinds, in one call.
 
-    canvases, frames : of every kind; frames (m, 3, 3), the axes of each picture's frame as rows
-    normals, on, seconds : (e, 3), (e,), (e,) the events; of them those of seen (m, 2), from and to, are turned back by
-        spins_rps (m, 3)
+    Parameters
+    ----------
+    pictures : tuple of (m, pixels, 3) uint8
+        Output, one array a kind.
+    canvases, frames : tuple of Canvas, tuple of (m, 3, 3) float64
+        Of every kind; the rows of a frame are the axes of the picture's frame.
+    normals, on, seconds : (e, 3) float64, (e,) bool, (e,) float64
+        The events, as in `count_derotated`.
+    seen : (m, 2) int64
+        First event of each moment, and the one after its last.
+    spins_rps : (m, 3) float64
+        Spin of each moment.
     """
     density = np.empty((CELLS, CELLS, CELLS, 3), np.float32)
     for moment in range(spins_rps.shape[0]):
@@ -180,7 +234,7 @@ def paint(
 
 @njit(cache=True, nogil=True)
 def centroid(density: Singles) -> Floats:
-    """(3,) where the events lie on the whole, as a vector from the middle of the cube; zeros where there are none."""
+    """Mean direction (3,) of the events, a vector from the middle of the cube; zeros where there are none."""
     found = np.zeros(3)
     middle = 0.5 * (density.shape[0] - 1)
     for i, j, k in np.ndindex(density.shape[:3]):

@@ -1,10 +1,10 @@
-"""Normal flow as seen by an observer who turns with the ball.
+"""Normal flow on the derotated ball, as seen by an observer who turns with it.
 
 Given a guess of the spin, every event is turned back on the sphere to where the guess says it was at one common
 time. If the guess is right, an edge of the logo then stands still, however fast it moved: its events lie on one
 line, and strokes that follow each other stay apart. If it is not quite right, the line drifts, and the drift is a
 linear constraint on what is missing from the guess. This is plane fitting in the ball's own frame: no velocity bound,
-no length scale in time, and no bias from the sphere's curvature or the perspective.
+no length scale in time, and no bias from the sphere's curvature or the perspective. Not in the paper.
 """
 
 from __future__ import annotations
@@ -25,7 +25,24 @@ NO_LINE = 2.0
 
 @numba.njit(cache=True, nogil=True)
 def derotated_normals(normals: Floats, t_us: NDArray[np.int64], common_us: int, spin_rad_s: Floats) -> Floats:
-    """(n, 3) normals where they were at common_us, if the ball turns with this spin (3,)."""
+    """Normals at one common time, if the ball turns with this spin.
+
+    Parameters
+    ----------
+    normals : (n, 3) float64
+        Unit normals at the times of the events.
+    t_us : (n,) int64
+        These times.
+    common_us : int
+        Time to which the normals are turned.
+    spin_rad_s : (3,) float64
+        Angular velocity.
+
+    Returns
+    -------
+    (n, 3) float64
+        Unit normals at common_us.
+    """
     derotated = np.empty((t_us.size, 3))
     ax, ay, az, speed = axis_and_length(spin_rad_s)
     for i in range(t_us.size):
@@ -38,11 +55,28 @@ def derotated_normals(normals: Floats, t_us: NDArray[np.int64], common_us: int, 
 
 @numba.njit(cache=True, nogil=True)
 def fit_moving_line(u: Floats, v: Floats, t_s: Floats, width: float) -> tuple[float, float, float, float, float]:
-    """Line (nu, nv) . (u, v) = c + drift t through points, robustly: nu, nv, drift, its variance and sharpness.
+    """Fit a line (nu, nv) . (u, v) = c + drift t to points, robustly.
 
     Total least squares in (u, v): the normal is the direction in which the points spread least once their linear
-    dependence on t is taken out. Once with equal weights, then ROUNDS - 1 times with bisquare weights of this width.
-    Sharpness is the squared spread across the line over that along it; NO_LINE where there is none.
+    dependence on t is taken out. Once with equal weights, then ROUNDS - 1 times with bisquare weights.
+
+    Parameters
+    ----------
+    u, v : (n,) float64
+        Places in the tangent plane, rad.
+    t_s : (n,) float64
+        Times.
+    width : float
+        Width of the bisquare weights, rad.
+
+    Returns
+    -------
+    nu, nv : float
+        Unit normal of the line.
+    drift, variance : float
+        Velocity along the normal, rad/s, and its variance.
+    sharpness : float
+        Squared spread across the line over that along it; NO_LINE where there is no line.
     """
     nu, nv, c, drift, variance, sharpness = 0.0, 0.0, 0.0, 0.0, 0.0, NO_LINE
     for round_ in range(ROUNDS):
@@ -83,8 +117,8 @@ def _gather(
 ) -> int:
     """Write (u, v, t in s) of event k and its neighbours into `near` (3, NEIGHBOURS); return how many there are.
 
-    frame (3, 3): e of event k and two directions that span the tangent plane. Half the neighbours at most come from
-    before k and the rest from after, nearest in time first.
+    The rows of `frame` (3, 3) are e of event k and two directions that span the tangent plane. Half the neighbours at
+    most come from before k and the rest from after, nearest in time first.
     """
     size = 0
     for direction in range(2):
@@ -117,10 +151,35 @@ def derotated_constraints(
 ) -> tuple[NDArray[np.int64], Floats, Floats, Floats, NDArray[np.int64]]:
     """Constraints rows . spin = speeds from every stride-th event whose neighbours make a line.
 
-    normals (n, 3), reach and width are on the unit sphere (rad); reach_us is how far apart in time events of one line
-    may be. Returned: rows (m,) of the events, constraint rows (m, 3), speeds (m,) in rad/s along the line's normal,
-    their variances (m,) in (rad/s)^2, and on how many events (m,) each stands. Lines less sharp than `sharpest` are
-    left out. First come the events of one polarity, then those of the other.
+    Parameters
+    ----------
+    t_us : (n,) int64
+        Times of the events, rising.
+    normals : (n, 3) float64
+        Unit normals where the events are on the ball.
+    on : (n,) bool
+        Polarity.
+    spin_rad_s : (3,) float64
+        Guess of the spin.
+    stride : int
+        A constraint is looked for at every so many-th event.
+    reach, width : float
+        Distance of neighbours, and width of the fit's weights, on the unit sphere, rad.
+    reach_us : float
+        Time between neighbours.
+    sharpest : float
+        Lines less sharp than this are left out.
+
+    Returns
+    -------
+    events : (m,) int64
+        Indices of the events that have a constraint, first those OFF, then those ON.
+    rows : (m, 3) float64
+        Constraint rows e x n, n the line's normal in the tangent plane.
+    speeds, variances : (m,) float64
+        Velocity along the line's normal, rad/s, and its variance.
+    sizes : (m,) int64
+        Number of events behind each.
     """
     n = t_us.size
     common_us = t_us[n // 2] if n else 0
@@ -166,10 +225,24 @@ def derotated_constraints(
 
 @numba.njit(cache=True, nogil=True)
 def position_response(normals: Floats, sights: Floats, rows: Floats, spin_rad_s: Floats, radius_px: float) -> Floats:
-    """(n, 3) by how much speeds - rows . spin changes (rad/s) per px of error in the ball's x, y and radius.
+    """Change of speeds - rows . spin (rad/s) per px of error in the ball's x, y and radius: (n, 3) float64.
 
-    rows (n, 3) are e x n as from derotated_constraints, normals (n, 3) the e, sights (n, 3) unit vectors to the
-    camera, s. An error of the centre by d (px, across the line of sight) moves e by
+    Parameters
+    ----------
+    normals : (n, 3) float64
+        The unit normals e.
+    sights : (n, 3) float64
+        Unit vectors s to the camera.
+    rows : (n, 3) float64
+        Constraint rows e x n as from `derotated_constraints`.
+    spin_rad_s : (3,) float64
+        The spin.
+    radius_px : float
+        Radius r of the ball.
+
+    Notes
+    -----
+    An error of the centre by d (px, across the line of sight) moves e by
 
         -d/r + s (e . d) / (r e . s)
 

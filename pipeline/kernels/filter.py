@@ -1,4 +1,4 @@
-"""STC and TRAIL: which events of a pixel's bursts go on (supplement, section 'Filters').
+"""STC and TRAIL: filters of the bursts of a pixel (supplement, section 'Filters').
 
 Per pixel only its last event counts, passed or not: whether it had the same polarity and how long ago it was.
 
@@ -31,7 +31,7 @@ AHEAD = np.uint64(64)
 
 @njit(cache=True, nogil=True)
 def _passes(mode: int, same: bool, pause_us: int, threshold_us: int, passed_before: bool) -> bool:
-    """Whether an event passes; same = polarity of the pixel's last event, pause_us = time since then."""
+    """Decide whether an event passes; same = polarity of the pixel's last event, pause_us = time since then."""
     if mode == STC:
         return same & (pause_us <= threshold_us)
     if mode == TRAIL:
@@ -54,11 +54,27 @@ def filter_events(
     logo_mode: int,
     logo_threshold_us: int,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Rows of the events that the first filter passes and of those that the logo's passes; updates last.
+    """Apply the surface's and the logo's filter to events in order of time; writes into `last` only.
 
-    last : (height x width,) int64, the pixels' states, NEVER at the start
-    t_us, x_px, y_px, on : (n,) columns of the events, in order of time; returns two rising (m,) int64
-    Both filters in one go, because they share the pixels' last events and fetching these is most of the work.
+    Both in one go, because they share the pixels' last events and fetching these is most of the work.
+
+    Parameters
+    ----------
+    last : (height x width,) int64
+        The pixels' states, NEVER at the start.
+    width_px : int
+        Width of the image.
+    t_us, x_px, y_px, on : (n,) int64, uint16, uint16, bool
+        The events.
+    mode, logo_mode : int
+        OFF, STC, TRAIL or STC_CUT_TRAIL.
+    threshold_us, logo_threshold_us : int
+        Threshold of each filter.
+
+    Returns
+    -------
+    rows, logo_rows : (m,) int64
+        Rising indices of the events that each filter passes.
     """
     # Unsigned indices need no check for negative ones: a quarter faster.
     count, width = np.uint64(t_us.size), np.uint64(width_px)

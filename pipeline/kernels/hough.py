@@ -1,4 +1,4 @@
-"""Circles in an image: the Hough vote and its peak (section 3.1)."""
+"""Hough transform for circles: votes, peak and its refinement (section 3.1)."""
 
 from __future__ import annotations
 
@@ -20,11 +20,16 @@ def vote(
     y0_px: int,
     radius0_px: int,
 ) -> None:
-    """Hough circle transform: each pixel votes for every circle that runs through it; adds into votes.
+    """Let each pixel vote for every circle that runs through it; adds into `votes` only.
 
-    votes : (height, width, radii) uint16; votes[b, a, k] counts the pixels whose distance from the centre
-        (x0 + a, y0 + b) rounds to radius0 + k, k >= 0
-    x_px, y_px : (n,) int64, the pixels
+    Parameters
+    ----------
+    votes : (height, width, radii) uint16
+        votes[b, a, k] counts the pixels whose distance from the centre (x0 + a, y0 + b) rounds to radius0 + k, k >= 0.
+    x_px, y_px : (n,) int64
+        The pixels.
+    x0_px, y0_px, radius0_px : int
+        Centre and radius of votes[0, 0, 0].
     """
     height, width, radii = votes.shape
     reach = radius0_px + radii - 1
@@ -48,7 +53,7 @@ def vote(
 
 @njit(cache=True, nogil=True)
 def peak(votes: Votes, radius0_px: int) -> tuple[float, int, int, int]:
-    """The best supported circle: (support, a, b, k), its indices in the votes.
+    """Best supported circle: (support, a, b, k), its indices in the votes.
 
     The support is votes^2 / (2 pi radius): the number of votes times the share of the outline that they fill,
     so that neither a short arc of a large circle nor a full but tiny one wins. (0, 0, 0, 0) without votes.
@@ -103,10 +108,24 @@ def active_cells(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Cells of cell_px x cell_px pixels in which one of these pixels is at least `least` in `values`.
 
-    values : (height, width) uint8, a surface
-    Returns columns and rows (m,) int64 of the cells, rising by row, then column. Cells without an active
-    neighbour among their eight are left out: what remains of the noise is isolated. No cells with fewer than
-    eight bright events: the most frequent case, answered without making the grid.
+    Cells without an active neighbour among their eight are left out: what remains of the noise is isolated.
+
+    Parameters
+    ----------
+    values : (height, width) uint8
+        A surface.
+    x_px, y_px : (n,) uint16
+        Pixels of events.
+    least : int
+        Value from which a pixel counts as bright.
+    cell_px : int
+        Width of a cell.
+
+    Returns
+    -------
+    columns, rows : (m,) int64
+        The cells, rising by row, then column. None with fewer than eight bright events: the most frequent case,
+        answered without making the grid.
     """
     bright = 0
     for i in range(x_px.size):
@@ -141,7 +160,7 @@ def active_cells(
 
 @njit(cache=True, nogil=True)
 def refined(votes: Votes, a: int, b: int, k: int) -> tuple[float, float, float]:
-    """(a, b, k) of a peak to sub-pixel: the centre of mass of the squared votes in the 3 x 3 x 3 around it."""
+    """Peak (a, b, k) to sub-pixel: the centre of mass of the squared votes in the 3 x 3 x 3 around it."""
     height, width, radii = votes.shape
     total, sum_a, sum_b, sum_k = 0.0, 0.0, 0.0, 0.0
     for j in range(max(0, b - 1), min(height, b + 2)):
@@ -169,10 +188,21 @@ def best_circle(
     radius0_px: int,
     radii: int,
 ) -> tuple[float, float, float, float]:
-    """The circle through these pixels with the best support: (centre x, y, radius, share of its outline that voted).
+    """Circle through these pixels with the best support.
 
-    The centre lies in the window at (left, top) of this width and height, the radius rounds to one of so many from
-    radius0 on. All 0 without votes.
+    Parameters
+    ----------
+    x_px, y_px : (n,) int64
+        The pixels.
+    left_px, top_px, width_px, height_px : int
+        Window of the centre.
+    radius0_px, radii : int
+        The radius rounds to one of so many from radius0 on.
+
+    Returns
+    -------
+    x_px, y_px, radius_px, share : float
+        Centre, radius, and share of the outline that voted. All 0 without votes.
     """
     votes = np.zeros((height_px, width_px, radii), np.uint16)
     vote(votes, x_px, y_px, left_px, top_px, radius0_px)
@@ -197,6 +227,6 @@ def best_in_window(
     radius0_px: int,
     radii: int,
 ) -> tuple[float, float, float, float]:
-    """`best_circle` through the `bright_pixels` of a window whose first pixel is (x0, y0), in a square of centres."""
+    """Circle (see `best_circle`) through the `bright_pixels` of a window whose first pixel is (x0, y0)."""
     xs, ys = bright_pixels(window, least, most_pixels)
     return best_circle(xs + x0_px, ys + y0_px, left_px, top_px, side_px, side_px, radius0_px, radii)

@@ -9,7 +9,7 @@ Floats = NDArray[np.float64]
 
 
 def flow_colours(vx_px_s: Floats, vy_px_s: Floats, bound_px_s: float) -> NDArray[np.uint8]:
-    """(..., 3) uint8 RGB of velocities; white stands still, full colour moves at bound_px_s or faster.
+    """Colours (..., 3) uint8 RGB of velocities; white stands still, full colour moves at bound_px_s or faster.
 
     Hue 0 (red) moves to +x (right) and hue rises towards +y (down in the image).
     """
@@ -23,7 +23,7 @@ def flow_colours(vx_px_s: Floats, vy_px_s: Floats, bound_px_s: float) -> NDArray
 
 
 def hsv_wheel(size_px: int) -> NDArray[np.uint8]:
-    """(size_px, size_px, 3) uint8 colour wheel: velocity zero in the middle, the bound at the rim, black outside."""
+    """Colour wheel (size_px, size_px, 3) uint8: zero velocity in the middle, the bound at the rim, black outside."""
     across = (2.0 * np.arange(size_px) + 1.0) / size_px - 1.0
     vx, vy = np.meshgrid(across, across)
     wheel = flow_colours(vx, vy, 1.0)
@@ -41,10 +41,20 @@ def hsv_image(
     radius_px: float,
     size_px: int,
 ) -> NDArray[np.uint8]:
-    """(size_px, size_px, 3) uint8 image of the ball's disc with the mean flow of every cell that has any.
+    """Image (size_px, size_px, 3) uint8 of the ball's disc with the mean flow of every cell that has any.
 
-    x_px, y_px : (n,) places relative to the ball's centre; radius_px is the half width of the picture
-    Cells without flow are black; rows outside the picture are left out.
+    Parameters
+    ----------
+    x_px, y_px : (n,) float64
+        Places relative to the ball's centre; those outside the picture are left out.
+    vx_px_s, vy_px_s : (n,) float64
+        Flow.
+    bound_px_s : float
+        Speed of full colour.
+    radius_px : float
+        Half width of the picture.
+    size_px : int
+        Width of the image. Cells without flow are black.
     """
     scale = size_px / (2.0 * radius_px)
     column, row = np.floor((x_px + radius_px) * scale), np.floor((y_px + radius_px) * scale)

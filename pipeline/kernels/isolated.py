@@ -36,7 +36,7 @@ def _load(line: Line, values: NDArray[np.uint8], y: int, x0: int) -> None:
 
 @njit(cache=True, nogil=True)
 def _ring(ring: Line, a: Line, b: Line, c: Line, d: Line) -> None:
-    """For each 4 x 4 block of four lines: not 0 where one of its 12 outer pixels is set."""
+    """Write, for each 4 x 4 block of four lines, not 0 into `ring` where one of its 12 outer pixels is set."""
     for n in range(np.uint64(ring.size)):
         i = np.uint64(n)
         ends = a[i] | a[i + THREE] | b[i] | b[i + THREE] | c[i] | c[i + THREE] | d[i] | d[i + THREE]
@@ -54,7 +54,7 @@ def _spare_unless_full(ring: Line, b: Line, c: Line) -> None:
 
 @njit(cache=True, nogil=True)
 def _keep(out: Line, line: Line, above: Line, below: Line) -> None:
-    """The line less its pixels in a window with an empty ring; above, below: rings of the windows there."""
+    """Write the line without its pixels in a window with an empty ring; above, below: rings of the windows there."""
     for n in range(np.uint64(out.size)):
         i = np.uint64(n)
         value = line[i + TWO]
@@ -66,11 +66,18 @@ def _keep(out: Line, line: Line, above: Line, below: Line) -> None:
 def copy_cleaned(
     window: NDArray[np.uint8], values: NDArray[np.uint8], x0_px: int, y0_px: int, full_blocks_only: bool
 ) -> None:
-    """Write the window of values that starts at column x0, row y0, without its isolated pixels.
+    """Write a window of `values` without its isolated pixels into `window`, and into nothing else.
 
-    window, values : (rows, columns) and (height, width) uint8, the window within the image; not 0 = occupied
-    full_blocks_only : the printed kernel; otherwise the rule of the text
-    Pixels of values around the window count as neighbours.
+    Parameters
+    ----------
+    window : (rows, columns) uint8
+        Output, within the image.
+    values : (height, width) uint8
+        The image; not 0 = occupied. Pixels around the window count as neighbours.
+    x0_px, y0_px : int
+        First column and row of the window.
+    full_blocks_only : bool
+        Use the printed kernel; otherwise the rule of the text.
     """
     rows, columns = window.shape
     lines = np.empty((4, columns + 4), np.uint8)  # the last four rows, from two columns left to two right

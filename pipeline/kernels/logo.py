@@ -20,12 +20,31 @@ def logo_rows(
     rim_px: float,
     ring_px: tuple[float, float],
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_], int, int]:
-    """Rows (m,) int64 of the logo's events, which of them (m,) are inside the mask, and the outline's two polarities.
+    """Select the events inside the moving mask.
 
-    reference_us : the time stamp that an event of the scene with the ball at `centre_px` carries
-    mask_px : radius within which every event counts
-    rim_px : radius within which those count that are OFF ahead of the centre or ON behind it, or all if nothing moves
-    ring_px : inner and outer radius of the ring of which the ON events ahead and OFF behind are counted, and the others
+    Parameters
+    ----------
+    t_us, x_px, y_px, on : (n,) int64, uint16, uint16, bool
+        The events.
+    reference_us : float
+        The time stamp that an event of the scene with the ball at `centre_px` carries.
+    centre_px, velocity_px_s : (x, y) float
+        Centre of the ball at the reference time, and its velocity.
+    mask_px : float
+        Radius within which every event counts.
+    rim_px : float
+        Radius within which those count that are OFF ahead of the centre or ON behind it, or all if nothing moves.
+    ring_px : (inner, outer) float
+        Radii of the annulus in which the outline's events are counted.
+
+    Returns
+    -------
+    rows : (m,) int64
+        Indices of the logo's events.
+    inside : (m,) bool
+        Which of them are inside the mask.
+    likes, others : int
+        Events in the annulus that are ON ahead or OFF behind, as a bright ball's outline, and the others.
     """
     rows, inside = np.empty(t_us.size, np.int64), np.empty(t_us.size, np.bool_)
     count, likes, others = 0, 0, 0
@@ -57,9 +76,18 @@ def outline_like(
     velocity_px_s: tuple[float, float],
     least_radius_px: float,
 ) -> NDArray[np.bool_]:
-    """(n,) bool: ON ahead of the centre or OFF behind it, within 60 degrees of the motion, this far out or more.
+    """Mark the events (n,) that look like the outline's: ON ahead of the centre or OFF behind it, far out.
 
-    x_px, y_px : (n,), relative to the ball's centre
+    Parameters
+    ----------
+    x_px, y_px : (n,) float64
+        Relative to the ball's centre.
+    on : (n,) bool
+        Polarity.
+    velocity_px_s : (x, y) float
+        Velocity of the ball; events within 60 degrees of it (or of its opposite) are marked.
+    least_radius_px : float
+        Distance from the centre from which events are marked.
     """
     out = np.empty(x_px.size, np.bool_)
     vx, vy = velocity_px_s

@@ -28,7 +28,7 @@ def near_outline(
     most_events: int,
     ahead_only: bool,
 ) -> NDArray[np.int64]:
-    """(m,) int64 indices of events within gate_px of the moving outline, thinned evenly to most_events.
+    """Indices (m,) int64 of events within gate_px of the moving outline, thinned evenly to most_events.
 
     With ahead_only, only those on the half of the outline that moves outwards.
     """
@@ -49,7 +49,7 @@ def near_outline(
 
 @njit(cache=True, nogil=True)
 def residuals(circle: Floats, ellipticity: Floats, tau_s: Floats, x_px: Floats, y_px: Floats) -> Floats:
-    """(n,) float64 distance (px, > 0 outside) of events from the outline."""
+    """Distances (n,) in px of events from the outline, > 0 outside."""
     out = np.empty(tau_s.size, np.float64)
     for i in range(tau_s.size):
         dx = x_px[i] - (circle[0] + circle[2] * tau_s[i])
@@ -161,15 +161,31 @@ def fit_circle(
     floor_px: float,
     most_rounds: int,
 ) -> tuple[Floats, Floats, float, float]:
-    """Robust fit of a moving circle to events: Gauss-Newton steps with Tukey's biweight.
+    """Fit a moving circle to events: Gauss-Newton steps with Tukey's biweight.
 
-    start : (5,) circle to begin with
-    prior_std : (5,) 1 sigma by which the answer may leave it (large = freely, 0 = not at all: zeros for the
-        velocity give the fit of a circle at rest)
-    gate_px : Tukey's cut-off in the first round; it then shrinks to 4.7 robust sigma, by half a round at
-        least (so that the sharp outline wins over a band of late events inside it), down to floor_px
-    Returns the circle, its covariance (5, 5) from the scatter of the residuals alone, that scatter (1 sigma,
-    px) and the sum of the weights (about the number of events used).
+    Parameters
+    ----------
+    start : (5,) float64
+        Circle to begin with.
+    prior_std : (5,) float64
+        1 sigma by which the answer may leave it (large = freely, 0 = not at all: zeros for the velocity give the fit of
+        a circle at rest).
+    ellipticity, tau_s, x_px, y_px : (2,), (n,), (n,), (n,) float64
+        Shape of the outline, and the events.
+    gate_px, floor_px : float
+        Tukey's cut-off in the first round; it then shrinks to 4.7 robust sigma, by half a round at least (so that the
+        sharp outline wins over a band of late events inside it), down to floor_px.
+    most_rounds : int
+        Number of steps.
+
+    Returns
+    -------
+    circle, covariance : (5,), (5, 5) float64
+        The covariance is from the scatter of the residuals alone.
+    scatter_px : float
+        That scatter, 1 sigma.
+    weight : float
+        Sum of the weights, about the number of events used.
     """
     circle = start.copy()
     information, gradient = np.zeros((5, 5)), np.zeros(5)
@@ -203,84 +219,6 @@ def fit_circle(
 
 
 @njit(cache=True, nogil=True)
-def support(
-    circle: Floats,
-    ellipticity: Floats,
-    tau_s: Floats,
-    x_px: Floats,
-    y_px: Floats,
-    on: NDArray[np.bool_],
-    width_px: int,
-    height_px: int,
-    tolerance_px: float,
-    early_px: float,
-    bins: int,
-) -> Floats:
-    """How well events support a moving outline: (8,) float64
-
-    [events on the outline, share of ON among those ahead of the centre, the same behind it,
-     share of the visible outline ahead that has events, the same behind it, share of the whole outline that is
-     visible, events just outside (one to four tolerances beyond), events inside].
-    On the outline = within tolerance_px of it, and behind the centre up to early_px inside.
-    The outline is cut into `bins` sectors, which count from two events on, from one where there are fewer than
-    three a sector; sectors that the motion passes at a grazing angle (|cos| < 0.25)
-    yield few events and do not count. Shares of nothing are 0.
-    """
-    counts = np.zeros(bins, np.int64)
-    ahead_on, ahead, behind_on, behind, outside, inside = 0, 0, 0, 0, 0, 0
-    error = residuals(circle, ellipticity, tau_s, x_px, y_px)
-    for i in range(tau_s.size):
-        if error[i] > tolerance_px:
-            outside += error[i] < 4.0 * tolerance_px
-            continue
-        dx = x_px[i] - (circle[0] + circle[2] * tau_s[i])
-        dy = y_px[i] - (circle[1] + circle[3] * tau_s[i])
-        is_ahead = dx * circle[2] + dy * circle[3] > 0.0
-        if error[i] < -(tolerance_px if is_ahead else max(tolerance_px, early_px)):
-            inside += 1
-            continue
-        if is_ahead:
-            ahead += 1
-            ahead_on += on[i]
-        else:
-            behind += 1
-            behind_on += on[i]
-        counts[int((math.atan2(dy, dx) / (2.0 * math.pi) + 1.0) * bins) % bins] += 1
-    speed = math.hypot(circle[2], circle[3]) + 1e-9
-    least = 2 if ahead + behind >= 3 * bins else 1
-    seen = np.zeros(2)
-    visible = np.zeros(2)
-    in_view = 0
-    for b in range(bins):
-        angle = 2.0 * math.pi * (b + 0.5) / bins
-        nx = math.cos(angle)
-        ny = math.sin(angle)
-        x = circle[0] + circle[4] * nx
-        y = circle[1] + circle[4] * ny
-        if x < 0.0 or y < 0.0 or x > width_px - 1 or y > height_px - 1:
-            continue
-        in_view += 1
-        across = (nx * circle[2] + ny * circle[3]) / speed
-        if abs(across) < 0.25:
-            continue
-        side = 0 if across > 0.0 else 1
-        visible[side] += 1.0
-        seen[side] += counts[b] >= least
-    return np.array(
-        [
-            float(ahead + behind),
-            ahead_on / max(ahead, 1),
-            behind_on / max(behind, 1),
-            seen[0] / max(visible[0], 1.0),
-            seen[1] / max(visible[1], 1.0),
-            in_view / bins,
-            float(outside),
-            float(inside),
-        ]
-    )
-
-
-@njit(cache=True, nogil=True)
 def outside_circle(
     circle: Floats,
     t_us: NDArray[np.int64],
@@ -289,7 +227,7 @@ def outside_circle(
     reference_us: float,
     margin_px: float,
 ) -> NDArray[np.int64]:
-    """(m,) int64 indices of events more than margin_px outside the moving circle."""
+    """Indices (m,) int64 of events more than margin_px outside the moving circle."""
     chosen = np.empty(t_us.size, np.int64)
     m = 0
     limit = (circle[4] + margin_px) ** 2
@@ -300,3 +238,34 @@ def outside_circle(
         chosen[m] = i
         m += dx * dx + dy * dy > limit
     return chosen[:m].copy()
+
+
+@njit(cache=True, nogil=True)
+def in_square(
+    x_px: NDArray[np.uint16], y_px: NDArray[np.uint16], centre_x_px: float, centre_y_px: float, reach_px: float
+) -> NDArray[np.int64]:
+    """Indices (m,) int64 of events within reach_px of a place, in both columns and rows."""
+    chosen = np.empty(x_px.size, np.int64)
+    m = 0
+    for i in range(x_px.size):
+        chosen[m] = i
+        m += (abs(x_px[i] - centre_x_px) <= reach_px) & (abs(y_px[i] - centre_y_px) <= reach_px)
+    return chosen[:m].copy()
+
+
+@njit(cache=True, nogil=True)
+def relative_events(
+    chosen: NDArray[np.int64],
+    t_us: NDArray[np.int64],
+    x_px: NDArray[np.uint16],
+    y_px: NDArray[np.uint16],
+    reference_us: float,
+) -> tuple[Floats, Floats, Floats]:
+    """Seconds after the reference time, columns and rows of the chosen events, (m,) float64 each."""
+    tau_s, x, y = np.empty(chosen.size), np.empty(chosen.size), np.empty(chosen.size)
+    for k in range(chosen.size):
+        i = chosen[k]
+        tau_s[k] = (t_us[i] - reference_us) * 1e-6
+        x[k] = x_px[i]
+        y[k] = y_px[i]
+    return tau_s, x, y

@@ -1,6 +1,6 @@
-"""The ball's outline out of the events: its velocity by vote, then the fit with what supports it.
+"""Outline of the ball in the events: its velocity by vote, then the fit with what supports it.
 
-`circle`, `ellipticity` and tau_s as in the contour kernels.
+`circle`, `ellipticity` and tau_s as in `moving_circle`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from .moving_circle import fit_circle, near_outline, support
+from .moving_circle import fit_circle, in_square, near_outline, relative_events, residuals
 
 Floats = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ def _support_of_velocity(
     sign: Floats,
     gate_px: float,
 ) -> float:
-    """One cell of `vote_velocity`; sign (n,): +1 for ON, -1 for OFF events."""
+    """Vote for one velocity, see `vote_velocity`; sign (n,): +1 for ON, -1 for OFF events."""
     x0, y0, radius = circle[0], circle[1], circle[4]
     total = 0.0
     for e in range(tau_s.size):
@@ -68,14 +68,24 @@ def vote_velocity(
     step_px_s: float,
     gate_px: float,
 ) -> None:
-    """Hough vote for the velocity of a circle (5,) float64 around the one it has; adds into votes.
-
-    votes : (2 m + 1, 2 m + 1) float64; votes[m + j, m + i] is for the circle's velocity plus
-        (i, j) * step_px_s, within the disc of radius m
+    """Hough vote for the velocity of a circle around the one it has; adds into `votes` only.
 
     An event counts by its nearness to the outline moved to its time, plus where the outline moves outwards and
     its polarity is ON or inwards and OFF, minus for the opposite: |votes| is the support of a ball brighter (or,
     where negative, darker) than its background that moves so.
+
+    Parameters
+    ----------
+    votes : (2 m + 1, 2 m + 1) float64
+        votes[m + j, m + i] is for the circle's velocity plus (i, j) * step_px_s, within the disc of radius m.
+    circle : (5,) float64
+        The circle.
+    tau_s, x_px, y_px, on : (n,) float64, float64, float64, bool
+        The events.
+    step_px_s : float
+        Step of the velocity.
+    gate_px : float
+        Distance from the outline at which an event no longer counts.
     """
     m = votes.shape[0] // 2
     sign = np.where(on, 1.0, -1.0)
@@ -86,6 +96,98 @@ def vote_velocity(
             vx = circle[2] + i * step_px_s
             vy = circle[3] + j * step_px_s
             votes[m + j, m + i] += _support_of_velocity(circle, vx, vy, tau_s, x_px, y_px, sign, gate_px)
+
+
+@njit(cache=True, nogil=True)
+def support(
+    circle: Floats,
+    ellipticity: Floats,
+    tau_s: Floats,
+    x_px: Floats,
+    y_px: Floats,
+    on: NDArray[np.bool_],
+    width_px: int,
+    height_px: int,
+    tolerance_px: float,
+    early_px: float,
+    bins: int,
+) -> Floats:
+    """Support of a moving outline by events.
+
+    Parameters
+    ----------
+    circle, ellipticity : (5,), (2,) float64
+        The outline.
+    tau_s, x_px, y_px, on : (n,) float64, float64, float64, bool
+        The events.
+    width_px, height_px : int
+        Size of the image.
+    tolerance_px, early_px : float
+        On the outline = within tolerance_px of it, and behind the centre up to early_px inside.
+    bins : int
+        The outline is cut into so many sectors, which count from two events on, from one where there are fewer than
+        three a sector; sectors that the motion passes at a grazing angle (|cos| < 0.25) yield few events and do not
+        count.
+
+    Returns
+    -------
+    (8,) float64
+        [events on the outline, share of ON among those ahead of the centre, the same behind it,
+        share of the visible outline ahead that has events, the same behind it, share of the whole outline that is
+        visible, events just outside (one to four tolerances beyond), events inside]. Shares of nothing are 0.
+    """
+    counts = np.zeros(bins, np.int64)
+    ahead_on, ahead, behind_on, behind, outside, inside = 0, 0, 0, 0, 0, 0
+    error = residuals(circle, ellipticity, tau_s, x_px, y_px)
+    for i in range(tau_s.size):
+        if error[i] > tolerance_px:
+            outside += error[i] < 4.0 * tolerance_px
+            continue
+        dx = x_px[i] - (circle[0] + circle[2] * tau_s[i])
+        dy = y_px[i] - (circle[1] + circle[3] * tau_s[i])
+        is_ahead = dx * circle[2] + dy * circle[3] > 0.0
+        if error[i] < -(tolerance_px if is_ahead else max(tolerance_px, early_px)):
+            inside += 1
+            continue
+        if is_ahead:
+            ahead += 1
+            ahead_on += on[i]
+        else:
+            behind += 1
+            behind_on += on[i]
+        counts[int((math.atan2(dy, dx) / (2.0 * math.pi) + 1.0) * bins) % bins] += 1
+    speed = math.hypot(circle[2], circle[3]) + 1e-9
+    least = 2 if ahead + behind >= 3 * bins else 1
+    seen = np.zeros(2)
+    visible = np.zeros(2)
+    in_view = 0
+    for b in range(bins):
+        angle = 2.0 * math.pi * (b + 0.5) / bins
+        nx = math.cos(angle)
+        ny = math.sin(angle)
+        x = circle[0] + circle[4] * nx
+        y = circle[1] + circle[4] * ny
+        if x < 0.0 or y < 0.0 or x > width_px - 1 or y > height_px - 1:
+            continue
+        in_view += 1
+        across = (nx * circle[2] + ny * circle[3]) / speed
+        if abs(across) < 0.25:
+            continue
+        side = 0 if across > 0.0 else 1
+        visible[side] += 1.0
+        seen[side] += counts[b] >= least
+    return np.array(
+        [
+            float(ahead + behind),
+            ahead_on / max(ahead, 1),
+            behind_on / max(behind, 1),
+            seen[0] / max(visible[0], 1.0),
+            seen[1] / max(visible[1], 1.0),
+            in_view / bins,
+            float(outside),
+            float(inside),
+        ]
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -102,57 +204,42 @@ def fit_outline(
     width_px: int,
     height_px: int,
 ) -> tuple[Floats, Floats, float, Floats]:
-    """Fit the half of the outline ahead near an expected circle, and what supports the fit.
+    """Fit the half of the outline ahead near an expected circle, and count what supports the fit.
 
-    Events within gate_px of the expected outline take part; prior_std as for `fit_circle`.
-    Returns the circle (5,), its covariance (5, 5), the scatter in px and what `support` says (8,); the circle is NaN
-    with too few events, or where these are a band rather than an outline.
+    Parameters
+    ----------
+    expected, prior_std, ellipticity : (5,), (5,), (2,) float64
+        As for `fit_circle`.
+    t_us, x_px, y_px, on : (n,) int64, uint16, uint16, bool
+        The events; those within gate_px of the expected outline take part.
+    reference_us, gate_px : float
+        Reference time and gate.
+    width_px, height_px : int
+        Size of the image.
+
+    Returns
+    -------
+    circle, covariance : (5,), (5, 5) float64
+        NaN circle with too few events, or where these are a band rather than an outline.
+    scatter_px : float
+        1 sigma of the residuals.
+    support : (8,) float64
+        See `support`.
     """
     chosen = near_outline(expected, t_us, x_px, y_px, reference_us, gate_px, MOST_EVENTS, True)
     nothing = np.full(5, np.nan), np.zeros((5, 5)), 0.0, np.zeros(8)
     if chosen.size < LEAST_EVENTS:
         return nothing
-    tau_s, x, y = _relative(chosen, t_us, x_px, y_px, reference_us)
+    tau_s, x, y = relative_events(chosen, t_us, x_px, y_px, reference_us)
     circle, covariance, scatter, weight = fit_circle(expected, prior_std, ellipticity, tau_s, x, y, gate_px, 0.6, 9)
     if not (np.all(np.isfinite(circle)) and circle[4] > 1.0 and weight >= LEAST_WEIGHT and scatter <= MOST_SCATTER_PX):
         return nothing
     early_px = EARLY_SHARE * circle[4]
     around_px = max(4.0 * ON_OUTLINE_PX, early_px)
     around = near_outline(circle, t_us, x_px, y_px, reference_us, around_px, MOST_AROUND, False)
-    tau_s, x, y = _relative(around, t_us, x_px, y_px, reference_us)
+    tau_s, x, y = relative_events(around, t_us, x_px, y_px, reference_us)
     found = support(circle, ellipticity, tau_s, x, y, on[around], width_px, height_px, ON_OUTLINE_PX, early_px, SECTORS)
     return circle, covariance, scatter, found
-
-
-@njit(cache=True, nogil=True)
-def _relative(
-    chosen: NDArray[np.int64],
-    t_us: NDArray[np.int64],
-    x_px: NDArray[np.uint16],
-    y_px: NDArray[np.uint16],
-    reference_us: float,
-) -> tuple[Floats, Floats, Floats]:
-    """Seconds after the reference time, columns and rows of the chosen events, (m,) float64 each."""
-    tau_s, x, y = np.empty(chosen.size), np.empty(chosen.size), np.empty(chosen.size)
-    for k in range(chosen.size):
-        i = chosen[k]
-        tau_s[k] = (t_us[i] - reference_us) * 1e-6
-        x[k] = x_px[i]
-        y[k] = y_px[i]
-    return tau_s, x, y
-
-
-@njit(cache=True, nogil=True)
-def in_square(
-    x_px: NDArray[np.uint16], y_px: NDArray[np.uint16], centre_x_px: float, centre_y_px: float, reach_px: float
-) -> NDArray[np.int64]:
-    """(m,) int64 indices of events within reach_px of a place, in both columns and rows."""
-    chosen = np.empty(x_px.size, np.int64)
-    m = 0
-    for i in range(x_px.size):
-        chosen[m] = i
-        m += (abs(x_px[i] - centre_x_px) <= reach_px) & (abs(y_px[i] - centre_y_px) <= reach_px)
-    return chosen[:m].copy()
 
 
 @njit(cache=True, nogil=True)
@@ -168,11 +255,29 @@ def find_moving_circle(
     span_s: float,
     fastest_px_s: float,
 ) -> tuple[Floats, float]:
-    """The circle (5,) at this place and of this radius that moves as most events say, and the width of the last vote.
+    """Circle at this place and of this radius that moves as most events say.
 
-    span_s : how far back the events go
-    Two rounds: all velocities up to fastest_px_s with an outline as wide as the steps, then between them. The second
-    width is what a Hough circle may be off, about 2 px on balls of 20 px. The circle is NaN with too few events.
+    Two rounds: all velocities up to fastest_px_s with an outline as wide as the steps, then between them.
+
+    Parameters
+    ----------
+    x_px, y_px, radius_px : float
+        Place and radius at the reference time.
+    t_us, xs_px, ys_px, on : (n,) int64, uint16, uint16, bool
+        The events.
+    reference_us : float
+        Reference time.
+    span_s : float
+        Time that the events go back.
+    fastest_px_s : float
+        Bound of the velocity.
+
+    Returns
+    -------
+    circle : (5,) float64
+        NaN with too few events.
+    gate_px : float
+        Width of the last vote: what a Hough circle may be off, about 2 px on balls of 20 px.
     """
     circle = np.array([x_px, y_px, 0.0, 0.0, radius_px])
     chosen = in_square(xs_px, ys_px, x_px, y_px, 1.3 * radius_px + fastest_px_s * span_s)
@@ -182,7 +287,7 @@ def find_moving_circle(
     if chosen.size < LEAST_EVENTS:
         circle[:] = np.nan
         return circle, gate
-    tau_s, x, y = _relative(chosen, t_us, xs_px, ys_px, reference_us)
+    tau_s, x, y = relative_events(chosen, t_us, xs_px, ys_px, reference_us)
     for turn in range(2):
         if turn == 1:
             gate, span = max(2.0, 0.15 * radius_px), 0.3 * radius_px / span_s

@@ -1,4 +1,4 @@
-"""Normal flow: a plane t = a x + b y + c through each event's neighbours in space and time, robustly.
+"""Normal flow by plane fitting: t = a x + b y + c through each event's neighbours in space and time, robustly.
 
 The gradient (a, b) of the time at which an edge arrives points across the edge, and its length is one over the speed
 of the edge (Benosman et al., "Event-Based Visual Flow", IEEE TNNLS 2014).
@@ -12,6 +12,10 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+NEIGHBOURS = 64  # at most; a logo's edge leaves 10 to 40 events of one polarity in three pixels around an event
+FEWEST = 6  # points for the three unknowns of a plane: as many again to judge it by
+SPREAD_PX = 0.6  # two pixels wide: (1, 1) would be 0.5
+
 
 @numba.njit(cache=True, nogil=True)
 def near_in_time(
@@ -24,10 +28,23 @@ def near_in_time(
     reach_px: float,
     reach_us: float,
 ) -> int:
-    """Write the rows of event k's neighbours (k included) into `rows` and return how many there are.
+    """Write the indices of event k's neighbours (k included) into `rows`, and into nothing else.
 
-    A neighbour has k's polarity and lies within reach_px and reach_us. Of those before and of those after k, at most
-    half the length of `rows` each, nearest in time first.
+    Parameters
+    ----------
+    rows : (m,) int64
+        Output: of the neighbours before and of those after k at most m / 2 each, nearest in time first.
+    k : int
+        The event.
+    t_us, x_px, y_px, on : (n,) int64, float64, float64, bool
+        The events, in order of time.
+    reach_px, reach_us : float
+        A neighbour has k's polarity and lies within these.
+
+    Returns
+    -------
+    int
+        Number of indices written.
     """
     half, n = rows.size // 2, t_us.size
     reach2 = reach_px * reach_px
@@ -55,11 +72,30 @@ def near_in_time(
 def fit_plane(
     x_px: Floats, y_px: Floats, t_us: Floats, scales_us: Floats, fewest: int, spread_px: float
 ) -> tuple[float, float, float, float]:
-    """Gradient (a, b) in us/px, rms of the residuals in us and the weight behind the plane; weight 0 where none fits.
+    """Fit a plane t = a x + b y + c, robustly.
 
     Weighted least squares, once with equal weights and then once a scale in scales_us with bisquare weights
-    (1 - (residual / scale)^2)^2, zero beyond the scale. There is no plane when fewer than `fewest` points have weight
-    or their spread (1 sigma) in some direction of the image is below spread_px.
+    (1 - (residual / scale)^2)^2, zero beyond the scale.
+
+    Parameters
+    ----------
+    x_px, y_px, t_us : (n,) float64
+        The points.
+    scales_us : (k,) float64
+        Widths of the weights.
+    fewest : int
+        Points that must have weight.
+    spread_px : float
+        Least spread of the points (1 sigma) in every direction of the image.
+
+    Returns
+    -------
+    a, b : float
+        Gradient, us/px.
+    rms_us : float
+        Residuals.
+    weight : float
+        Sum of the weights; 0 where there is no plane.
     """
     a, b, c, rms, total = 0.0, 0.0, 0.0, 0.0, 0.0
     for stage in range(scales_us.size + 1):
@@ -112,11 +148,32 @@ def plane_flow(
     scales_us: Floats,
     speed_max_px_s: float,
 ) -> tuple[NDArray[np.int64], Floats, Floats]:
-    """Normal flow of every stride-th event of first..last-1: rows (m,) that have it, unit directions (m, 2), px/s (m,).
+    """Normal flow of every stride-th event of first..last-1; the neighbours come from all events.
 
-    The neighbours come from all events. A plane needs FEWEST points spread by SPREAD_PX; its residuals may not
-    exceed a third of the last scale (twice that and a second edge is in the fit), and its speed lies in
-    0..speed_max_px_s.
+    A plane needs FEWEST points spread by SPREAD_PX; its residuals may not exceed a third of the last scale (twice that
+    and a second edge is in the fit), and its speed lies in 0..speed_max_px_s.
+
+    Parameters
+    ----------
+    t_us, x_px, y_px, on : (n,) int64, float64, float64, bool
+        The events, in order of time.
+    first, last, stride : int
+        Events that are asked for.
+    reach_px, reach_us : float
+        Neighbourhood, see `near_in_time`.
+    scales_us : (k,) float64
+        See `fit_plane`.
+    speed_max_px_s : float
+        Bound of the speed.
+
+    Returns
+    -------
+    rows : (m,) int64
+        Indices of the events that have flow.
+    directions : (m, 2) float64
+        Unit vectors across the edge.
+    speeds : (m,) float64
+        px/s.
     """
     rows, found = np.empty(NEIGHBOURS, np.int64), np.empty(max(last - first, 0), np.int64)
     directions, speeds = np.empty((found.size, 2)), np.empty(found.size)
@@ -137,8 +194,3 @@ def plane_flow(
         directions[count, 0], directions[count, 1] = a / slope, b / slope
         count += 1
     return found[:count].copy(), directions[:count].copy(), speeds[:count].copy()
-
-
-NEIGHBOURS = 64  # at most; a logo's edge leaves 10 to 40 events of one polarity in three pixels around an event
-FEWEST = 6  # points for the three unknowns of a plane: as many again to judge it by
-SPREAD_PX = 0.6  # two pixels wide: (1, 1) would be 0.5

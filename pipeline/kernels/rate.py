@@ -1,4 +1,4 @@
-"""The rhythm of an event rate: moving average, low-pass, crossings, period (section 3.3)."""
+"""Periodicity of an event rate: moving average, low-pass, crossings, period (section 3.3)."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def moving_average(signal: Floats, weight: float) -> Floats:
 def low_passed(signal: Floats, cutoff_cycles: float) -> Floats:
     """Butterworth low-pass of second order, forward and then backward: (n,), nothing is shifted in time.
 
-    cutoff_cycles : cut-off in cycles per sample, between 0 and 0.5
-    Each pass starts from the steady state of its first value, so an end that is not zero rings little.
+    The cut-off is in cycles per sample, between 0 and 0.5. Each pass starts from the steady state of its first value,
+    so an end that is not zero rings little.
     """
     k = np.tan(np.pi * cutoff_cycles)
     scale = 1.0 / (1.0 + np.sqrt(2.0) * k + k * k)  # bilinear transform of 1 / (s^2 + sqrt(2) s + 1)
@@ -46,7 +46,7 @@ def low_passed(signal: Floats, cutoff_cycles: float) -> Floats:
 
 @numba.njit(cache=True, nogil=True)
 def falling_crossings(signal: Floats) -> Floats:
-    """Places (m,), in samples, where the signal falls from above zero to zero or below; linear in between."""
+    """Places (m,), in samples, of the falls from above zero to zero or below; linear in between."""
     places = np.empty(signal.size)
     count = 0
     for i in range(signal.size - 1):

@@ -26,11 +26,26 @@ def intersect_ball(
     centres_m: Floats,
     ball_radius_m: float,
 ) -> tuple[Floats, Floats]:
-    """Points (n, 3) in m and outward unit normals (n, 3) where rays (n, 3) meet the visible side of a moving ball.
+    """Intersect rays with the visible side of a moving ball.
 
-    centres_m : (k, 3), the ball's centre at k times spread evenly over first_us..last_us (in event time); linear
-        in between, the same throughout if k = 1
-    A ray that misses gives the point of the ball's outline nearest to it (normal perpendicular to the ray).
+    Parameters
+    ----------
+    rays : (n, 3) float64
+        Camera rays, any length.
+    t_us : (n,) int64
+        Time of each ray.
+    first_us, last_us : float
+        Times of the first and the last centre.
+    centres_m : (k, 3) float64
+        The ball's centre at k times spread evenly; linear in between, the same throughout if k = 1.
+    ball_radius_m : float
+        Radius of the ball.
+
+    Returns
+    -------
+    points_m, normals : (n, 3) float64
+        Points on the ball and outward unit normals, camera frame. A ray that misses gives the point of the ball's
+        outline nearest to it (normal perpendicular to the ray).
     """
     n, knots = rays.shape[0], centres_m.shape[0]
     points, normals = np.empty((n, 3)), np.empty((n, 3))
@@ -65,6 +80,15 @@ def surface_velocity(points_m: Floats, normals: Floats, vx_px_s: Floats, vy_px_s
 
     The two image components leave the velocity along the ray open; tangency, e . V = 0, settles it. On the visible
     side e . ray < 0, so the division is safe except on the outline itself.
+
+    Parameters
+    ----------
+    points_m, normals : (n, 3) float64
+        Points on the ball and outward unit normals, camera frame.
+    vx_px_s, vy_px_s : (n,) float64
+        Image velocities, the ball's own motion taken off.
+    focal_px : float
+        Focal length.
     """
     n = points_m.shape[0]
     velocity = np.empty((n, 3))
@@ -82,7 +106,7 @@ def surface_velocity(points_m: Floats, normals: Floats, vx_px_s: Floats, vy_px_s
 def spin_rows(points_m: Floats, normals: Floats, directions: Floats, focal_px: float, ball_radius_m: float) -> Floats:
     """Rows (n, 3) a with a . spin = image velocity along `directions` (n, 2), in px/s for a spin in rad/s.
 
-    d . J (spin x R e) = spin . (R e x J^T d).
+    From d . J (spin x R e) = spin . (R e x J^T d). The other arguments as in `surface_velocity`.
     """
     n = points_m.shape[0]
     rows = np.empty((n, 3))

@@ -1,4 +1,4 @@
-"""A spin from many linear constraints a . spin = b: a start by random samples, then robust least squares."""
+"""Spin from many linear constraints a . spin = b: a start by random samples, then robust least squares."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def solve3(m: Floats, b: Floats) -> tuple[Floats, float]:
 
 @numba.njit(cache=True, nogil=True)
 def support(rows: Floats, speeds: Floats, spin: Floats, share: float) -> float:
-    """How well a spin explains the constraints, 0..1: mean of 1 - (off / (share x speed))^2, zero beyond 1."""
+    """Agreement of a spin with the constraints, 0..1: mean of 1 - (off / (share x speed))^2, zero beyond 1."""
     total = 0.0
     for i in range(speeds.size):
         predicted = rows[i, 0] * spin[0] + rows[i, 1] * spin[1] + rows[i, 2] * spin[2]
@@ -40,10 +40,27 @@ def support(rows: Floats, speeds: Floats, spin: Floats, share: float) -> float:
 def sampled_spin(
     rows: Floats, speeds: Floats, share: float, spin_max: float, tries: int, seed: int
 ) -> tuple[Floats, float]:
-    """The best supported (3,) of the spins that three random constraints each fix, and its support (RANSAC).
+    """Best supported spin of those that three random constraints each fix (RANSAC).
 
-    rows (n, 3), speeds (n,) > 0. Spins above spin_max are passed over, and samples of three nearly coplanar rows.
-    Support 0 and a spin of zero when there is none. The same seed gives the same answer.
+    Parameters
+    ----------
+    rows : (n, 3) float64
+        Constraint rows.
+    speeds : (n,) float64
+        Right-hand sides, > 0.
+    share : float
+        Scale of `support`.
+    spin_max : float
+        Spins above this are passed over, and samples of three nearly coplanar rows.
+    tries, seed : int
+        Number of samples; the same seed gives the same answer.
+
+    Returns
+    -------
+    spin : (3,) float64
+        Zero where there is none.
+    support : float
+        0 where there is none.
     """
     best, best_support = np.zeros(3), 0.0
     n = speeds.size
@@ -68,12 +85,29 @@ def sampled_spin(
 def robust_spin(
     rows: Floats, speeds: Floats, stds: Floats, start: Floats, rounds: int
 ) -> tuple[Floats, Floats, Floats, float]:
-    """Spin (3,) with rows . spin ~ speeds by iteratively reweighted least squares, from a start (3,).
+    """Spin with rows . spin ~ speeds by iteratively reweighted least squares.
 
     Tukey's bisquare with its usual 4.685 robust standard deviations (1.4826 x median of the residuals over stds).
-    Also: the weights (n,) of the last round (1 / std^2 included), the normal matrix (3, 3) they give, and the robust
-    standard deviation in units of stds. The matrix is singular where the constraints do not fix a spin; the spin is
-    then the start.
+
+    Parameters
+    ----------
+    rows, speeds, stds : (n, 3), (n,), (n,) float64
+        Constraints and the standard deviations of their right-hand sides.
+    start : (3,) float64
+        Spin to begin with.
+    rounds : int
+        Number of reweightings.
+
+    Returns
+    -------
+    spin : (3,) float64
+        The start where the constraints do not fix a spin.
+    weights : (n,) float64
+        Of the last round, 1 / std^2 included.
+    matrix : (3, 3) float64
+        The normal matrix they give; singular where the constraints do not fix a spin.
+    scale : float
+        Robust standard deviation in units of stds.
     """
     n = speeds.size
     spin, weights, matrix, off = start.copy(), np.zeros(n), np.zeros((3, 3)), np.empty(n)

@@ -1,4 +1,4 @@
-"""Triplet Matching: flow from three events that keep time with each other (Shiba, Aoki, Gallego, IEEE SPL 2022).
+"""Triplet Matching: flow from three events at even intervals (Shiba, Aoki, Gallego, IEEE SPL 2022).
 
 An edge that moves evenly fires at x, x + d, x + 2d at times t, t + dt, t + 2dt. Every such triplet of one polarity
 votes with its velocity for the flow of its newest event; an event's flow is the weighted mean of its votes, where a
@@ -27,10 +27,23 @@ def earlier_neighbours(
     speed_max_px_s: float,
     most: int,
 ) -> NDArray[np.int32]:
-    """(n, most) rows of each event's latest earlier neighbours, latest first, -1 where there are fewer.
+    """Latest earlier neighbours of each event.
 
-    A neighbour has the same polarity, is near_px..reach_px away and at most reach_us older, and the velocity between
-    the two is at most speed_max_px_s. Events are in order of time; the search back stops at `most` neighbours.
+    Parameters
+    ----------
+    t_us, x_px, y_px, on : (n,) int64, float64, float64, bool
+        The events, in order of time.
+    near_px, reach_px, reach_us : float
+        A neighbour has the same polarity, is near_px..reach_px away and at most reach_us older.
+    speed_max_px_s : float
+        Bound of the velocity between the two.
+    most : int
+        The search back stops at so many neighbours.
+
+    Returns
+    -------
+    (n, most) int32
+        Indices, latest first, -1 where there are fewer.
     """
     n = t_us.size
     neighbours = np.full((n, most), -1, np.int32)
@@ -60,11 +73,25 @@ def triplet_flow(
     mismatch_px: float,
     mismatch_share: float,
 ) -> tuple[Floats, Floats, NDArray[np.int64]]:
-    """Flow (n,), (n,) in px/s and the number (n,) of triplets behind it; NaN and 0 where an event ends no triplet.
+    """Flow of the events that end a triplet.
 
-    mismatch_px : 1 sigma of the difference between a triplet's two displacements
-    mismatch_share : 1 sigma of the difference between its two durations, as a share of their mean
-    Triplets beyond two sigma in either do not match.
+    Parameters
+    ----------
+    t_us, x_px, y_px : (n,) int64, float64, float64
+        The events.
+    neighbours : (n, most) int32
+        As from `earlier_neighbours`.
+    mismatch_px : float
+        1 sigma of the difference between a triplet's two displacements; beyond two sigma it does not match.
+    mismatch_share : float
+        The same of its two durations, as a share of their mean.
+
+    Returns
+    -------
+    vx_px_s, vy_px_s : (n,) float64
+        NaN where an event ends no triplet.
+    triplets : (n,) int64
+        Number of triplets behind each.
     """
     n, most = neighbours.shape
     vx, vy, triplets = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, np.int64)

@@ -61,7 +61,7 @@ def test_measures_equal_the_twins(seed: int, oval: tuple[float, float]) -> None:
         moving_circle.residuals(ring, bent, tau, x, y), reference.residuals(ring, bent, tau, x, y), atol=1e-9
     )
     args = (ring, bent, tau, x, y, on, 60, 40, 1.2, 3.0, 32)
-    assert np.allclose(moving_circle.support(*args), reference.support(*args))
+    assert np.allclose(outline.support(*args), reference.support(*args))
     votes = np.zeros((9, 9))
     outline.vote_velocity(votes, ring, tau, x, y, on, 700.0, 2.5)
     assert np.allclose(votes, reference.vote_velocity(4, ring, tau, x, y, on, 700.0, 2.5))
