@@ -35,11 +35,15 @@ def rotate(vector: Vector, axis: Vector, sine: float, cosine: float, versine: fl
 
 
 @numba.njit(cache=True, nogil=True)
-def orthonormal_axes(x: float, y: float, z: float) -> Floats:
-    """Complete a unit vector to an orthonormal basis: (3, 3), the vector itself in the first row."""
-    across = np.array([0.0, -z, y]) if abs(x) < 0.6 else np.array([z, 0.0, -x])  # on the axis that is not near it
-    u, v, w = across / math.sqrt(across[0] ** 2 + across[1] ** 2 + across[2] ** 2)
-    return np.array([[x, y, z], [u, v, w], [y * w - z * v, z * u - x * w, x * v - y * u]])
+def orthonormal_axes(x: float, y: float, z: float) -> tuple[Vector, Vector, Vector]:
+    """Complete a unit vector to a right-handed orthonormal basis, the vector itself first."""
+    # Across the axis of the frame that is not near the vector.
+    u, v, w = 0.0, -z, y
+    if abs(x) >= 0.6:
+        u, v, w = z, 0.0, -x
+    length = math.sqrt(u * u + v * v + w * w)
+    u, v, w = u / length, v / length, w / length
+    return (x, y, z), (u, v, w), (y * w - z * v, z * u - x * w, x * v - y * u)
 
 
 def rotations(vectors_rad: ArrayLike) -> Floats:

@@ -97,9 +97,7 @@ def _mean_direction(spin_rad_s: Floats, events: EventColumns) -> tuple[float, fl
 def _to_map(points: Floats, pole: tuple[float, float, float], per_cell: float, middle: float) -> None:
     """Replace the first two rows of unit vectors `points` (3, n) by their places on the map around the pole."""
     px, py, pz = pole
-    axes = orthonormal_axes(px, py, pz)
-    ux, uy, uz = axes[1]
-    vx, vy, vz = axes[2]
+    _, (ux, uy, uz), (vx, vy, vz) = orthonormal_axes(px, py, pz)
     xs, ys, zs = points[0], points[1], points[2]
     for k in range(xs.size):
         x, y, z = xs[k], ys[k], zs[k]
@@ -294,7 +292,7 @@ def scores_near(
 def spin_axes(spin_rad_s: Floats) -> Floats:
     """The spin's direction and two directions across it: (3, 3), orthonormal rows."""
     x, y, z = spin_rad_s / math.sqrt(spin_rad_s[0] ** 2 + spin_rad_s[1] ** 2 + spin_rad_s[2] ** 2)
-    return orthonormal_axes(x, y, z)
+    return np.array(orthonormal_axes(x, y, z))
 
 
 @numba.njit(cache=True, nogil=True)

@@ -203,6 +203,30 @@ def test_the_stated_error_grows_with_what_is_not_known() -> None:
     assert spreads[2] > spreads[0]
 
 
+def test_a_drifting_track_makes_the_axis_less_certain_and_not_the_turn_about_the_line_of_sight() -> None:
+    events = dotted_ball(SPIN, duration_s=0.01, events=300)
+    steady = answer_of(events).covariance_rps2
+    for rising in (
+        {"drift_std_px_s": 30.0, "track_std_px": 9.0},
+        {"drift_std_px_s": 9e9, "track_std_px": 30e-2 / 12**0.5},
+    ):
+        drifting = answer_of(events, BallUncertainty(centre_std_px=0.2, radius_std_px=0.2, **rising)).covariance_rps2
+        expected = (30.0 / 17.0 / (2 * np.pi)) ** 2 * np.diag([1.0, 1.0, 0.0])
+        np.testing.assert_allclose(drifting - steady, expected, rtol=0.05, atol=1e-6)  # events span 9.9 ms
+
+
+def test_margins_are_in_sigmas_of_independent_events() -> None:
+    """Four times as many events that tell the same are worth half the sigmas, and twice the events' own error."""
+    events = dotted_ball(SPIN, duration_s=0.012, events=300)
+    one, four = (
+        estimate_spin(events, BALL, ContrastSettings(repeats=repeats), starts_rps=np.stack([SPIN, -SPIN]))
+        for repeats in (8.0, 32.0)
+    )
+    assert one.margins.size
+    np.testing.assert_allclose(four.margins, 0.5 * one.margins, rtol=1e-6)
+    assert np.trace(four.covariance_rps2) > np.trace(one.covariance_rps2)
+
+
 def test_noise_has_no_contrast() -> None:
     events = dotted_ball(SPIN)
     noise = replace(events, t_s=np.sort(np.random.default_rng(1).permutation(events.t_s)))
