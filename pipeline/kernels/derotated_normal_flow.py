@@ -54,7 +54,7 @@ def derotated_normals(normals: Floats, t_us: NDArray[np.int64], common_us: int, 
 
 
 @numba.njit(cache=True, nogil=True)
-def fit_moving_line(u: Floats, v: Floats, t_s: Floats, width: float) -> tuple[float, float, float, float, float]:
+def fit_moving_line(u: Floats, v: Floats, t_s: Floats, width_rad: float) -> tuple[float, float, float, float, float]:
     """Fit a line (nu, nv) . (u, v) = c + drift t to points, robustly.
 
     Total least squares in (u, v): the normal is the direction in which the points spread least once their linear
@@ -66,7 +66,7 @@ def fit_moving_line(u: Floats, v: Floats, t_s: Floats, width: float) -> tuple[fl
         Places in the tangent plane, rad.
     t_s : (n,) float64
         Times.
-    width : float
+    width_rad : float
         Width of the bisquare weights, rad.
 
     Returns
@@ -84,7 +84,7 @@ def fit_moving_line(u: Floats, v: Floats, t_s: Floats, width: float) -> tuple[fl
         for i in range(t_s.size):
             weight = 1.0
             if round_ > 0:
-                off = (nu * u[i] + nv * v[i] - drift * t_s[i] - c) / width
+                off = (nu * u[i] + nv * v[i] - drift * t_s[i] - c) / width_rad
                 if abs(off) >= 1.0:
                     continue
                 weight = (1.0 - off * off) ** 2
@@ -113,7 +113,7 @@ def fit_moving_line(u: Floats, v: Floats, t_s: Floats, width: float) -> tuple[fl
 
 @numba.njit(cache=True, nogil=True)
 def _gather(
-    near: Floats, turned: Floats, t_us: NDArray[np.int64], k: int, frame: Floats, reach: float, reach_us: float
+    near: Floats, turned: Floats, t_us: NDArray[np.int64], k: int, frame: Floats, reach_rad: float, reach_us: float
 ) -> int:
     """Write (u, v, t in s) of event k and its neighbours into `near` (3, NEIGHBOURS); return how many there are.
 
@@ -128,7 +128,7 @@ def _gather(
             dx = turned[j, 0] - frame[0, 0]
             dy = turned[j, 1] - frame[0, 1]
             dz = turned[j, 2] - frame[0, 2]
-            if dx * dx + dy * dy + dz * dz <= reach * reach:
+            if dx * dx + dy * dy + dz * dz <= reach_rad * reach_rad:
                 near[0, size] = frame[1, 0] * dx + frame[1, 1] * dy + frame[1, 2] * dz
                 near[1, size] = frame[2, 0] * dx + frame[2, 1] * dy + frame[2, 2] * dz
                 near[2, size] = (t_us[j] - t_us[k]) * 1e-6
@@ -144,9 +144,9 @@ def derotated_constraints(
     on: NDArray[np.bool_],
     spin_rad_s: Floats,
     stride: int,
-    reach: float,
+    reach_rad: float,
     reach_us: float,
-    width: float,
+    width_rad: float,
     sharpest: float,
 ) -> tuple[NDArray[np.int64], Floats, Floats, Floats, NDArray[np.int64]]:
     """Constraints rows . spin = speeds from every stride-th event whose neighbours make a line.
@@ -163,7 +163,7 @@ def derotated_constraints(
         Guess of the spin.
     stride : int
         A constraint is looked for at every so many-th event.
-    reach, width : float
+    reach_rad, width_rad : float
         Distance of neighbours, and width of the fit's weights, on the unit sphere, rad.
     reach_us : float
         Time between neighbours.
@@ -200,10 +200,12 @@ def derotated_constraints(
             frame[0, 0], frame[0, 1], frame[0, 2] = ex, ey, ez
             frame[1, 0], frame[1, 1], frame[1, 2] = 1.0 + sign * ex * ex * p, sign * q, -sign * ex
             frame[2, 0], frame[2, 1], frame[2, 2] = q, sign + ey * ey * p, -ey
-            size = _gather(near, own, own_us, k, frame, reach, reach_us)
+            size = _gather(near, own, own_us, k, frame, reach_rad, reach_us)
             if size < FEWEST:
                 continue
-            nu, nv, drift, variance, sharpness = fit_moving_line(near[0, :size], near[1, :size], near[2, :size], width)
+            nu, nv, drift, variance, sharpness = fit_moving_line(
+                near[0, :size], near[1, :size], near[2, :size], width_rad
+            )
             if sharpness > sharpest:
                 continue
             # n . (missing x e) = drift with n in the tangent plane: missing . (e x n) = drift

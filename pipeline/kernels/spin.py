@@ -38,7 +38,7 @@ def support(rows: Floats, speeds: Floats, spin: Floats, share: float) -> float:
 
 @numba.njit(cache=True, nogil=True)
 def sampled_spin(
-    rows: Floats, speeds: Floats, share: float, spin_max: float, tries: int, seed: int
+    rows: Floats, speeds: Floats, share: float, spin_max_rad_s: float, tries: int, seed: int
 ) -> tuple[Floats, float]:
     """Best supported spin of those that three random constraints each fix (RANSAC).
 
@@ -50,7 +50,7 @@ def sampled_spin(
         Right-hand sides, > 0.
     share : float
         Scale of `support`.
-    spin_max : float
+    spin_max_rad_s : float
         Spins above this are passed over, and samples of three nearly coplanar rows.
     tries, seed : int
         Number of samples; the same seed gives the same answer.
@@ -73,7 +73,10 @@ def sampled_spin(
             m[i, 0], m[i, 1], m[i, 2], b[i] = rows[pick, 0], rows[pick, 1], rows[pick, 2], speeds[pick]
             size *= np.sqrt(m[i, 0] ** 2 + m[i, 1] ** 2 + m[i, 2] ** 2)
         spin, determinant = solve3(m, b)
-        if abs(determinant) < 1e-3 * size or spin[0] ** 2 + spin[1] ** 2 + spin[2] ** 2 > spin_max * spin_max:
+        if (
+            abs(determinant) < 1e-3 * size
+            or spin[0] ** 2 + spin[1] ** 2 + spin[2] ** 2 > spin_max_rad_s * spin_max_rad_s
+        ):
             continue
         found = support(rows, speeds, spin, share)
         if found > best_support:

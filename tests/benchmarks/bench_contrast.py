@@ -37,7 +37,8 @@ def recorded(name: str) -> tuple[list[Tick], Context]:
     ticks = [
         tick for tick in session.ticks(("logo", "normal_flow"), forget=("surface",)) if tick.track.ball is not None
     ]
-    return ticks, session.chain.context(session.parameters, contrast.STAGE)
+    with_ball = [tick for tick in ticks if tick.track.ball is not None]
+    return with_ball, session.chain.context(session.parameters, contrast.STAGE)
 
 
 def costs_ms(ticks: list[Tick], context: Context) -> tuple[list[float], list[float]]:

@@ -229,7 +229,7 @@ def _ranked(events: SphereEvents, spins_rad_s: Floats, settings: ContrastSetting
 
 def _refined(
     events: SphereEvents,
-    spins: Floats,
+    spins_rad_s: Floats,
     margins: Floats,
     ball: BallUncertainty,
     settings: ContrastSettings,
@@ -237,14 +237,14 @@ def _refined(
     offsets_px: Floats,
     iterations: int,
 ) -> ContrastEstimate:
-    """The estimate around spins[0], with the ball's offsets; `events` are thinned from stretch[0]."""
+    """The estimate around spins_rad_s[0], with the ball's offsets; `events` are thinned from stretch[0]."""
     given, reference_s, span_s = stretch
     objective = _objective(events, settings, FINE * settings.sigma_rad)._replace(
         slopes=offset_slopes(events.normals, events.facing, events.radius_px),
         prior_px=np.array([ball.centre_std_px, ball.centre_std_px, ball.radius_std_px]),
         weight=settings.score_weight,
     )
-    spin, offsets, sharp, model = maximise(objective, spins[0], offsets_px, iterations)
+    spin, offsets, sharp, model = maximise(objective, spins_rad_s[0], offsets_px, iterations)
     covariance = _spin_covariance(objective, model, settings.repeats * len(events) / given)
     covariance += _drift_covariance(events, ball, span_s)
     along = np.outer(spin, spin) / (spin @ spin)
@@ -255,8 +255,8 @@ def _refined(
     shuffled = window.events._replace(t_s=np.random.default_rng(0).permutation(events.t_s))
     chance = objective._replace(window=window._replace(events=shuffled))
     by_chance = scores_near(np.empty((1, len(events))), chance, spin, offsets, np.zeros((1, 6)))
-    gaps = spins[1:] - spins[0]
-    near = np.linalg.norm(gaps, axis=1) < NEAR * np.linalg.norm(spins[0])
+    gaps = spins_rad_s[1:] - spins_rad_s[0]
+    near = np.linalg.norm(gaps, axis=1) < NEAR * np.linalg.norm(spins_rad_s[0])
     for gap, margin in zip(gaps[near], margins[1:][near], strict=True):
         covariance += np.outer(gap, gap) / (1.0 + math.exp(min(float(margin), 50.0)))
     return ContrastEstimate(
@@ -265,7 +265,7 @@ def _refined(
         given,
         reference_s,
         span_s,
-        spins[1:][~near] / TURN,
+        spins_rad_s[1:][~near] / TURN,
         margins[1:][~near],
         offsets,
         (sharp - float(by_chance[0])) / len(events),

@@ -130,7 +130,7 @@ def _splat(density: Map, places: Floats, polarity: Integers, first: int, last: i
 
 
 @numba.njit(cache=True, nogil=True)
-def score(log_ratios: Floats, spin_rad_s: Floats, window: ScoreWindow, cell: float, floor: float) -> float:
+def score(log_ratios: Floats, spin_rad_s: Floats, window: ScoreWindow, cell_rad: float, floor: float) -> float:
     """Score of one spin (3,); each event's log((I + floor) / (B + floor)) is written into `log_ratios` (n,).
 
     Parameters
@@ -141,7 +141,7 @@ def score(log_ratios: Floats, spin_rad_s: Floats, window: ScoreWindow, cell: flo
         Angular velocity.
     window : ScoreWindow
         The events draw I; the same at permuted times draw B. Each segment has a map of its own.
-    cell : float
+    cell_rad : float
         Width of the map's cells, radians near its middle.
     floor : float
         Density in units of coinciding events that is added to both, against ratios of small numbers.
@@ -152,15 +152,15 @@ def score(log_ratios: Floats, spin_rad_s: Floats, window: ScoreWindow, cell: flo
         Sum of the log ratios.
     """
     events, permuted = window.events, window.permuted
-    size = int(4.0 / cell) + 5
+    size = int(4.0 / cell_rad) + 5
     middle = 0.5 * (size - 1)
     added = floor * COINCIDENCE
     places, permuted_places = np.empty_like(events.normals), np.empty_like(permuted.normals)
     derotate(places, spin_rad_s, events.t_s, events.normals)
     derotate(permuted_places, spin_rad_s, permuted.t_s, permuted.normals)
     pole = _mean_direction(spin_rad_s, events)
-    _to_map(places, pole, 1.0 / cell, middle)
-    _to_map(permuted_places, pole, 1.0 / cell, middle)
+    _to_map(places, pole, 1.0 / cell_rad, middle)
+    _to_map(permuted_places, pole, 1.0 / cell_rad, middle)
     sharp, blurred = np.zeros(2 * size * size, np.float32), np.zeros(2 * size * size, np.float32)
     total = 0.0
     for segment in range(events.starts.size - 1):
