@@ -44,6 +44,7 @@ def test_the_period_is_the_rotations_not_a_part_of_it_or_a_multiple() -> None:
     correlation = autocorrelation(signal - signal.mean(), 240)
     assert shortest_period(correlation, 3, 0.8) == 40
     assert shortest_period(np.zeros(50), 3, 0.8) == 0
+    assert shortest_period(correlation, 41, 0.8) == 80
 
 
 def test_moving_average_is_recursive_and_starts_at_the_first_value() -> None:

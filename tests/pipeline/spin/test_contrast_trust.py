@@ -1,0 +1,55 @@
+"""Thresholds of the contrast estimate's trust rule, each on both sides."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spinscope.pipeline.spin.contrast import stage
+from spinscope.pipeline.spin.contrast.events import ContrastEstimate
+
+PARAMETERS = stage.ContrastParameters(
+    min_gain=0.25,
+    smallest_patch_rad=0.18,
+    rival_sigmas=1.2,
+    magnitude_std_rps=3.0,
+    axis_std_deg=12.0,
+)
+SPIN = np.array([20.0, 0.0, 0.0])
+
+
+def uncertain(magnitude_std_rps: float, axis_std_deg: float, spin_rps: np.ndarray = SPIN) -> ContrastEstimate:
+    """A trusted estimate with these stated errors; those of the axis are the same in both directions."""
+    across = float(np.linalg.norm(spin_rps)) * np.radians(axis_std_deg) / np.sqrt(2.0)
+    covariance = np.diag([magnitude_std_rps, across, across]) ** 2
+    return ContrastEstimate(spin_rps, covariance, 200, contrast=1.0, patch_rad=0.3)
+
+
+SURE = uncertain(0.1, 2.0)
+RIVALS = {"rivals_rps": np.array([[0.0, 30.0, 0.0], [0.0, 0.0, 9.0]])}
+
+
+@pytest.mark.parametrize(
+    ("trusted", "doubted", "reason"),
+    [
+        (SURE, replace(SURE, spin_rps=None, covariance_rps2=None), "200 logo events"),
+        (replace(SURE, contrast=0.26), replace(SURE, contrast=0.24), "gains 0.24"),
+        (replace(SURE, patch_rad=0.19), replace(SURE, patch_rad=0.17), "spread over 10 degrees"),
+        (
+            replace(SURE, margins=np.array([9.0, 1.3]), **RIVALS),
+            replace(SURE, margins=np.array([9.0, 1.1]), **RIVALS),
+            r"or \(0, 0, 9\) rps",
+        ),
+        (uncertain(2.9, 2.0), uncertain(3.1, 2.0), r"20.0 \+- 3.1 rps"),
+        (uncertain(8.9, 2.0, 4.5 * SPIN), uncertain(9.1, 2.0, 4.5 * SPIN), r"90.0 \+- 9.1 rps"),
+        (uncertain(0.1, 11.8), uncertain(0.1, 12.2), r"axis is too uncertain: \+- 12 degrees"),
+    ],
+)
+def test_each_threshold_is_where_its_parameter_says(
+    trusted: ContrastEstimate, doubted: ContrastEstimate, reason: str
+) -> None:
+    assert stage._doubt(PARAMETERS, trusted) is None
+    assert re.search(reason, stage._doubt(PARAMETERS, doubted) or "")
