@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +11,8 @@ from typing import Any
 import click
 
 from spinscope.pipeline.errors import ParameterError, SpinscopeError
+from spinscope.pipeline.files import atomic_file, check_writable
+from spinscope.pipeline.recordings import writable_suffixes
 from spinscope.pipeline.registry import methods
 from spinscope.pipeline.session import DEFAULT_SAMPLE, Choices, Session
 
@@ -172,8 +173,8 @@ def analyze(recordings: tuple[Path, ...], output: str | None, method: str, choic
     """Find the shots of recordings and estimate their spin."""
     from .analyze import analyze as analyzed
 
-    if output not in (None, "-") and not os.access(Path(str(output)).absolute().parent, os.W_OK):
-        raise ParameterError(f"JSON cannot be written there: choose another place with --json: {output}")
+    if output is not None and output != "-":
+        check_writable(Path(output), "JSON")
     reports: list[dict[str, Any]] = []
     for recording in recordings:
         try:
@@ -208,12 +209,14 @@ def view(recording: Path, save: Path | None, native: bool, layout: str, choices:
     _view(recording, save, native, layout, choices)
 
 
-@cli.command()
+@cli.command(
+    help=f"Write a recording in another format, chosen by the suffix of TARGET ({', '.join(writable_suffixes())})."
+)
 @click.argument("source", type=RECORDING)
 @click.argument("target", type=RECORDING)
 @click.option("--sensor", type=SensorSize(), help="Size of the sensor in pixels, where the file does not say it.")
 def convert(source: Path, target: Path, sensor: tuple[int, int] | None) -> None:
-    """Write a recording in another format, chosen by the suffix of TARGET (.h5, .npz, .raw)."""
+    """Convert a recording."""
     from spinscope.pipeline.recordings import convert as converted
 
     with ProgressBar() as bar:
@@ -346,14 +349,12 @@ def evaluate(
 
 
 def _write(output: str, text: str) -> None:
-    """Text to a file, which appears whole or not at all, or to standard output for "-"."""
-    try:
-        with click.open_file(output, "w", encoding="utf-8", atomic=output != "-") as file:
-            file.write(text)
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        raise ParameterError(f"JSON cannot be written ({error.strerror}): choose another place: {output}") from None
+    """Write text to a file, which appears whole or not at all, or to standard output for "-"."""
+    if output == "-":
+        click.echo(text, nl=False)
+    else:
+        with atomic_file(output, "JSON") as part:
+            part.write_text(text, encoding="utf-8")
 
 
 def _view(recording: Path, save: Path | None, native: bool, layout: str, choices: Choices) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,8 +15,9 @@ import numpy as np
 from spinscope.pipeline.biases import PAPER, BiasParameters, read_biases
 from spinscope.pipeline.camera import Camera, CameraParameters
 from spinscope.pipeline.errors import ParameterError, RecordingError
+from spinscope.pipeline.files import check_writable
 from spinscope.pipeline.parameters import ParameterGroup, choice, switch, tunable
-from spinscope.pipeline.recordings import open_recording, write_npz, write_raw, write_recording
+from spinscope.pipeline.recordings import format_to_write, open_recording, write_recording
 from spinscope.pipeline.simulator import Background, Light, Scene, SimulatedRecording, flight, rally, simulate, spinner
 from spinscope.pipeline.simulator import simulate_again as simulated_again
 from spinscope.pipeline.simulator.shots import FLIGHT_KINDS
@@ -29,7 +29,6 @@ KINDS = ("spinner", "flight", "rally")
 MAX_SPIN_RPS = 1000.0
 DESCRIPTION = "simulation"  # root attribute: what `simulate_again` needs, as JSON
 BIASES = "biases"  # root attribute: the biases alone, as JSON
-SUFFIXES = (".h5", ".hdf5", ".raw", ".npz")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,38 +197,30 @@ def _spin(spin_rps: Sequence[float] | None) -> Sequence[float] | None:
 
 def _writable(out: Path) -> None:
     """Find out before the work what would fail after it; a disk that fills up is found out in writing."""
-    if out.suffix.lower() not in SUFFIXES:
-        raise RecordingError(f"a recording is written as {', '.join(SUFFIXES)}: give another suffix: {out}")
-    if out.is_dir() or not out.parent.is_dir() or not os.access(out.parent, os.W_OK):
-        why = "it is a folder" if out.is_dir() else "its folder does not exist or may not be written to"
-        raise RecordingError(f"recording cannot be written, {why}: give another name: {out}")
+    format_to_write(out)
+    check_writable(out, "recording")
 
 
 def _write(made: SimulatedRecording, out: Path, biases: BiasParameters | None) -> Written:
     """Write in the format of the suffix; see `simulate_to_file`."""
     width_px, height_px = made.width_px, made.height_px
-    suffix, warnings = out.suffix.lower(), []
+    keeps_truth, warnings = format_to_write(out).keeps_truth, []
     attributes: dict[str, str | float] = {
         DESCRIPTION: json.dumps(made.description, separators=(",", ":")),
         "camera.focal_length_mm": round(made.description["camera"]["focal_px"] * CameraParameters().pixel_um / 1000, 9),
     }
     if biases is not None:
         attributes[BIASES] = json.dumps(biases.as_dict())
-    if suffix in (".h5", ".hdf5"):
-        write_recording(
-            out,
-            made.events,
-            width_px=width_px,
-            height_px=height_px,
-            attributes=attributes,
-            truth=made.truth,
-        )
-    else:
-        warnings.append(f"{suffix} holds no truth and no scene: write .h5 to keep them")
-        if suffix == ".raw":
-            write_raw(out, made.events, width_px=width_px, height_px=height_px)
-        else:
-            write_npz(out, made.events, width_px=width_px, height_px=height_px)
+    if not keeps_truth:
+        warnings.append(f"{out.suffix.lower()} holds no truth and no scene: write .h5 to keep them")
+    write_recording(
+        out,
+        made.events,
+        width_px=width_px,
+        height_px=height_px,
+        attributes=attributes if keeps_truth else None,
+        truth=made.truth,
+    )
     spin = made.truth.spin_rps[0] if made.truth.t_us.size else None
     return Written(
         path=out,

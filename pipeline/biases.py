@@ -15,6 +15,7 @@ from types import MappingProxyType
 import numpy as np
 
 from .errors import ParameterError, RecordingError
+from .files import atomic_file
 from .parameters import ParameterGroup, tunable
 
 
@@ -193,7 +194,5 @@ def read_biases(path: Path | str) -> BiasParameters:
 def write_biases(biases: BiasParameters, path: Path | str) -> None:
     """Write a `.bias` file; raises RecordingError when that is impossible."""
     lines = [f"{value} % bias_{name}\n" for name, value in biases.as_dict().items()]
-    try:
-        Path(path).write_text("".join(lines), encoding="utf-8")
-    except OSError as error:
-        raise RecordingError(f"the bias file cannot be written ({error.strerror}): {path}") from error
+    with atomic_file(path, "bias file") as part:
+        part.write_text("".join(lines), encoding="utf-8")

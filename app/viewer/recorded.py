@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
-from spinscope.pipeline.errors import RecordingError
+from spinscope.pipeline.files import atomic_file
 
 from .ball import ball_chunks
 from .layouts import blueprint
@@ -27,15 +26,6 @@ def chunks(run: ViewedRun) -> list[Chunk]:
 def write_rrd(run: ViewedRun, path: Path, layout: str) -> None:
     """Write the run and its layouts, whole or not at all; raises RecordingError when that fails."""
     made = chunks(run)
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        unfinished.touch()  # Rerun's own message for a path that cannot be written is no help
-        file_with(made, blueprint(run, layout), unfinished, run.name)
-        unfinished.replace(path)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise RecordingError(
-            f"cannot write the .rrd file ({reason}): choose another place with --save: {path}"
-        ) from None
-    finally:
-        unfinished.unlink(missing_ok=True)
+    with atomic_file(path, ".rrd file") as part:
+        part.touch()  # Rerun's own message for a path that cannot be written is no help
+        file_with(made, blueprint(run, layout), part, run.name)

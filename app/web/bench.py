@@ -23,7 +23,6 @@ from spinscope.pipeline.results import Truth
 from spinscope.pipeline.session import Choices, Session
 from spinscope.pipeline.shots import ShotLog
 
-SUFFIXES = (".h5", ".hdf5", ".raw", ".dat", ".npz")  # of recordings that are read
 CHAIN_BYTES = 160_000_000  # a clip's columns: eight surfaces of a flight of 100 ms
 COLUMNS_KEPT = 200  # 40 settings of the logo, whose columns are small but many
 CLIPS_KEPT = 2

@@ -17,12 +17,12 @@ from spinscope.app.simulate import BIASES, DESCRIPTION, simulate_again_to_file
 from spinscope.pipeline.biases import CURVES, BiasParameters, read_biases, write_biases
 from spinscope.pipeline.errors import ParameterError, RecordingError, SpinscopeError
 from spinscope.pipeline.events import EventBatch
-from spinscope.pipeline.recordings import open_recording
+from spinscope.pipeline.recordings import open_recording, readable_suffixes
 from spinscope.pipeline.registry import Parameters
 from spinscope.pipeline.session import AnyRecording
 from spinscope.pipeline.simulator import simulate_again
 
-from .bench import SUFFIXES, Bench, Clip
+from .bench import Bench, Clip
 from .jobs import Job
 
 NOISE, HOT, EDGE, LOGO = 0, 4, 1, 2  # labels of the simulator's truth
@@ -149,7 +149,7 @@ def measured_curve(
 
 def known_biases(path: Path) -> BiasParameters | None:
     """The biases a recording states or has in a .bias file of its name beside it; None for none, or no recording."""
-    if path.suffix.lower() not in SUFFIXES or not path.is_file():
+    if path.suffix.lower() not in readable_suffixes() or not path.is_file():
         return None
     beside = path.with_suffix(".bias")
     try:

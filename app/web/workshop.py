@@ -10,9 +10,10 @@ from tempfile import TemporaryDirectory
 
 from spinscope.app.viewer.tuning import Drawings
 from spinscope.pipeline.errors import ParameterError, RecordingError
+from spinscope.pipeline.recordings import readable_suffixes
 from spinscope.pipeline.session import Choices
 
-from .bench import SUFFIXES, Bench
+from .bench import Bench
 from .finder import ShotFinder
 from .page import Page
 
@@ -57,7 +58,9 @@ class Workshop:
 
     def recordings(self) -> list[str]:
         """Names of the recordings in the folder."""
-        found = {path.name for path in self.folder.iterdir() if path.suffix.lower() in SUFFIXES and path.is_file()}
+        found = {
+            path.name for path in self.folder.iterdir() if path.suffix.lower() in readable_suffixes() and path.is_file()
+        }
         return sorted(found | {self.path.name})
 
     def open_page(self, name: str | None) -> Page:

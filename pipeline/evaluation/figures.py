@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
-import secrets
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import RecordingError
+from ..files import atomic_file
 from . import biases, detector, filters, runtime
 from .honesty import by_coverage
 from .spinner import group_of
@@ -41,12 +40,8 @@ def draw(report: Report, folder: Path) -> list[Path]:
             content = io.BytesIO()
             _legend(figure).savefig(content, format="png", dpi=DPI)
             path = folder / f"{report.suite.name}_{name}.png"
-            part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
-            try:
+            with atomic_file(path, "figure") as part:
                 part.write_bytes(content.getvalue())
-                os.replace(part, path)
-            finally:
-                part.unlink(missing_ok=True)
             paths.append(path)
     except OSError as error:
         raise RecordingError(f"figures cannot be written ({error.strerror}): {folder}") from error

@@ -7,18 +7,18 @@ import importlib
 import json
 import multiprocessing
 import os
-import secrets
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from ..errors import ParameterError, RecordingError
+from ..errors import ParameterError
+from ..files import atomic_file
 from ..registry import Parameters
 from .tables import Row
 
@@ -200,17 +200,10 @@ def text_of(part: str) -> str:
 
 def write_whole(path: Path, content: str) -> None:
     """Write a file that is there whole or not at all; raises RecordingError when it cannot be written."""
-    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
-    try:
+    with suppress(OSError):  # the message comes from the writing
         path.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            part.write_text(content, encoding="utf-8")
-            os.replace(part, path)
-        finally:
-            part.unlink(missing_ok=True)
-    except OSError as error:
-        why = error.strerror or str(error)
-        raise RecordingError(f"results cannot be written ({why}): check free space and rights: {path}") from error
+    with atomic_file(path, "results") as part:
+        part.write_text(content, encoding="utf-8")
 
 
 def _make_room(cache: Path) -> None:

@@ -1,18 +1,16 @@
-"""Which format is this file? Its first bytes say, then its name."""
+"""Opening a recording of any registered format."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from ..errors import RecordingError
+from .formats import FORMATS, HEAD_BYTES
+from .reader import Progress
 from .recording import Recording
-from .sensor import stated_sensor
-from .source import Progress, Source
+from .sensor import stated_resolution
 
-READABLE = "HDF5 (.h5, .hdf5), Prophesee RAW (.raw) and DAT (.dat), NPZ (.npz)"
-HEAD_BYTES = 16
-HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
-OTHER_FORMATS = {
+UNREADABLE = {
     b"#!AER-DAT": "AEDAT",
     b"#ROSBAG": "ROS bag",
     b"SQLite format 3": "ROS 2 bag (SQLite)",
@@ -27,17 +25,35 @@ OTHER_FORMATS = {
 def open_recording(
     path: str | Path, *, sensor: tuple[int, int] | None = None, on_progress: Progress | None = None
 ) -> Recording:
-    """Open a recording of any known format; the content decides, then the suffix.
+    """Open a recording of any registered format, recognised by its content.
 
-    sensor : (width_px, height_px) as stated by the user; beats what the file says
-    on_progress : called with the share done (0..1) while the events are searched for the sensor's size
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    sensor : (width_px, height_px), optional
+        Size of the sensor as stated by the user; beats the file's own statement.
+    on_progress : callable, optional
+        Called with the share done (0..1) while the events are searched for the sensor's size.
 
-    Raises RecordingError in one line for everything that cannot be read.
+    Returns
+    -------
+    Recording
+        The recording, of which only the header has been read, or once all events when nothing states the sensor.
+
+    Raises
+    ------
+    RecordingError
+        In one line for everything that cannot be read.
     """
     path = Path(path)
     try:
-        asked = None if sensor is None else stated_sensor(*sensor, "command line")
-        return Recording(_source(path, _head(path)), asked, on_progress)
+        stated = None if sensor is None else stated_resolution(*sensor, "command line")
+        head = _head(path)
+        for format in FORMATS:
+            if format.sniff(path, head):
+                return Recording(format.open(path), stated, on_progress)
+        raise _unknown(path, head)
     except RecordingError as error:
         if str(path) in str(error):
             raise
@@ -45,7 +61,7 @@ def open_recording(
 
 
 def _head(path: Path) -> bytes:
-    """The first bytes of a file that can be read."""
+    """Read the first bytes; raises RecordingError for all that is no ordinary file with content."""
     try:
         if path.is_dir():
             raise RecordingError(f"recording is a folder, not a file: name a file in it: {path}")
@@ -65,32 +81,17 @@ def _head(path: Path) -> bytes:
     return head
 
 
-def _source(path: Path, head: bytes) -> Source:
-    # Each reader is imported only when needed: h5py takes 0.15 s, the RAW decoders compile.
-    if head.startswith(HDF5_MAGIC):
-        from .hdf5 import Hdf5Source
-
-        return Hdf5Source(path)
-    if head.startswith(b"PK"):
-        from .npz import NpzSource
-
-        return NpzSource(path)
-    if head.startswith(b"% Data file"):
-        from .dat import DatSource
-
-        return DatSource(path)
-    if head.startswith(b"% "):
-        from .raw import RawSource
-
-        return RawSource(path)
-    for magic, name in OTHER_FORMATS.items():
+def _unknown(path: Path, head: bytes) -> RecordingError:
+    """Error for a file that no format recognises."""
+    readable = ", ".join(format.listed for format in FORMATS)
+    for magic, name in UNREADABLE.items():
         if head.startswith(magic):
-            raise RecordingError(f"{name} file is not read here: convert it to one of {READABLE}: {path}")
+            return RecordingError(f"{name} file is not read here: convert it to one of {readable}: {path}")
     suffix = path.suffix.lower()
-    expected = {".h5": "HDF5", ".hdf5": "HDF5", ".npz": "NPZ", ".raw": "Prophesee RAW with its header"}.get(suffix)
-    if expected is not None:
-        raise RecordingError(
-            f"file named {suffix} is no {expected} file (it starts with {head[:8].hex(' ')}): "
-            f"copy or export it again as one of {READABLE}: {path}"
-        )
-    raise RecordingError(f"format of the recording is unknown: readable are {READABLE}: {path}")
+    for format in FORMATS:
+        if suffix in format.suffixes:
+            return RecordingError(
+                f"file named {suffix} is no {format.label} file (it starts with {head[:8].hex(' ')}): "
+                f"copy or export it again as one of {readable}: {path}"
+            )
+    return RecordingError(f"format of the recording is unknown: readable are {readable}: {path}")

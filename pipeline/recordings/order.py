@@ -1,4 +1,4 @@
-"""Events back into the order of time, in a stream."""
+"""Sorting of a stream of events by time."""
 
 from __future__ import annotations
 
@@ -7,28 +7,37 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import RecordingError
-from .source import MAX_DISORDER_US, Columns, Pass
+from .reader import MAX_DISORDER_US, ReadPass, UncheckedEvents
 
 
 class TimeOrder:
-    """Sorts a stream of events by time, equal times staying in file order.
+    """Stable sort of a stream of events by time.
 
     An event may come up to 10 ms behind the latest one before it (readout of several event buffers, a wrong
     time word): so the last 10 ms are held back until more has come. Events further behind are refused
-    (RecordingError) where order is law, and dropped and counted otherwise: what was handed on stays as it is.
+    (RecordingError) where order is strict, and dropped and counted otherwise, because earlier events are handed on.
+
+    Parameters
+    ----------
+    path : Path
+        File that messages name.
+    reading : ReadPass
+        Pass in which damage is counted.
+    strict : bool
+        Whether events too far behind are refused.
     """
 
-    def __init__(self, path: Path, reading: Pass, order_is_law: bool) -> None:
-        self._path, self._reading, self._law = path, reading, order_is_law
+    def __init__(self, path: Path, reading: ReadPass, strict: bool) -> None:
+        self._path, self._reading, self._strict = path, reading, strict
         self._events = 0  # pushed so far
-        self._held: list[Columns] = []
+        self._held: list[UncheckedEvents] = []
         self._held_in_order = True
         self._first_us = 2**63 - 1  # of those held
         self._latest_us = -(2**63)  # of all events so far
         self._before_us = -(2**63)  # of the event just before, in file order
 
-    def push(self, new: Columns) -> Columns | None:
-        """The events that are now sure to be in order."""
+    def push(self, new: UncheckedEvents) -> UncheckedEvents | None:
+        """Take the next events; returns those that no later event can precede, None when there are none."""
         if not len(new):
             return None
         t_us = new.t_us
@@ -52,20 +61,20 @@ class TimeOrder:
         self._first_us = int(known.t_us[sure]) if sure < len(known) else 2**63 - 1
         return known[:sure]
 
-    def finish(self) -> Columns | None:
-        """What was held back."""
+    def finish(self) -> UncheckedEvents | None:
+        """Return the events held back, None when there are none."""
         return self._sorted() if self._held else None
 
-    def _sorted(self) -> Columns:
-        known = Columns.joined(self._held)
+    def _sorted(self) -> UncheckedEvents:
+        known = UncheckedEvents.joined(self._held)
         return known if self._held_in_order else known[np.argsort(known.t_us, kind="stable")]
 
-    def _without_late(self, new: Columns) -> Columns:
+    def _without_late(self, new: UncheckedEvents) -> UncheckedEvents:
         latest_us = np.maximum(np.maximum.accumulate(new.t_us), self._latest_us)
         late = new.t_us < latest_us - MAX_DISORDER_US
         if not late.any():
             return new
-        if self._law:
+        if self._strict:
             at = int(np.argmax(late))
             raise RecordingError(
                 f"time goes backwards at event {self._reading.first_row + self._events + at}: {latest_us[at]} us, "

@@ -1,4 +1,4 @@
-"""One recording on disk, whatever its format."""
+"""A recording on disk, independent of its format."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from ..errors import RecordingError
 from ..events import EventBatch
 from ..results import Truth
 from .order import TimeOrder
-from .sensor import Sensor, guessed_sensor, smallest_known
-from .source import CHUNK_EVENTS, Columns, Damage, Pass, Progress, Source, Triggers
+from .reader import CHUNK_EVENTS, Damage, FormatReader, Progress, ReadPass, Triggers, UncheckedEvents
+from .sensor import Resolution, guessed_resolution, smallest_known
 
 HASH_ALL_BYTES = 64 << 20
 HASH_BLOCK_BYTES = 1 << 20
@@ -33,28 +33,36 @@ def _memory_bytes() -> int:
 class Recording:
     """Events on disk, read in streams; made by `open_recording`.
 
-    path, format : where it is and what it is, for people
-    width_px, height_px : the sensor
-    sensor_from : who says so: "file", "command line", "system_ID 49" or "guess"
-    attributes : root attributes or header lines of the file; `camera.focal_length_mm` and the like among them
-    t_offset_us : DSEC's offset of the file's time; reported, never added
-    events : number of events in the file when it says so before it is read, None for RAW
-
     The file is opened anew for every pass and closed after it: nothing has to be closed.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    format : str
+        Format and encoding for people, like "EVT3 RAW".
+    attributes : dict of str to str or float
+        Root attributes or header lines of the file; `camera.focal_length_mm` and the like among them.
+    t_offset_us : int or None
+        DSEC's offset of the file's time; reported, never added.
+    events : int or None
+        Number of events when the file tells before it is read, None for RAW.
     """
 
-    def __init__(self, source: Source, asked: Sensor | None = None, on_progress: Progress | None = None) -> None:
-        self._source = source
+    def __init__(
+        self, reader: FormatReader, asked: Resolution | None = None, on_progress: Progress | None = None
+    ) -> None:
+        self._reader = reader
         self._asked = asked
         self._sensor_warnings: list[str] = []
         self._sensor = self._chosen_sensor(on_progress)
-        self._pass: Pass | None = None
+        self._pass: ReadPass | None = None
         self._whole = False  # whether _pass saw the whole file
-        self.path: Path = source.path
-        self.format: str = source.format
-        self.attributes: dict[str, str | float] = dict(source.attributes)
-        self.t_offset_us: int | None = source.t_offset_us
-        self.events: int | None = source.events
+        self.path: Path = reader.path
+        self.format: str = reader.format
+        self.attributes: dict[str, str | float] = dict(reader.attributes)
+        self.t_offset_us: int | None = reader.t_offset_us
+        self.events: int | None = reader.events
 
     def __repr__(self) -> str:
         return f"Recording({self.format}, {self.width_px} x {self.height_px} px, {self.path})"
@@ -71,50 +79,73 @@ class Recording:
 
     @property
     def sensor_from(self) -> str:
-        """Who says how large the sensor is."""
-        return self._sensor.source
+        """Origin of the sensor's size: "file", "command line", "system_ID 49" or "guess"."""
+        return self._sensor.origin
 
     @cached_property
     def truth(self) -> Truth | None:
-        """The simulator's truth, None where the file has none; raises RecordingError when it is damaged.
+        """Simulator's truth, None where the file has none; raises RecordingError when it is damaged.
 
         Its labels go with the events as they are in the file: with those of `read` if `damage` is all zero.
         """
-        return self._source.truth()
+        return self._reader.truth()
 
     @property
     def warnings(self) -> list[str]:
-        """What people should know: assumptions made on opening, then the damage the last pass met."""
+        """Assumptions made on opening, then the damage the last pass met, in sentences."""
         damage = self._pass.damage.sentences() if self._pass is not None else []
-        return [*self._source.warnings, *self._sensor_warnings, *damage]
+        return [*self._reader.warnings, *self._sensor_warnings, *damage]
 
     @property
     def damage(self) -> Damage:
-        """What is wrong in the whole file; makes a pass over it unless there was one."""
+        """Counts of what is wrong in the whole file; makes a pass over it unless there was one."""
         return self._scanned().damage
 
     @property
     def triggers(self) -> Triggers:
-        """The edges on the trigger input in the whole file; makes a pass over it unless there was one."""
+        """Edges on the trigger input in the whole file; makes a pass over it unless there was one."""
         return Triggers.joined(self._scanned().triggers)
 
     def scan(self, on_progress: Progress | None = None) -> None:
-        """Pass over the whole file, for `damage`, `triggers` and `warnings`."""
+        """Read the whole file once, for `damage`, `triggers` and `warnings`."""
         for _ in self.chunks(on_progress=on_progress):
             pass
 
     def chunks(self, max_events: int = CHUNK_EVENTS, on_progress: Progress | None = None) -> Iterator[EventBatch]:
-        """All events in order of time, 1 to max_events at once, in constant memory.
+        """Yield all events in order of time, in constant memory.
 
-        Raises RecordingError on the way for what cannot be repaired; see `Damage` for what can.
+        Parameters
+        ----------
+        max_events : int
+            Most events at once; there is at least one.
+        on_progress : callable, optional
+            Called with the share done, 0..1.
+
+        Raises
+        ------
+        RecordingError
+            On the way, for what cannot be repaired; `Damage` counts what can.
         """
-        return self._batches(Pass(max_events, on_progress=on_progress))
+        return self._batches(ReadPass(max_events, on_progress=on_progress))
 
     def read(
         self, start_us: int | None = None, end_us: int | None = None, on_progress: Progress | None = None
     ) -> EventBatch:
-        """All events of [start_us, end_us) in memory at once; RecordingError when they do not fit there."""
-        reading = Pass(CHUNK_EVENTS, start_us, end_us, on_progress)
+        """Read events into memory.
+
+        Parameters
+        ----------
+        start_us, end_us : int, optional
+            Only events of [start_us, end_us), in the file's time; from the start, or to the end, without them.
+        on_progress : callable, optional
+            Called with the share done, 0..1.
+
+        Raises
+        ------
+        RecordingError
+            The events do not fit in memory, or cannot be read.
+        """
+        reading = ReadPass(CHUNK_EVENTS, start_us, end_us, on_progress)
         most_events = _memory_bytes() // (3 * EVENT_BYTES)  # twice to join them, and room for the work on them
         parts: list[EventBatch] = []
         events = 0
@@ -129,7 +160,7 @@ class Recording:
         return EventBatch.concatenate(parts)
 
     def identity(self) -> str:
-        """Hash of the file's bytes (BLAKE2b, 32 hexadecimal digits).
+        """Hash the file's bytes (BLAKE2b, 32 hexadecimal digits).
 
         Of a file above 64 MB only size, time of change, and 1 MB each at start, middle and end are hashed.
         """
@@ -149,19 +180,19 @@ class Recording:
             raise RecordingError(f"recording can no longer be read ({error.strerror}): {self.path}") from error
         return digest.hexdigest()
 
-    def _scanned(self) -> Pass:
+    def _scanned(self) -> ReadPass:
         if self._pass is None or not self._whole:
             self.scan()
         assert self._pass is not None
         return self._pass
 
-    def _chosen_sensor(self, on_progress: Progress | None) -> Sensor:
+    def _chosen_sensor(self, on_progress: Progress | None) -> Resolution:
         if self._asked is not None:
             return self._asked
-        if self._source.stated is not None:
-            return self._source.stated
+        if self._reader.stated is not None:
+            return self._reader.stated
         extent = self._extent_px(on_progress)
-        sensor = guessed_sensor(*extent)
+        sensor = guessed_resolution(*extent)
         self._sensor_warnings.append(
             f"the file does not state its sensor: taken as {sensor.width_px} x {sensor.height_px}, the "
             f"smallest known one that holds the events (they reach over {extent[0]} x {extent[1]} pixels); "
@@ -172,13 +203,13 @@ class Recording:
     def _extent_px(self, on_progress: Progress | None) -> tuple[int, int]:
         """One more than the largest x and y of all events, (0, 0) without events; a pass over the file."""
         columns_px = rows_px = 0
-        for block in self._source.columns(Pass(on_progress=on_progress)):
+        for block in self._reader.columns(ReadPass(on_progress=on_progress)):
             columns_px = max(columns_px, int(block.x.max()) + 1)
             rows_px = max(rows_px, int(block.y.max()) + 1)
         return columns_px, rows_px
 
-    def _batches(self, reading: Pass) -> Iterator[EventBatch]:
-        order = TimeOrder(self.path, reading, self._source.order_is_law)
+    def _batches(self, reading: ReadPass) -> Iterator[EventBatch]:
+        order = TimeOrder(self.path, reading, self._reader.strict_order)
         whole = reading.start_us is None and reading.end_us is None
         start_us = -(2**63) if reading.start_us is None else reading.start_us
         end_us = 2**63 - 1 if reading.end_us is None else reading.end_us
@@ -191,17 +222,17 @@ class Recording:
         if whole or not self._whole:
             self._pass, self._whole = reading, whole
 
-    def _ordered(self, reading: Pass, order: TimeOrder) -> Iterator[Columns | None]:
-        for columns in self._source.columns(reading):
+    def _ordered(self, reading: ReadPass, order: TimeOrder) -> Iterator[UncheckedEvents | None]:
+        for columns in self._reader.columns(reading):
             yield order.push(columns)
         yield order.finish()
 
-    def _on_sensor(self, columns: Columns, reading: Pass) -> EventBatch:
+    def _on_sensor(self, columns: UncheckedEvents, reading: ReadPass) -> EventBatch:
         """Events on the sensor; others are dropped as damage, or show that --sensor is too small."""
         if columns.x.max() < self.width_px and columns.y.max() < self.height_px:
             inside = columns
         else:
-            stated = self._source.stated
+            stated = self._reader.stated
             if self._asked is not None and not (
                 stated is not None and self._asked.holds(stated.width_px, stated.height_px)
             ):

@@ -1,4 +1,4 @@
-"""How large the sensor is: what the command line says beats what the file says, which beats a guess."""
+"""Size of the sensor: the command line's statement beats the file's, which beats a guess."""
 
 from __future__ import annotations
 
@@ -15,55 +15,55 @@ MAX_SIZE_PX = 65535
 
 
 @dataclass(frozen=True, slots=True)
-class Sensor:
-    """Size of the sensor and who says so: "command line", "file", "system_ID 49" or "guess"."""
+class Resolution:
+    """Size of the sensor and its origin: "command line", "file", "system_ID 49" or "guess"."""
 
     width_px: int
     height_px: int
-    source: str
+    origin: str
 
     def holds(self, columns_px: int, rows_px: int) -> bool:
         """Whether pixels of that many columns and rows all lie on this sensor."""
         return columns_px <= self.width_px and rows_px <= self.height_px
 
 
-def stated_sensor(width: object, height: object, source: str) -> Sensor:
-    """The sensor from two values found in a file or given by the user; raises RecordingError for nonsense."""
+def stated_resolution(width: object, height: object, origin: str) -> Resolution:
+    """Resolution from two values of a file or of the user; raises RecordingError for nonsense."""
     try:
         size = int(width), int(height)  # type: ignore[call-overload]
     except (TypeError, ValueError, OverflowError):
         size = (0, 0)
     if not (0 < size[0] <= MAX_SIZE_PX and 0 < size[1] <= MAX_SIZE_PX):
         raise RecordingError(
-            f"sensor size {width} x {height} from the {source} is not 1 to {MAX_SIZE_PX} pixels each way: "
+            f"sensor size {width} x {height} from the {origin} is not 1 to {MAX_SIZE_PX} pixels each way: "
             "state it with --sensor WxH, like --sensor 1280x720"
         )
-    return Sensor(*size, source)
+    return Resolution(*size, origin)
 
 
-def stated_or_none(width: object, height: object, warnings: list[str]) -> Sensor | None:
-    """What a file states, or None and a warning where it states nonsense."""
+def resolution_or_none(width: object, height: object, warnings: list[str]) -> Resolution | None:
+    """Resolution from two values of a file; None with a warning added when they are nonsense."""
     try:
-        return stated_sensor(width, height, "file")
+        return stated_resolution(width, height, "file")
     except RecordingError:
         warnings.append(f"the file's sensor size {width!s:.20} x {height!s:.20} px makes no sense: ignored")
         return None
 
 
-def geometry_or_none(text: str, warnings: list[str]) -> Sensor | None:
-    """The same for a text like "1280x720"."""
+def geometry_or_none(text: str, warnings: list[str]) -> Resolution | None:
+    """Resolution from a text like "1280x720"; None with a warning added when it is nonsense."""
     width, _, height = text.partition("x")
-    return stated_or_none(width, height, warnings)
+    return resolution_or_none(width, height, warnings)
 
 
 def smallest_known(columns_px: int, rows_px: int) -> tuple[int, int] | None:
-    """The smallest known sensor with at least these columns and rows, None if there is none."""
+    """Width and height of the smallest known sensor with these columns and rows, None if there is none."""
     fitting = [s for s in KNOWN_SENSORS if columns_px <= s[0] and rows_px <= s[1]]
     return min(fitting, key=lambda s: s[0] * s[1]) if fitting else None
 
 
-def guessed_sensor(columns_px: int, rows_px: int) -> Sensor:
-    """The smallest known sensor of at least so many columns and rows; raises RecordingError without one."""
+def guessed_resolution(columns_px: int, rows_px: int) -> Resolution:
+    """Resolution of the smallest known sensor with these columns and rows; raises RecordingError without one."""
     size = smallest_known(columns_px, rows_px)
     if size is None:
         largest = KNOWN_SENSORS[-1]
@@ -71,4 +71,4 @@ def guessed_sensor(columns_px: int, rows_px: int) -> Sensor:
             f"the events reach over {columns_px} x {rows_px} pixels, more than the largest known sensor "
             f"({largest[0]} x {largest[1]}): state it with --sensor WxH"
         )
-    return Sensor(*size, "guess")
+    return Resolution(*size, "guess")

@@ -1,4 +1,4 @@
-"""What is in a recording, from one pass over it."""
+"""Summary of a recording from one pass over it."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..events import EventBatch
+from .reader import Progress
 from .recording import Recording
-from .source import Progress
 
 PEAK_BIN_US = 1000  # the peak rate is that of the fullest millisecond
 # A hot pixel has 10 events or more, and over 10 times as many as the second busiest of its 8 neighbours: a
@@ -24,16 +24,32 @@ HOT_NEIGHBOUR = 2
 
 @dataclass(frozen=True, slots=True)
 class RecordingInfo:
-    """What `summary` found.
+    """Result of `summary`.
 
-    first_us, last_us : times of the first and last event; None without events
-    duration_us : last less first, 0 without events
-    on_share : share of ON events, None without events
-    mean_rate_hz : events a second over the duration; None when that is 0
-    peak_rate_hz : the same in the fullest millisecond, None without events
-    hot_pixels, hot_share : number of hot pixels (see HOT_EVENTS) and their share of the events
-    triggers : number of edges on the trigger input
-    damage : name of every kind of damage and its count, see `Damage`
+    Attributes
+    ----------
+    path, format, width_px, height_px, sensor_from, attributes, t_offset_us, warnings
+        As of `Recording`.
+    events : int
+        Number of events.
+    first_us, last_us : int or None
+        Times of the first and last event; None without events.
+    duration_us : int
+        Last less first, 0 without events.
+    on_share : float or None
+        Share of ON events, None without events.
+    mean_rate_hz : float or None
+        Events a second over the duration; None when that is 0.
+    peak_rate_hz : float or None
+        The same in the fullest millisecond, None without events.
+    hot_pixels : int
+        Number of hot pixels (see HOT_EVENTS).
+    hot_share : float
+        Their share of the events.
+    triggers : int
+        Number of edges on the trigger input.
+    damage : dict of str to int
+        Count of every kind of damage, see `Damage`.
     """
 
     path: Path
@@ -64,13 +80,14 @@ class RecordingInfo:
 
 
 def summary(recording: Recording, on_progress: Progress | None = None) -> RecordingInfo:
-    """Look a recording over in one pass, in constant memory; raises RecordingError if it cannot be read."""
-    tally = _Tally(recording.width_px, recording.height_px)
+    """Summarise a recording in one pass, in constant memory; raises RecordingError if it cannot be read."""
+    statistics = _EventStatistics(recording.width_px, recording.height_px)
     for batch in recording.chunks(on_progress=on_progress):
-        tally.add(batch)
-    duration_us = 0 if tally.first_us is None or tally.last_us is None else tally.last_us - tally.first_us
-    hot_pixels, hot_events = tally.hot()
-    events = tally.events
+        statistics.add(batch)
+    first_us, last_us = statistics.first_us, statistics.last_us
+    duration_us = 0 if first_us is None or last_us is None else last_us - first_us
+    hot_pixels, hot_events = statistics.hot()
+    events = statistics.events
     return RecordingInfo(
         path=recording.path,
         format=recording.format,
@@ -78,12 +95,12 @@ def summary(recording: Recording, on_progress: Progress | None = None) -> Record
         height_px=recording.height_px,
         sensor_from=recording.sensor_from,
         events=events,
-        first_us=tally.first_us,
-        last_us=tally.last_us,
+        first_us=first_us,
+        last_us=last_us,
         duration_us=duration_us,
-        on_share=tally.on / events if events else None,
+        on_share=statistics.on / events if events else None,
         mean_rate_hz=events / (duration_us * 1e-6) if duration_us else None,
-        peak_rate_hz=tally.peak_events / (PEAK_BIN_US * 1e-6) if events else None,
+        peak_rate_hz=statistics.peak_events / (PEAK_BIN_US * 1e-6) if events else None,
         hot_pixels=hot_pixels,
         hot_share=hot_events / events if events else 0.0,
         triggers=len(recording.triggers),
@@ -94,8 +111,8 @@ def summary(recording: Recording, on_progress: Progress | None = None) -> Record
     )
 
 
-class _Tally:
-    """Counts over batches that follow each other."""
+class _EventStatistics:
+    """Counts over successive batches."""
 
     def __init__(self, width_px: int, height_px: int) -> None:
         self._width_px = width_px
@@ -106,7 +123,7 @@ class _Tally:
         self._bin, self._bin_events = 0, 0  # the last, perhaps unfinished millisecond
 
     def add(self, batch: EventBatch) -> None:
-        """Count one batch that is not empty."""
+        """Count the events of a batch that is not empty."""
         if self.first_us is None:
             self.first_us = int(batch.t_us[0])
         self.last_us = int(batch.t_us[-1])
@@ -122,7 +139,7 @@ class _Tally:
         self._bin, self._bin_events = int(bins[-1]), int(counts[-1])
 
     def hot(self) -> tuple[int, int]:
-        """Number of hot pixels, and of their events."""
+        """Count the hot pixels, and their events."""
         rows, columns = np.nonzero(self._counts >= HOT_EVENTS)
         padded = np.pad(self._counts, 1)
         around = np.stack([padded[rows + dy, columns + dx] for dy in range(3) for dx in range(3) if (dy, dx) != (1, 1)])
@@ -133,6 +150,6 @@ class _Tally:
 
 
 def _runs(rising: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The different values of a rising column, and how often each occurs."""
+    """Run-length encoding of a rising column: values and counts."""
     starts = np.flatnonzero(np.concatenate([[True], rising[1:] != rising[:-1]]))
     return rising[starts], np.diff(np.append(starts, rising.size))

@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 
 from spinscope.pipeline.events import EventBatch
-from spinscope.pipeline.recordings import open_recording, summary, write_npz, write_raw, write_recording
-from tests.naive_recordings import naive_evt2, naive_evt3
+from spinscope.pipeline.recordings import open_recording, summary, write_recording
+from tests.reference.recordings import naive_evt2, naive_evt3, write_evt2
 
 EVENTS = 2_000_000
 TWIN_EVENTS = 20_000
@@ -50,14 +50,14 @@ def say(name: str, seconds: float, other: str, other_seconds: float) -> None:
 
 @pytest.mark.parametrize("format", ["EVT3", "EVT2"])
 def test_raw_against_its_twin(benchmark: Any, tmp_path: Path, format: str) -> None:
-    path = tmp_path / "a.raw"
-    write_raw(path, scene(TWIN_EVENTS), width_px=1280, height_px=720, format=format)
+    path, write = tmp_path / "a.raw", write_recording if format == "EVT3" else write_evt2
+    write(path, scene(TWIN_EVENTS), width_px=1280, height_px=720)
     data = path.read_bytes()
     words = data[data.index(b"% end\n") + 6 :]
     numbers = np.frombuffer(words, "<u2" if format == "EVT3" else "<u4").tolist()
     twin = naive_evt3 if format == "EVT3" else naive_evt2
     twin_seconds = best_seconds(lambda: twin(numbers), 1) * EVENTS / TWIN_EVENTS
-    write_raw(path, scene(EVENTS), width_px=1280, height_px=720, format=format)
+    write(path, scene(EVENTS), width_px=1280, height_px=720)
     recording = open_recording(path)
     recording.scan()
     benchmark.pedantic(recording.scan, rounds=3)
@@ -79,7 +79,7 @@ def test_hdf5_against_h5py(benchmark: Any, tmp_path: Path) -> None:
 
 def test_npz_against_numpy(benchmark: Any, tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
-    write_npz(path, scene(EVENTS), width_px=1280, height_px=720)
+    write_recording(path, scene(EVENTS), width_px=1280, height_px=720)
     recording = open_recording(path)
 
     def plain() -> list[Any]:
@@ -92,7 +92,7 @@ def test_npz_against_numpy(benchmark: Any, tmp_path: Path) -> None:
 
 def test_summary_against_reading_alone(benchmark: Any, tmp_path: Path) -> None:
     path = tmp_path / "a.raw"
-    write_raw(path, scene(EVENTS), width_px=1280, height_px=720)
+    write_recording(path, scene(EVENTS), width_px=1280, height_px=720)
     recording = open_recording(path)
     recording.scan()
     benchmark.pedantic(lambda: summary(recording), rounds=3)

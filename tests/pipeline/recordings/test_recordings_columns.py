@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.events import EventBatch
-from spinscope.pipeline.recordings import Recording, open_recording, write_npz, write_recording
-from tests.naive_recordings import ecf_block, naive_order
+from spinscope.pipeline.recordings import Recording, open_recording, write_recording
+from tests.reference.recordings import ecf_block, naive_order
 
 N = 5000
 
@@ -110,7 +110,7 @@ def test_prophesees_ecf_compression_is_undone(tmp_path: Path, way: int, dense: b
 
 
 def test_damaged_ecf_blocks_are_refused_not_misread(tmp_path: Path) -> None:
-    from spinscope.pipeline.recordings.ecf import DAMAGED, PAD_BYTES, _room, decode_ecf
+    from spinscope.pipeline.recordings.formats.hdf5.ecf import DAMAGED, PAD_BYTES, _empty_block, decode_ecf
 
     c = some_columns(300)
     rng = np.random.default_rng(0)
@@ -118,11 +118,11 @@ def test_damaged_ecf_blocks_are_refused_not_misread(tmp_path: Path) -> None:
         block = ecf_block(c["t"], c["x"], c["y"], c["p"], way)
         for size in range(0, len(block), 7):
             data = np.frombuffer(block[:size] + bytes(PAD_BYTES), np.uint8)
-            assert decode_ecf(_room(300), data) == DAMAGED
+            assert decode_ecf(_empty_block(300), data) == DAMAGED
         for _ in range(300):
             data = bytearray(block + bytes(PAD_BYTES))
             data[int(rng.integers(0, len(block)))] ^= 1 << int(rng.integers(0, 8))
-            assert decode_ecf(_room(300), np.frombuffer(bytes(data), np.uint8)) <= 300
+            assert decode_ecf(_empty_block(300), np.frombuffer(bytes(data), np.uint8)) <= 300
 
 
 @pytest.mark.parametrize("places", [("/", "width_height"), ("events", "width_height"), ("events", "geometry")])
@@ -317,7 +317,7 @@ def test_objects_in_npz_are_refused_without_opening_them(tmp_path: Path) -> None
 @pytest.mark.parametrize("kind", ["h5", "npz"])
 def test_bombs_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
     """Zeros that pack a thousand times; what is too small to be refused is lowered to 1 MB."""
-    monkeypatch.setattr("spinscope.pipeline.recordings.columns.EXPANSION_FREE_BYTES", 1 << 20)
+    monkeypatch.setattr("spinscope.pipeline.recordings.column_types.EXPANSION_FREE_BYTES", 1 << 20)
     path, zeros = tmp_path / f"bomb.{kind}", dict.fromkeys("txyp", np.zeros(3_000_000, np.int8))
     if kind == "h5":
         write_columns(path, zeros, chunks=(1_000_000,), compression="gzip", compression_opts=9)
@@ -332,10 +332,7 @@ def test_flipped_bits_and_cuts_are_refused_or_read_in_order(tmp_path: Path, kind
     """400 damaged files: one line or events that keep the rules, never a traceback."""
     events = EventBatch.checked(**_arguments(some_columns(400)), width_px=640, height_px=480)
     path = tmp_path / f"a.{kind}"
-    if kind == "h5":
-        write_recording(path, events, width_px=640, height_px=480, attributes={"lens": "x"})
-    else:
-        write_npz(path, events, width_px=640, height_px=480)
+    write_recording(path, events, width_px=640, height_px=480, attributes={"lens": "x"})
     whole = path.read_bytes()
     rng = np.random.default_rng(5)
     for k in range(400):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from spinscope.pipeline.errors import RecordingError
-from spinscope.pipeline.recordings import open_recording, write_npz, write_raw, write_recording
+from spinscope.pipeline.recordings import open_recording, write_recording
 from spinscope.pipeline.recordings.sensor import KNOWN_SENSORS, smallest_known
 from tests.pipeline.recordings.test_recordings_raw import assert_same_events, moving_edge
 
@@ -20,7 +20,7 @@ HEADS = {
     "a.npy": (b"\x93NUMPY\x01\x00", "single NumPy array"),
     "a.h5.gz": (b"\x1f\x8b\x08\x00", "gzip-packed"),
     "a.h5": (b"version https://git-lfs.github.com", "file named .h5 is no HDF5 file"),
-    "a.raw": (b"\x00\x01\x02\x03", "file named .raw is no Prophesee RAW with its header"),
+    "a.raw": (b"\x00\x01\x02\x03", "file named .raw is no Prophesee RAW file"),
     "a.npz": (b"no zip at all", "file named .npz is no NPZ"),
     "a.txt": (b"1 2 3 4\n", "format of the recording is unknown"),
     "b.npz": (b"PK\x03\x04 and no more", "NPZ file is damaged or was cut"),
@@ -67,9 +67,9 @@ def test_a_file_that_may_not_be_read_is_named(tmp_path: Path) -> None:
 
 def test_the_content_decides_not_the_suffix(tmp_path: Path) -> None:
     events = moving_edge(200)
-    write_recording(tmp_path / "a.raw", events, width_px=1280, height_px=720)
-    write_raw(tmp_path / "a.npz", events, width_px=1280, height_px=720)
-    write_npz(tmp_path / "a", events, width_px=1280, height_px=720)
+    for kind, name in (("h5", "a.raw"), ("raw", "a.npz"), ("npz", "a")):
+        write_recording(tmp_path / f"right.{kind}", events, width_px=1280, height_px=720)
+        (tmp_path / f"right.{kind}").rename(tmp_path / name)
     for name, format in (("a.raw", "HDF5 columns"), ("a.npz", "EVT3 RAW"), ("a", "NPZ")):
         recording = open_recording(tmp_path / name)
         assert recording.format == format and recording.sensor_from == "file"
@@ -78,13 +78,13 @@ def test_the_content_decides_not_the_suffix(tmp_path: Path) -> None:
 
 def test_identity_is_of_the_content(tmp_path: Path) -> None:
     for name, n in (("a.raw", 100), ("b.raw", 100), ("c.raw", 101)):
-        write_raw(tmp_path / name, moving_edge(n), width_px=1280, height_px=720)
+        write_recording(tmp_path / name, moving_edge(n), width_px=1280, height_px=720)
     a, b, c = (open_recording(tmp_path / name).identity() for name in ("a.raw", "b.raw", "c.raw"))
     assert a == b != c
 
 
 def test_a_sensor_that_is_none_is_refused(tmp_path: Path) -> None:
-    write_npz(tmp_path / "a.npz", moving_edge(10))
+    write_recording(tmp_path / "a.npz", moving_edge(10), width_px=1280, height_px=720)
     for size in ((0, 720), (1280, -1), (100_000, 10)):
         with pytest.raises(RecordingError, match="is not 1 to 65535 pixels"):
             open_recording(tmp_path / "a.npz", sensor=size)
@@ -99,8 +99,8 @@ def test_the_guess_is_the_smallest_known_sensor() -> None:
 
 
 def test_progress_rises_to_one(tmp_path: Path) -> None:
-    write_npz(tmp_path / "a.npz", moving_edge(1000), width_px=1280, height_px=720)
-    write_raw(tmp_path / "a.raw", moving_edge(1000), width_px=1280, height_px=720)
+    write_recording(tmp_path / "a.npz", moving_edge(1000), width_px=1280, height_px=720)
+    write_recording(tmp_path / "a.raw", moving_edge(1000), width_px=1280, height_px=720)
     write_recording(tmp_path / "a.h5", moving_edge(1000), width_px=1280, height_px=720)
     for kind in ("npz", "raw", "h5"):
         shares: list[float] = []
@@ -111,8 +111,8 @@ def test_progress_rises_to_one(tmp_path: Path) -> None:
 
 def test_an_empty_recording_can_be_read(tmp_path: Path) -> None:
     nothing = moving_edge(0)
-    write_npz(tmp_path / "a.npz", nothing)
-    write_raw(tmp_path / "a.raw", nothing, width_px=64, height_px=64)
+    write_recording(tmp_path / "a.npz", nothing, width_px=64, height_px=64)
+    write_recording(tmp_path / "a.raw", nothing, width_px=64, height_px=64)
     write_recording(tmp_path / "a.h5", nothing, width_px=64, height_px=64)
     for kind in ("npz", "raw", "h5"):
         recording = open_recording(tmp_path / f"a.{kind}")
@@ -120,7 +120,7 @@ def test_an_empty_recording_can_be_read(tmp_path: Path) -> None:
 
 
 def test_batches_do_not_change_when_reading_goes_on(tmp_path: Path) -> None:
-    write_raw(tmp_path / "a.raw", moving_edge(20_000), width_px=1280, height_px=720)
+    write_recording(tmp_path / "a.raw", moving_edge(20_000), width_px=1280, height_px=720)
     batches = list(open_recording(tmp_path / "a.raw").chunks(max_events=700))
     assert_same_events(type(batches[0]).concatenate(batches), moving_edge(20_000))
     assert not any(column.flags.writeable for b in batches for column in (b.t_us, b.x_px, b.y_px, b.on))

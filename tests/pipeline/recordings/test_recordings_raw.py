@@ -1,4 +1,4 @@
-"""RAW: the decoders against their twins, cuts and flipped bits, real recordings."""
+"""RAW: the decoders against slow ones, cuts and flipped bits, real recordings."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from hypothesis import strategies as st
 
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.events import EventBatch
-from spinscope.pipeline.recordings import Recording, Triggers, open_recording, write_raw
-from spinscope.pipeline.recordings.evt_time import BAD_WORDS, OUTSIDE, TIME_JUMPS, UNTIMED
-from spinscope.pipeline.recordings.raw import Decoder
-from spinscope.pipeline.recordings.source import Pass
-from tests.naive_recordings import NaiveDecoded, naive_evt2, naive_evt3, naive_order
+from spinscope.pipeline.recordings import Recording, Triggers, open_recording, write_recording
+from spinscope.pipeline.recordings.formats.prophesee_raw.decoding import BAD_WORDS, OUTSIDE, TIME_JUMPS, UNTIMED
+from spinscope.pipeline.recordings.formats.prophesee_raw.reader import RawDecoder
+from spinscope.pipeline.recordings.reader import ReadPass
+from tests.reference.recordings import NaiveDecoded, columns, naive_evt2, naive_evt3, naive_order, write_evt2
 
 EVT3_HEADER = b"% evt 3.0\n% format EVT3;height=720;width=1280\n% geometry 1280x720\n% end\n"
+WRITE = {"EVT3": write_recording, "EVT2": write_evt2}
 KINDS = [0x0, 0x2, 0x2, 0x3, 0x4, 0x5, 0x6, 0x6, 0x8, 0x8, 0xA, 0x1, 0x7, 0xE, 0xF, 0xC]
 HIGHS = st.one_of(st.integers(0, 4), st.integers(4090, 4095), st.integers(0, 4095))
 
@@ -49,8 +50,8 @@ CUTS = st.lists(st.integers(0, 600), max_size=5)
 
 def decoded(encoding: str, legacy: bool, data: bytes, cuts: list[int]) -> NaiveDecoded:
     """What the decoder makes of the bytes when they come in pieces, in the twin's form."""
-    reading = Pass()
-    decoder = Decoder(encoding, legacy, reading)
+    reading = ReadPass()
+    decoder = RawDecoder(encoding, legacy, reading)
     out = NaiveDecoded()
     places = [0, *sorted(min(cut, len(data)) for cut in cuts), len(data)]
     blocks = [data[a:b] for a, b in pairwise(places)]
@@ -107,7 +108,7 @@ def assert_same_events(found: EventBatch, expected: EventBatch) -> None:
 def test_a_file_cut_at_any_byte_gives_the_events_before_the_cut(tmp_path: Path, format: str) -> None:
     events = moving_edge(50)
     path, cut = tmp_path / "whole.raw", tmp_path / "cut.raw"
-    write_raw(path, events, width_px=1280, height_px=720, format=format)
+    WRITE[format](path, events, width_px=1280, height_px=720)
     data = path.read_bytes()
     start = data.index(b"% end\n") + 6
     word_bytes = {"EVT3": 2, "EVT2": 4}[format]
@@ -126,7 +127,7 @@ def test_a_file_cut_at_any_byte_gives_the_events_before_the_cut(tmp_path: Path, 
 @pytest.mark.parametrize("format", ["EVT3", "EVT2"])
 def test_a_header_cut_anywhere_is_refused_or_empty(tmp_path: Path, format: str) -> None:
     path = tmp_path / "whole.raw"
-    write_raw(path, moving_edge(20), width_px=1280, height_px=720, format=format)
+    WRITE[format](path, moving_edge(20), width_px=1280, height_px=720)
     data = path.read_bytes()
     for end in range(1, data.index(b"% end\n") + 6):
         path.write_bytes(data[:end])
@@ -141,7 +142,7 @@ def test_flipped_bits_never_break_order_or_bounds(tmp_path: Path, format: str) -
     """1000 files with 1 to 20 flipped bits each: no crash, times rise, pixels on the sensor, little lost."""
     events = moving_edge(400)
     path = tmp_path / "flipped.raw"
-    write_raw(path, events, width_px=1280, height_px=720, format=format)
+    WRITE[format](path, events, width_px=1280, height_px=720)
     whole = path.read_bytes()
     start = whole.index(b"% end\n") + 6
     rng = np.random.default_rng(11)
@@ -164,7 +165,7 @@ def test_one_flipped_bit_in_a_time_word_costs_milliseconds_only(tmp_path: Path, 
     """Without the look ahead, a flip of the highest bit would shift all later events by 16.8 s."""
     events = moving_edge()
     path = tmp_path / "flipped.raw"
-    write_raw(path, events, width_px=1280, height_px=720)
+    write_recording(path, events, width_px=1280, height_px=720)
     data = bytearray(path.read_bytes())
     start = data.index(b"% end\n") + 6
     words = np.frombuffer(bytes(data[start:]), "<u2")
@@ -182,7 +183,7 @@ def test_time_wraps_and_goes_on(tmp_path: Path) -> None:
     t = np.arange(0, 70_000_000, 3_000_000)
     zeros = np.zeros(t.size, np.uint16)
     events = EventBatch(t, zeros, zeros.copy(), np.ones(t.size, np.bool_))
-    write_raw(tmp_path / "wraps.raw", events, width_px=1280, height_px=720)
+    write_recording(tmp_path / "wraps.raw", events, width_px=1280, height_px=720)
     assert_same_events(open_recording(tmp_path / "wraps.raw").read(), events)
 
 
@@ -211,7 +212,7 @@ def test_raw_round_trip_is_exact(
 ) -> None:
     path = tmp_path_factory.mktemp("raw") / "round.raw"
     events, triggers = recorded
-    write_raw(path, events, width_px=2048, height_px=2048, format=format, triggers=triggers)
+    WRITE[format](path, events, width_px=2048, height_px=2048, triggers=triggers)
     recording = open_recording(path)
     assert_same_events(recording.read(), events)
     for name in ("t_us", "value", "id"):
@@ -242,7 +243,7 @@ def test_a_raw_recording_is_its_words_in_order(tmp_path_factory: pytest.TempPath
     twin = naive_evt3(words)
     ordered, backward, late = naive_order(twin.events)
     inside = [event for event in ordered if event[1] < 1280 and event[2] < 720]
-    assert list(zip(*(c.tolist() for c in (found.t_us, found.x_px, found.y_px, found.on)), strict=True)) == inside
+    assert columns(found) == inside
     damage = recording.damage
     assert (damage.backward_steps, damage.late_events) == (backward, late)
     assert damage.outside_events == twin.outside + len(ordered) - len(inside)

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spinscope.pipeline.events import EventBatch
-from spinscope.pipeline.recordings import open_recording, summary, write_npz, write_recording
+from spinscope.pipeline.recordings import open_recording, summary, write_recording
 from tests.pipeline.recordings.test_recordings_raw import moving_edge
 
 
@@ -25,7 +25,7 @@ def test_summary_is_what_plain_sums_say(tmp_path_factory: pytest.TempPathFactory
     rng = np.random.default_rng(n)
     on = rng.integers(0, 2, n).astype(np.bool_)
     pixels = rng.integers(0, 40, (2, n)).astype(np.uint16)
-    write_npz(path, EventBatch(t, pixels[0], pixels[1], on), width_px=64, height_px=48)
+    write_recording(path, EventBatch(t, pixels[0], pixels[1], on), width_px=64, height_px=48)
     recording = open_recording(path)
     whole = recording.chunks
     recording.chunks = lambda **_: whole(max_events=batch)  # type: ignore[method-assign]
@@ -68,5 +68,7 @@ def test_an_outline_that_keeps_firing_is_not_hot(tmp_path: Path) -> None:
     x, y = np.repeat(np.append(circle, [[5], [40]], axis=1), 50, axis=1).astype(np.uint16)
     t = np.arange(x.size, dtype=np.int64) * 100
     order = np.random.default_rng(0).permutation(x.size)
-    write_npz(tmp_path / "a.npz", EventBatch(t, x[order], y[order], np.ones(x.size, np.bool_)))
+    write_recording(
+        tmp_path / "a.npz", EventBatch(t, x[order], y[order], np.ones(x.size, np.bool_)), width_px=304, height_px=240
+    )
     assert summary(open_recording(tmp_path / "a.npz")).hot_pixels == 1

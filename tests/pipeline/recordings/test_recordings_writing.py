@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.events import EventBatch
-from spinscope.pipeline.recordings import Triggers, convert, open_recording, write_npz, write_raw, write_recording
+from spinscope.pipeline.recordings import Triggers, convert, open_recording, write_recording
 from spinscope.pipeline.results import Truth
 from tests.pipeline.recordings.test_recordings_raw import assert_same_events, moving_edge
 
@@ -33,10 +33,7 @@ def any_events(draw: st.DrawFn) -> EventBatch:
 @given(any_events(), st.sampled_from(["h5", "npz"]))
 def test_round_trips_are_exact(tmp_path_factory: pytest.TempPathFactory, events: EventBatch, kind: str) -> None:
     path = tmp_path_factory.mktemp("round") / f"a.{kind}"
-    if kind == "h5":
-        write_recording(path, events, width_px=65535, height_px=65535)
-    else:
-        write_npz(path, events, width_px=65535, height_px=65535)
+    write_recording(path, events, width_px=65535, height_px=65535)
     recording = open_recording(path)
     assert_same_events(recording.read(), events)
     assert recording.warnings == [] and recording.events == len(events)
@@ -80,17 +77,17 @@ def test_our_own_layout_is_as_promised(tmp_path: Path) -> None:
 def test_the_same_events_give_the_same_bytes(tmp_path: Path) -> None:
     for k in range(2):
         write_recording(tmp_path / f"{k}.h5", moving_edge(500), width_px=1280, height_px=720)
-        write_npz(tmp_path / f"{k}.npz", moving_edge(500), width_px=1280, height_px=720)
-        write_raw(tmp_path / f"{k}.raw", moving_edge(500), width_px=1280, height_px=720)
+        write_recording(tmp_path / f"{k}.npz", moving_edge(500), width_px=1280, height_px=720)
+        write_recording(tmp_path / f"{k}.raw", moving_edge(500), width_px=1280, height_px=720)
     for kind in ("h5", "npz", "raw"):
         assert (tmp_path / f"0.{kind}").read_bytes() == (tmp_path / f"1.{kind}").read_bytes()
 
 
 def test_npz_has_the_promised_columns(tmp_path: Path) -> None:
-    write_npz(tmp_path / "a.npz", moving_edge(300))
+    write_recording(tmp_path / "a.npz", moving_edge(300), width_px=1280, height_px=720)
     with np.load(tmp_path / "a.npz") as arrays:
         kinds = {name: arrays[name].dtype.str for name in arrays.files}
-        assert kinds == {"t": "<i8", "x": "<u2", "y": "<u2", "p": "|u1"}
+        assert kinds == {"t": "<i8", "x": "<u2", "y": "<u2", "p": "|u1", "width": "<u2", "height": "<u2"}
         np.testing.assert_array_equal(arrays["t"], moving_edge(300).t_us)
 
 
@@ -101,15 +98,8 @@ def test_conversion_keeps_events_and_what_the_format_can_hold(tmp_path: Path, fi
     edges = Triggers(np.array([4_000_100, 4_100_000]), np.array([1, 0], np.uint8), np.array([0, 6], np.uint8))
     source, target = tmp_path / f"a.{first}", tmp_path / f"b.{second}"
     size = {"width_px": 1000 + 280, "height_px": 720}
-    if first == "h5":
-        note: dict[str, str | float] = {"lens": "8 mm"}
-        write_recording(
-            source, events, **size, attributes=note, triggers=edges, truth=some_truth(events), t_offset_us=77
-        )
-    elif first == "npz":
-        write_npz(source, events, **size)
-    else:
-        write_raw(source, events, **size, attributes={"lens": "8 mm"}, triggers=edges)
+    note: dict[str, str | float] = {"lens": "8 mm"}
+    write_recording(source, events, **size, attributes=note, triggers=edges, truth=some_truth(events), t_offset_us=77)
     shares: list[float] = []
     convert(source, target, on_progress=shares.append)
     recording = open_recording(target)
@@ -148,12 +138,12 @@ def failing(events: EventBatch) -> Iterator[EventBatch]:
 
 
 def test_a_source_that_breaks_off_leaves_the_old_file_alone(tmp_path: Path) -> None:
-    for write, name in ((write_recording, "a.h5"), (write_npz, "a.npz"), (write_raw, "a.raw")):
+    for name in ("a.h5", "a.npz", "a.raw"):
         path = tmp_path / name
-        write(path, moving_edge(30), width_px=1280, height_px=720)
+        write_recording(path, moving_edge(30), width_px=1280, height_px=720)
         before = path.read_bytes()
         with pytest.raises(RecordingError, match="the source broke off"):
-            write(path, failing(moving_edge(400)), width_px=1280, height_px=720)
+            write_recording(path, failing(moving_edge(400)), width_px=1280, height_px=720)
         assert path.read_bytes() == before
     assert len(list(tmp_path.iterdir())) == 3
 
@@ -174,9 +164,9 @@ def test_a_full_disk_leaves_nothing_behind(tmp_path: Path, limit: int) -> None:
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, old[1]))
-        for write, name in ((write_recording, "a.h5"), (write_npz, "a.npz"), (write_raw, "a.raw")):
+        for name in ("a.h5", "a.npz", "a.raw"):
             with pytest.raises(RecordingError, match=r"cannot be written \(File too large\).*a\.\w+$"):
-                write(tmp_path / name, batches(), width_px=1280, height_px=720)
+                write_recording(tmp_path / name, batches(), width_px=1280, height_px=720)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, old)
         signal.signal(signal.SIGXFSZ, handler)
@@ -186,16 +176,16 @@ def test_a_full_disk_leaves_nothing_behind(tmp_path: Path, limit: int) -> None:
 def test_what_no_reader_would_take_back_is_not_written(tmp_path: Path) -> None:
     events = moving_edge(50)
     backwards = [events[25:], events[:25]]
-    for write, name in ((write_recording, "a.h5"), (write_npz, "a.npz"), (write_raw, "a.raw")):
+    for name in ("a.h5", "a.npz", "a.raw"):
         with pytest.raises(RecordingError, match="not in order of time"):
-            write(tmp_path / name, backwards, width_px=1280, height_px=720)
+            write_recording(tmp_path / name, backwards, width_px=1280, height_px=720)
         with pytest.raises(RecordingError, match="state a larger sensor"):
-            write(tmp_path / name, events, width_px=1280, height_px=20)
+            write_recording(tmp_path / name, events, width_px=1280, height_px=20)
     with pytest.raises(RecordingError, match="one an event is needed"):
         write_recording(tmp_path / "a.h5", events, width_px=1280, height_px=720, truth=some_truth(events[:10]))
     early = EventBatch(events.t_us - 10**9, events.x_px, events.y_px, events.on)
     with pytest.raises(RecordingError, match="do not fit in EVT3"):
-        write_raw(tmp_path / "a.raw", early, width_px=1280, height_px=720)
-    with pytest.raises(RecordingError, match=r"'EVT9' cannot be written, EVT3 and EVT2 can"):
-        write_raw(tmp_path / "a.raw", events, width_px=1280, height_px=720, format="EVT9")
+        write_recording(tmp_path / "a.raw", early, width_px=1280, height_px=720)
+    with pytest.raises(RecordingError, match="EVT3 holds pixels up to 2047"):
+        write_recording(tmp_path / "a.raw", events, width_px=2049, height_px=720)
     assert list(tmp_path.iterdir()) == []

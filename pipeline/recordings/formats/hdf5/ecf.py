@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ..errors import RecordingError
+from ....errors import RecordingError
 
 Bytes = NDArray[np.uint8]
 
@@ -24,7 +24,7 @@ DAMAGED = -1
 
 
 class EcfBlock(NamedTuple):
-    """Room for the events of one block: t (n,) int64, x, y (n,) uint16, p (n,) uint8."""
+    """Arrays for the events of one block: t (n,) int64, x, y (n,) uint16, p (n,) uint8."""
 
     t: NDArray[np.int64]
     x: NDArray[np.uint16]
@@ -33,7 +33,15 @@ class EcfBlock(NamedTuple):
 
 
 class EcfRows:
-    """Rows of an ECF-compressed dataset of events."""
+    """Rows of an ECF-compressed dataset of events.
+
+    Parameters
+    ----------
+    data : h5py.Dataset
+        Chunked dataset with ECF as its only filter.
+    path : Path
+        File that messages name.
+    """
 
     def __init__(self, data: h5py.Dataset, path: Path) -> None:
         self._data, self._path = data, path
@@ -42,7 +50,7 @@ class EcfRows:
             raise RecordingError(f"ECF blocks of {self._block_rows} events: the file is damaged: {path}")
 
     def rows_of(self, first: int, upto: int) -> tuple[NDArray[Any], ...]:
-        """t, x, y and p of rows [first, upto)."""
+        """Decode t, x, y and p of rows [first, upto)."""
         size = self._block_rows
         parts = []
         for block in range(first // size, -(-upto // size)):
@@ -50,7 +58,7 @@ class EcfRows:
             rows = slice(max(first - start, 0), min(upto - start, size))
             parts.append([column[rows] for column in self._block(start, rows.stop)])
         if not parts:
-            return _room(0)
+            return _empty_block(0)
         return tuple(np.concatenate(columns) for columns in zip(*parts, strict=True))
 
     def _block(self, start: int, needed: int) -> EcfBlock:
@@ -58,7 +66,7 @@ class EcfRows:
         if mask:  # stored as it is
             records = np.frombuffer(packed, self._data.dtype)
             return EcfBlock(records["t"], records["x"], records["y"], records["p"])
-        out = _room(self._block_rows)
+        out = _empty_block(self._block_rows)
         count = decode_ecf(out, np.frombuffer(packed + bytes(PAD_BYTES), np.uint8))
         if count < needed:
             raise RecordingError(
@@ -67,7 +75,7 @@ class EcfRows:
         return out
 
 
-def _room(events: int) -> EcfBlock:
+def _empty_block(events: int) -> EcfBlock:
     return EcfBlock(
         np.empty(events, np.int64),
         np.empty(events, np.uint16),
@@ -78,7 +86,7 @@ def _room(events: int) -> EcfBlock:
 
 @njit(cache=True, nogil=True)
 def _number(data: Bytes, at: int, size: int) -> int:
-    """Little-endian number of `size` bytes."""
+    """Read a little-endian number of `size` bytes."""
     value = 0
     for k in range(size):
         value |= int(data[at + k]) << (8 * k)
@@ -87,7 +95,20 @@ def _number(data: Bytes, at: int, size: int) -> int:
 
 @njit(cache=True, nogil=True)
 def decode_ecf(out: EcfBlock, data: Bytes) -> int:
-    """Decode a block, data (n + PAD_BYTES,) uint8, into out; returns the number of events or DAMAGED."""
+    """Decode a block into `out`.
+
+    Parameters
+    ----------
+    out : EcfBlock
+        Arrays that the events are written to.
+    data : (n + PAD_BYTES,) uint8
+        The block, followed by zeros.
+
+    Returns
+    -------
+    int
+        Number of events, or DAMAGED.
+    """
     end = data.size - PAD_BYTES
     if end < 12:
         return DAMAGED
@@ -113,7 +134,7 @@ def decode_ecf(out: EcfBlock, data: Bytes) -> int:
 
 @njit(cache=True, nogil=True)
 def _times(t: NDArray[np.int64], count: int, data: Bytes, at: int, now: int) -> int:
-    """Bytes of (step, run length), 4 bits each; step 15: 4 bits of a long step, the low ones first."""
+    """Decode bytes of (step, run length), 4 bits each; step 15: 4 bits of a long step, the low ones first."""
     end = data.size - PAD_BYTES
     done, shift, long_step = 0, 0, 0
     while done < count:
@@ -140,7 +161,7 @@ def _times(t: NDArray[np.int64], count: int, data: Bytes, at: int, now: int) -> 
 
 @njit(cache=True, nogil=True)
 def _runs(values: NDArray[Any], count: int, data: Bytes, at: int, size: int, run_bits: int) -> int:
-    """Words of `size` bytes: a value, then `run_bits` of run length; all ones = it is in 16 bits more."""
+    """Decode words of `size` bytes: a value, then `run_bits` of run length; all ones = it is in 16 bits more."""
     end, full = data.size - PAD_BYTES, (1 << run_bits) - 1
     done = 0
     while done < count:
@@ -160,7 +181,7 @@ def _runs(values: NDArray[Any], count: int, data: Bytes, at: int, size: int, run
 
 @njit(cache=True, nogil=True)
 def _columns_masked(x: NDArray[np.uint16], count: int, data: Bytes, at: int) -> int:
-    """16-bit words: x above, and 5 bits (highest first) that say which of the next 5 columns follow."""
+    """Decode 16-bit words: x above, and 5 bits (highest first) that say which of the next 5 columns follow."""
     end = data.size - PAD_BYTES
     done = 0
     while done < count:
@@ -179,7 +200,7 @@ def _columns_masked(x: NDArray[np.uint16], count: int, data: Bytes, at: int) -> 
 
 @njit(cache=True, nogil=True)
 def _columns_packed(out: EcfBlock, count: int, data: Bytes, at: int) -> int:
-    """Four events of 12 bits (x, p) in three 16-bit words; second and third begin with their low bits."""
+    """Decode four events of 12 bits (x, p) in three 16-bit words; second and third begin with their low bits."""
     end = data.size - PAD_BYTES
     for first in range(0, count, 4):
         if at >= end:
@@ -195,7 +216,7 @@ def _columns_packed(out: EcfBlock, count: int, data: Bytes, at: int) -> int:
 
 @njit(cache=True, nogil=True)
 def _pixels_packed(out: EcfBlock, count: int, data: Bytes, at: int) -> int:
-    """Four events of 24 bits (y, x, p) in three 32-bit words, split in the same way."""
+    """Decode four events of 24 bits (y, x, p) in three 32-bit words, split in the same way."""
     end = data.size - PAD_BYTES
     for first in range(0, count, 4):
         if at >= end:

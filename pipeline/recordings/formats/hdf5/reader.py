@@ -1,8 +1,9 @@
-"""Reading HDF5 recordings: Prophesee's compound layout and the column layout of DSEC and Spinscope."""
+"""Reader of HDF5 recordings."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,47 +11,47 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import RecordingError
-from ..results import Truth
-from .columns import ColumnTypes, named_columns, refuse_bomb, refuse_types
-from .hdf5_heap import refuse_endless_heap
-from .sensor import Sensor, geometry_or_none, stated_or_none
-from .source import MAX_DISORDER_US, Columns, Pass, Triggers, translated
+from ....errors import RecordingError
+from ....results import Truth
+from ...column_types import ColumnTypes, check_expansion, check_types, named_columns
+from ...reader import MAX_DISORDER_US, ReadPass, Triggers, UncheckedEvents, file_errors
+from ...sensor import Resolution, geometry_or_none, resolution_or_none
+from .heap import check_heap
 
 ECF_FILTER = 0x8ECF  # Prophesee's event compression, in no plugin package; decoded in `ecf.py`
-SNIFFED_ROWS = 4096  # times looked at, first and last, to tell seconds from microseconds
+SAMPLED_ROWS = 4096  # times looked at, first and last, to tell seconds from microseconds
 COMPOUNDS = ("CD/events", "events")
 TRIGGERS = "EXT_TRIGGER/events"
 
 
-class Hdf5Source:
-    """One HDF5 recording."""
+class Hdf5Reader:
+    """Reader of one HDF5 recording."""
 
-    order_is_law = True
+    strict_order = True
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.warnings: list[str] = []
-        with translated(path, "HDF5"), h5py.File(path, "r") as file:
-            self._layout = Layout.found(file, path)
+        with file_errors(path, "HDF5"), h5py.File(path, "r") as file:
+            self._layout = Hdf5Layout.found(file, path)
             self.format = self._layout.format
             if any(_has_texts(file[place]) for place in self._layout.attribute_places):
-                refuse_endless_heap(path)
+                check_heap(path)
             self.attributes = _attributes(file)
             self.stated = _stated_sensor(file, self._layout, self.warnings)
             self.t_offset_us = _t_offset_us(file)
-            table = Table(file, self._layout, path)
+            table = Hdf5Table(file, self._layout, path)
             self.events: int | None = table.rows
-            first = table.times_of(0, min(SNIFFED_ROWS, table.rows))
-            last = table.times_of(max(table.rows - SNIFFED_ROWS, 0), table.rows)
+            first = table.times_of(0, min(SAMPLED_ROWS, table.rows))
+            last = table.times_of(max(table.rows - SAMPLED_ROWS, 0), table.rows)
         self._types = ColumnTypes(path, first.dtype, np.concatenate([first, last]))
         if self._types.warning:
             self.warnings.append(self._types.warning)
 
-    def columns(self, reading: Pass) -> Iterator[Columns]:
-        """The events; rows far outside the asked times are skipped by bisection."""
-        with translated(self.path, "HDF5"), h5py.File(self.path, "r") as file:
-            table = Table(file, self._layout, self.path)
+    def columns(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
+        """Yield the events; rows far outside the requested times are skipped by bisection."""
+        with file_errors(self.path, "HDF5"), h5py.File(self.path, "r") as file:
+            table = Hdf5Table(file, self._layout, self.path)
             if TRIGGERS in file:
                 reading.triggers.append(_triggers(file[TRIGGERS]))
             first = 0 if reading.start_us is None else self._row_before(table, reading.start_us)
@@ -60,19 +61,18 @@ class Hdf5Source:
                 block = self._types.columns(row, *table.rows_of(row, upto))
                 yield block
                 reading.report(upto - first, table.rows - first)
-                # No event that follows one 10 ms behind the end can lie before it (see TimeOrder).
-                if reading.end_us is not None and int(block.t_us[-1]) >= reading.end_us + MAX_DISORDER_US:
+                if reading.is_past(int(block.t_us[-1])):
                     return
 
     def truth(self) -> Truth | None:
-        """The group /truth, None without it."""
-        with translated(self.path, "HDF5"), h5py.File(self.path, "r") as file:
+        """Read the group /truth, None without it."""
+        with file_errors(self.path, "HDF5"), h5py.File(self.path, "r") as file:
             if "truth" not in file:
                 return None
             return _truth(file["truth"], self.events or 0, self.path)
 
-    def _row_before(self, table: Table, start_us: int) -> int:
-        """A row before which all events are earlier than start_us; close to the first that is not."""
+    def _row_before(self, table: Hdf5Table, start_us: int) -> int:
+        """Row before which all events are earlier than start_us, close to the first that is not."""
         low, high = 0, table.rows  # invariant: all rows before low are early
         while high - low > 1:
             middle = (low + high) // 2
@@ -85,20 +85,35 @@ class Hdf5Source:
         return low
 
 
-class Layout:
-    """Where in a file the events are: one compound dataset, or a group and the names of its columns."""
+@dataclass(frozen=True, slots=True)
+class Hdf5Layout:
+    """Place of the events in a file.
 
-    def __init__(self, format: str, place: str, names: dict[str, str], compound: bool) -> None:
-        self.format, self.place, self.names, self.compound = format, place, names, compound
+    Attributes
+    ----------
+    format : str
+        Name of the layout for people.
+    place : str
+        Path of the compound dataset, or of the group of the columns.
+    names : dict of str to str
+        Field or dataset of t, x, y and p.
+    compound : bool
+        Whether the events are one dataset of records.
+    """
+
+    format: str
+    place: str
+    names: dict[str, str]
+    compound: bool
 
     @property
     def attribute_places(self) -> list[str]:
-        """The root, the events and what they lie in."""
+        """Root, events, and the group that they lie in."""
         return list(dict.fromkeys(("/", self.place, self.place.rpartition("/")[0] or "/")))
 
     @classmethod
-    def found(cls, file: h5py.File, path: Path) -> Layout:
-        """The layout of this file; raises RecordingError when it holds no events."""
+    def found(cls, file: h5py.File, path: Path) -> Hdf5Layout:
+        """Find the layout of a file; raises RecordingError when it holds no events."""
         for place in COMPOUNDS:
             item = file.get(place)
             if isinstance(item, h5py.Dataset) and item.dtype.names:
@@ -118,10 +133,10 @@ class Layout:
         )
 
 
-class Table:
-    """The event rows of an open file; checks that they can be read at all."""
+class Hdf5Table:
+    """Event rows of an open file, checked for being all there and readable."""
 
-    def __init__(self, file: h5py.File, layout: Layout, path: Path) -> None:
+    def __init__(self, file: h5py.File, layout: Hdf5Layout, path: Path) -> None:
         self._path, self._layout = path, layout
         place = file[layout.place]
         self._sets = {layout.place: place} if layout.compound else {c: place[n] for c, n in layout.names.items()}
@@ -131,15 +146,15 @@ class Table:
             raise RecordingError(f"event columns differ in length ({listed}): export the recording again: {path}")
         self.rows = int(next(iter(shapes.values()))[0])
         if layout.compound:
-            refuse_types(path, {c: place.dtype[n] for c, n in layout.names.items()})
+            check_types(path, {c: place.dtype[n] for c, n in layout.names.items()})
         else:
-            refuse_types(path, {c: data.dtype for c, data in self._sets.items()})
+            check_types(path, {c: data.dtype for c, data in self._sets.items()})
         self._ecf: Any = None
         for data in self._sets.values():
             self._check_storage(data)
 
     def rows_of(self, first: int, upto: int) -> tuple[NDArray[Any], ...]:
-        """t, x, y and p of rows [first, upto), as they are in the file."""
+        """Read t, x, y and p of rows [first, upto), in the types of the file."""
         if self._ecf is not None:
             columns: tuple[NDArray[Any], ...] = self._ecf.rows_of(first, upto)
             return columns
@@ -149,14 +164,14 @@ class Table:
         return tuple(np.ascontiguousarray(records[self._layout.names[c]]) for c in "txyp")
 
     def times_of(self, first: int, upto: int) -> NDArray[Any]:
-        """The times of rows [first, upto), as they are in the file."""
+        """Read the times of rows [first, upto), in the type of the file."""
         if self._layout.compound:
             return self.rows_of(first, upto)[0]
         times: NDArray[Any] = self._sets["t"][first:upto]
         return times
 
     def _check_storage(self, data: h5py.Dataset) -> None:
-        """Refuse data that is not all there (HDF5 would read zeros), bombs, and filters nobody can undo."""
+        """Refuse missing blocks (HDF5 would read zeros), decompression bombs, and unknown filters."""
         unpacked = self.rows * data.dtype.itemsize
         if data.chunks is not None:
             chunks = -(-self.rows // data.chunks[0])
@@ -170,10 +185,10 @@ class Table:
                 return
         elif data.id.get_storage_size() < unpacked and data.external is None:
             raise RecordingError(f"{data.name} is not all in the file: copy or export it again: {self._path}")
-        refuse_bomb(data.id.get_storage_size(), unpacked, self._path)
+        check_expansion(data.id.get_storage_size(), unpacked, self._path)
 
     def _undo_filters(self, data: h5py.Dataset) -> bool:
-        """Make sure that the filters can be undone; True if they are Prophesee's, undone here."""
+        """Check that the filters can be undone; True if they are Prophesee's, undone by `EcfRows`."""
         filters = data.id.get_create_plist()
         codes = [filters.get_filter(i)[0] for i in range(filters.get_nfilters())]
         if codes == [ECF_FILTER] and self._layout.compound:
@@ -212,11 +227,11 @@ def _attributes(file: h5py.File) -> dict[str, str | float]:
     return found
 
 
-def _stated_sensor(file: h5py.File, layout: Layout, warnings: list[str]) -> Sensor | None:
+def _stated_sensor(file: h5py.File, layout: Hdf5Layout, warnings: list[str]) -> Resolution | None:
     for place in layout.attribute_places:
         attributes = file[place].attrs
         if "width" in attributes and "height" in attributes:
-            return stated_or_none(_scalar(attributes["width"]), _scalar(attributes["height"]), warnings)
+            return resolution_or_none(_scalar(attributes["width"]), _scalar(attributes["height"]), warnings)
         if "geometry" in attributes:
             text = _scalar(attributes["geometry"])
             text = text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text)

@@ -1,4 +1,4 @@
-"""Reading Prophesee DAT files: a header of text lines, two bytes, then 64 bits an event."""
+"""Prophesee DAT: a header of text lines, two bytes, then 64 bits an event."""
 
 from __future__ import annotations
 
@@ -7,29 +7,30 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import RecordingError
-from ..results import Truth
-from .raw import HEADER_BYTES, parsed_header
-from .sensor import stated_or_none
-from .source import Columns, Pass, translated
+from ...errors import RecordingError
+from ...results import Truth
+from ..prophesee_header import MAX_HEADER_BYTES, parse_header
+from ..reader import ReadPass, UncheckedEvents, file_errors
+from ..sensor import resolution_or_none
+from .registry import FORMATS, RecordingFormat
 
 EVENT_BYTES = 8
 EVENT_KINDS = (0x00, 0x0C)  # 2D events of version 1 and CD events of version 2
 FIELDS = np.dtype([("t", "<u4"), ("pixel", "<u4")])  # pixel: x 14 bits, y 14 bits, polarity 4 bits
 
 
-class DatSource:
-    """One DAT recording."""
+class DatReader:
+    """Reader of one DAT recording."""
 
     format = "DAT"
-    order_is_law = False
+    strict_order = False
     t_offset_us: int | None = None
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.warnings: list[str] = []
-        with translated(path, "DAT"), open(path, "rb") as file:
-            header, start = parsed_header(file.read(HEADER_BYTES))
+        with file_errors(path, "DAT"), open(path, "rb") as file:
+            header, start = parse_header(file.read(MAX_HEADER_BYTES))
             file.seek(start)
             kind, size = (*file.read(2), 0, 0)[:2]
             self._start, self._end = start + 2, file.seek(0, 2)
@@ -42,12 +43,12 @@ class DatSource:
         self.events: int | None = max(self._end - self._start, 0) // EVENT_BYTES
         self.stated = None
         if "Width" in header and "Height" in header:
-            self.stated = stated_or_none(header["Width"], header["Height"], self.warnings)
+            self.stated = resolution_or_none(header["Width"], header["Height"], self.warnings)
 
-    def columns(self, reading: Pass) -> Iterator[Columns]:
-        """The events; times that fall by more than half of the 32 bits have wrapped (after 71 minutes)."""
+    def columns(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
+        """Yield the events; times that fall by more than half of the 32 bits have wrapped (after 71 minutes)."""
         before, turns = 0, 0
-        with translated(self.path, "DAT"), open(self.path, "rb") as file:
+        with file_errors(self.path, "DAT"), open(self.path, "rb") as file:
             file.seek(self._start)
             while block := file.read(reading.max_events * EVENT_BYTES):
                 lost = len(block) % EVENT_BYTES
@@ -59,9 +60,25 @@ class DatSource:
                 wraps = np.cumsum(np.diff(t, prepend=before) < -(1 << 31)) + turns
                 before, turns = int(t[-1]), int(wraps[-1])
                 pixel = events["pixel"]
-                yield Columns(t + (wraps << 32), pixel & 0x3FFF, (pixel >> 14) & 0x3FFF, pixel >> 28 != 0)
+                yield UncheckedEvents(t + (wraps << 32), pixel & 0x3FFF, (pixel >> 14) & 0x3FFF, pixel >> 28 != 0)
                 reading.report(file.tell() - self._start, self._end - self._start)
 
     def truth(self) -> Truth | None:
-        """DAT files hold none."""
+        """Return None: DAT files hold no truth."""
         return None
+
+
+def is_dat(path: Path, head: bytes) -> bool:
+    """Whether a file starts like DAT: by its first line, or else by the two bytes behind its header."""
+    if head.startswith(b"% Data file"):
+        return True
+    header, end = parse_header(head)
+    names_encoding = "evt" in header or "format" in header  # RAW
+    return (
+        end > 0 and not names_encoding and head[end : end + 2] in [bytes((kind, EVENT_BYTES)) for kind in EVENT_KINDS]
+    )
+
+
+FORMATS.register(
+    RecordingFormat(name="prophesee_dat", label="Prophesee DAT", suffixes=(".dat",), sniff=is_dat, open=DatReader)
+)

@@ -1,13 +1,17 @@
-"""Slow, obvious twins of the readers' kernels: whole files as lists, one word after the other."""
+"""Slow, obvious decoders and encoders of recordings: whole files as lists, one word after the other."""
 
 from __future__ import annotations
 
 import struct
 from dataclasses import dataclass, field
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.recordings import Triggers
 
 Event = tuple[int, int, int, bool]  # t_us, x, y, on
 Ints = NDArray[np.int64]
@@ -131,6 +135,40 @@ def naive_evt2(heads: list[int], masks: list[int] | None = None) -> NaiveDecoded
         elif kind not in (0xE, 0xF):
             out.bad_words += 1
     return out
+
+
+def write_evt2(
+    path: Path, events: EventBatch, *, width_px: int, height_px: int, triggers: Triggers | None = None
+) -> None:
+    """Write RAW in EVT2, which Spinscope only reads; triggers go before events of the same time."""
+    timed = [(t, 1, (on, x, y)) for t, x, y, on in columns(events)]
+    if triggers is not None:
+        edges = zip(triggers.t_us.tolist(), triggers.value.tolist(), triggers.id.tolist(), strict=True)
+        timed += [(t, 0, (value, number)) for t, value, number in edges]
+    words, high = [], None
+    for t, is_event, content in sorted(timed, key=lambda item: item[:2]):
+        if high is None:
+            high = t // 64
+            words.append(0x8 << 28 | high)
+        while high < t // 64:
+            high = min(high + (1 << 26), t // 64)  # quarter turns
+            words.append(0x8 << 28 | high % (1 << 28))
+        low = (t % 64) << 22
+        if is_event:
+            on, x, y = content
+            words.append(int(on) << 28 | low | x << 11 | y)
+        else:
+            value, number = content
+            words.append(0xA << 28 | low | number << 8 | value)
+    if high is not None:
+        words.append(0x8 << 28 | high % (1 << 28))  # confirms the last one
+    header = f"% evt 2.0\n% format EVT2;height={height_px};width={width_px}\n% geometry {width_px}x{height_px}\n% end\n"
+    path.write_bytes(header.encode() + np.array(words, "<u4").tobytes())
+
+
+def columns(events: EventBatch) -> list[Event]:
+    """Events of a batch one by one."""
+    return list(zip(*(c.tolist() for c in (events.t_us, events.x_px, events.y_px, events.on)), strict=True))
 
 
 def naive_order(events: list[Event]) -> tuple[list[Event], int, int]:

@@ -1,4 +1,4 @@
-"""A check that HDF5 leaves out: texts in a damaged heap can send the library round for ever.
+"""Check for endless loops in HDF5's global heap, on which the library itself would hang.
 
 Texts of attributes lie in "global heap collections" (HDF5 file format, III.E): a head of 16 bytes, then
 objects that each start with 16 bytes, index 0 being the free space. The library steps from object to object
@@ -10,15 +10,15 @@ from __future__ import annotations
 import struct
 from pathlib import Path
 
-from ..errors import RecordingError
+from ....errors import RecordingError
 
 SIGNATURE = b"GCOL\x01\x00\x00\x00"
 SEARCHED_BYTES = 8 << 20  # attributes are written before or after the columns: heaps lie near either end
 HEAD_BYTES = 16
 
 
-def refuse_endless_heap(path: Path) -> None:
-    """Raise RecordingError when a heap near the start or the end of the file would not end."""
+def check_heap(path: Path) -> None:
+    """Raise RecordingError when the walk over a heap near the start or the end of the file would not end."""
     with open(path, "rb") as file:
         size = file.seek(0, 2)
         for start in dict.fromkeys((0, max(0, size - SEARCHED_BYTES))):
@@ -26,14 +26,14 @@ def refuse_endless_heap(path: Path) -> None:
             data = file.read(SEARCHED_BYTES)
             at = data.find(SIGNATURE)
             while at >= 0:
-                if not ends(data[at:]):
+                if not terminates(data[at:]):
                     raise RecordingError(
                         f"HDF5 file is damaged (a heap of texts without end): copy or export it again: {path}"
                     )
                 at = data.find(SIGNATURE, at + 1)
 
 
-def ends(heap: bytes) -> bool:
+def terminates(heap: bytes) -> bool:
     """Whether walking over the objects of the collection that `heap` starts with comes to an end."""
     if len(heap) < HEAD_BYTES:
         return True

@@ -1,4 +1,4 @@
-"""Reading Prophesee RAW files: a header of text lines, then EVT2, EVT2.1 or EVT3 words."""
+"""Reader of Prophesee RAW files: a header of text lines, then EVT2, EVT2.1 or EVT3 words."""
 
 from __future__ import annotations
 
@@ -8,34 +8,34 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import RecordingError
-from ..results import Truth
-from .evt2 import decode_evt2
+from ....errors import RecordingError
+from ....results import Truth
+from ...prophesee_header import MAX_HEADER_BYTES, parse_header
+from ...reader import ReadPass, Triggers, UncheckedEvents, file_errors
+from ...sensor import SENSOR_OF_SYSTEM_ID, Resolution, geometry_or_none, resolution_or_none
+from .decoding import BAD_WORDS, EVENTS, OUTSIDE, TIME_HIGH, TIME_JUMPS, TRIGGERS, UNTIMED, Decoded, initial_state
+from .evt2 import HIGH_BITS, HIGH_MASK, decode_evt2
 from .evt3 import decode_evt3
-from .evt_time import BAD_WORDS, EVENTS, OUTSIDE, TIME_JUMPS, TRIGGERS, UNTIMED, Decoded, fresh_state
-from .sensor import SENSOR_OF_SYSTEM_ID, Sensor, geometry_or_none, stated_or_none
-from .source import Columns, Pass, Triggers, translated
 
 READ_BYTES = 4 << 20
-HEADER_BYTES = 64 << 10  # longer headers are none
 TRIGGER_ROOM = 1 << 14  # triggers decoded at once
 STEADY_STEPS = 16  # of 64 us between two TIME_HIGH words: sensors send one each 16 us to 1 ms
 WORD_BYTES = {"EVT2": 4, "EVT2.1": 8, "EVT3": 2}
 
 
-class RawSource:
-    """One RAW recording."""
+class RawReader:
+    """Reader of one RAW recording."""
 
-    order_is_law = False
+    strict_order = False
     t_offset_us: int | None = None
     events: int | None = None
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.warnings: list[str] = []
-        with translated(path, "RAW"), open(path, "rb") as file:
-            head = file.read(HEADER_BYTES)
-        header, self._start = parsed_header(head)
+        with file_errors(path, "RAW"), open(path, "rb") as file:
+            head = file.read(MAX_HEADER_BYTES)
+        header, self._start = parse_header(head)
         self.attributes: dict[str, str | float] = dict(header)
         options = format_options(header)
         self._encoding = _encoding(header, options, path)
@@ -45,10 +45,10 @@ class RawSource:
         if self._encoding == "EVT2.1":
             self._legacy = self._is_legacy(options.get("endianness", ""), head[self._start :])
 
-    def columns(self, reading: Pass) -> Iterator[Columns]:
-        """The events, decoded from the start: only the words before tell the time."""
-        decoder = Decoder(self._encoding, self._legacy, reading)
-        with translated(self.path, "RAW"), open(self.path, "rb") as file:
+    def columns(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
+        """Yield the events, decoded from the start: only the words before tell the time."""
+        decoder = RawDecoder(self._encoding, self._legacy, reading)
+        with file_errors(self.path, "RAW"), open(self.path, "rb") as file:
             size = file.seek(0, 2)
             file.seek(self._start)
             while block := file.read(READ_BYTES):
@@ -57,7 +57,7 @@ class RawSource:
             yield from decoder.feed(b"", final=True)
 
     def truth(self) -> Truth | None:
-        """RAW files hold none."""
+        """Return None: RAW files hold no truth."""
         return None
 
     def _is_legacy(self, endianness: str, data: bytes) -> bool:
@@ -69,7 +69,7 @@ class RawSource:
         halves = np.frombuffer(data[: len(data) // 8 * 8], "<u4").reshape(-1, 2)
         steady = []
         for head in (halves[:, 0], halves[:, 1]):
-            times = (head[head >> 28 == 8] & 0xFFFFFFF).astype(np.int64)
+            times = (head[head >> HIGH_BITS == TIME_HIGH] & HIGH_MASK).astype(np.int64)
             steps = np.diff(times)
             steady.append(int(np.count_nonzero((steps > 0) & (steps <= STEADY_STEPS))))
         legacy = steady[0] >= steady[1]
@@ -78,20 +78,27 @@ class RawSource:
         return legacy
 
 
-class Decoder:
-    """Words in, events out; remembers what it must from one block of bytes to the next.
+class RawDecoder:
+    """Stream decoder: bytes in blocks of any size in, events out.
 
-    encoding : EVT2, EVT2.1 or EVT3; legacy : EVT2.1 with the half that holds the type first
+    Parameters
+    ----------
+    encoding : str
+        EVT2, EVT2.1 or EVT3.
+    legacy : bool
+        EVT2.1 with the half that holds the type first.
+    reading : ReadPass
+        Pass to which damage and triggers are added.
     """
 
-    def __init__(self, encoding: str, legacy: bool, reading: Pass) -> None:
+    def __init__(self, encoding: str, legacy: bool, reading: ReadPass) -> None:
         self._encoding, self._legacy, self._reading = encoding, legacy, reading
         self._word_bytes = WORD_BYTES[encoding]
-        self._state = fresh_state()
+        self._state = initial_state()
         self._rest = b""
 
-    def feed(self, block: bytes, final: bool) -> Iterator[Columns]:
-        """The events of the next bytes of the file; final: there are no more."""
+    def feed(self, block: bytes, final: bool) -> Iterator[UncheckedEvents]:
+        """Yield the events of the next bytes of the file; final: there are no more."""
         data = self._rest + block
         count = len(data) // self._word_bytes
         done = 0
@@ -110,7 +117,7 @@ class Decoder:
             damage.outside_events += state[OUTSIDE]
             damage.lost_bytes = len(self._rest)
 
-    def _decode(self, data: bytes, final: bool) -> tuple[int, Columns]:
+    def _decode(self, data: bytes, final: bool) -> tuple[int, UncheckedEvents]:
         room = max(self._reading.max_events, 4096)
         out = Decoded(
             np.empty(room, np.int64),
@@ -131,7 +138,7 @@ class Decoder:
         if triggers:
             t_us, value, number = out.trigger_t_us, out.trigger_value, out.trigger_id
             self._reading.triggers.append(Triggers(t_us[:triggers], value[:triggers], number[:triggers]))
-        return used, Columns(out.t_us[:events], out.x_px[:events], out.y_px[:events], out.on[:events])
+        return used, UncheckedEvents(out.t_us[:events], out.x_px[:events], out.y_px[:events], out.on[:events])
 
     def _halves(self, data: bytes) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
         words = np.frombuffer(data, "<u4")
@@ -141,27 +148,8 @@ class Decoder:
         return (first, second) if self._legacy else (second, first)
 
 
-def parsed_header(head: bytes) -> tuple[dict[str, str], int]:
-    """Keys and values of the lines "% key value" at the start of a file, and where they end.
-
-    The header ends with the line "% end" or, in old files, before the first line that has no "% " in front.
-    """
-    found: dict[str, str] = {}
-    at = 0
-    while head.startswith(b"% ", at):
-        end = head.find(b"\n", at)
-        if end < 0:
-            return found, len(head)  # cut within the header: no events
-        key, _, value = head[at + 2 : end].decode("utf-8", "replace").strip().partition(" ")
-        at = end + 1
-        if key == "end":
-            break
-        found[key] = value.strip()
-    return found, at
-
-
 def format_options(header: dict[str, str]) -> dict[str, str]:
-    """The parts of "EVT3;height=720;width=1280": {"": "EVT3", "height": "720", "width": "1280"}."""
+    """Split "EVT3;height=720;width=1280": {"": "EVT3", "height": "720", "width": "1280"}."""
     name, *rest = header.get("format", "").split(";")
     pairs = (item.partition("=") for item in rest)
     return {"": name.strip(), **{key.strip(): value.strip() for key, _, value in pairs}}
@@ -181,12 +169,12 @@ def _encoding(header: dict[str, str], options: dict[str, str], path: Path) -> st
     )
 
 
-def _stated_sensor(header: dict[str, str], options: dict[str, str], warnings: list[str]) -> Sensor | None:
+def _stated_sensor(header: dict[str, str], options: dict[str, str], warnings: list[str]) -> Resolution | None:
     if "geometry" in header:
         return geometry_or_none(header["geometry"], warnings)
     if "width" in options and "height" in options:
-        return stated_or_none(options["width"], options["height"], warnings)
+        return resolution_or_none(options["width"], options["height"], warnings)
     number = header.get("system_ID", "")
     if number.isdecimal() and int(number) in SENSOR_OF_SYSTEM_ID:
-        return Sensor(*SENSOR_OF_SYSTEM_ID[int(number)], f"system_ID {number}")
+        return Resolution(*SENSOR_OF_SYSTEM_ID[int(number)], f"system_ID {number}")
     return None

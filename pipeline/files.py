@@ -1,0 +1,70 @@
+"""Files that appear under their name complete or not at all."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from .errors import RecordingError
+
+
+@contextmanager
+def atomic_file(path: str | Path, what: str = "file") -> Iterator[Path]:
+    """Temporary file beside `path`, which replaces it when the `with` block ends without an error.
+
+    Parameters
+    ----------
+    path : str or Path
+        File to create or to replace. A symbolic link is kept, and the file that it points to replaced. A device or a
+        pipe (`/dev/stdout`) cannot be replaced: the block writes to it directly.
+    what : str
+        Noun that the message begins with, like "recording" or "JSON".
+
+    Yields
+    ------
+    Path
+        Path to write to, not existing yet. When the block fails, the file is removed and `path` stays as it was.
+
+    Raises
+    ------
+    RecordingError
+        `path` is a folder or its folder does not exist, or the block or the replacement raised an OSError.
+    """
+    path = Path(path)
+    part: Path | None = None
+    try:
+        if path.exists() and not path.is_file() and not path.is_dir():
+            yield path
+            return
+        check_writable(path, what)
+        target = Path(os.path.realpath(path))
+        part = target.with_name(f".{secrets.token_hex(8)}.part")
+        yield part
+        with open(part, "rb+") as file:
+            os.fsync(file.fileno())
+        os.replace(part, target)
+    except BrokenPipeError:
+        raise  # the reader of a pipe has gone, which is for the command line to handle
+    except OSError as error:
+        why = error.strerror or " ".join(str(error).split())[:200]
+        raise RecordingError(f"{what} cannot be written ({why}): check free space and rights: {path}") from error
+    finally:
+        if part is not None:
+            part.unlink(missing_ok=True)
+
+
+def check_writable(path: Path, what: str = "file") -> None:
+    """Raise RecordingError when `path` cannot be written, for callers that have long work to do before."""
+    folder = Path(os.path.realpath(path)).parent
+    if path.is_dir():
+        why = "it is a folder"
+    elif not folder.is_dir():
+        why = "its folder does not exist"
+    elif not os.access(folder, os.W_OK) and not (path.exists() and not path.is_file()):
+        why = "its folder may not be written to"
+    else:
+        return
+    raise RecordingError(f"{what} cannot be written, {why}: give another name: {path}")

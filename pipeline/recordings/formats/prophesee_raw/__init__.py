@@ -1,0 +1,32 @@
+"""Prophesee RAW: EVT2, EVT2.1 and EVT3 are read, EVT3 is written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ...reader import FormatReader
+from ..prophesee_dat import is_dat
+from ..registry import FORMATS, RecordingContent, RecordingFormat
+
+
+def _sniff(path: Path, head: bytes) -> bool:
+    return head.startswith(b"% ") and not is_dat(path, head)
+
+
+def _open(path: Path) -> FormatReader:
+    from .reader import RawReader  # numba takes 0.3 s to load
+
+    return RawReader(path)
+
+
+def _write(path: Path, content: RecordingContent) -> None:
+    from .writer import write_raw
+
+    write_raw(path, content)
+
+
+FORMATS.register(
+    RecordingFormat(
+        name="prophesee_raw", label="Prophesee RAW", suffixes=(".raw",), sniff=_sniff, open=_open, write=_write
+    )
+)

@@ -1,0 +1,141 @@
+"""Output and state of the decoders of Prophesee's RAW words, and the rule for the time words.
+
+Time comes in two parts: rare TIME_HIGH words count units of 64 us (EVT2) or 4096 us (EVT3) and wrap; the low
+part comes with the events. One flipped bit in a TIME_HIGH word would throw all later events seconds or hours
+ahead, so a step that is not small must not be contradicted by the TIME_HIGH word after it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+# Indices of `Decoded.state`.
+HIGH = 0  # TIME_HIGH with the wraps counted in; -1 before the first
+LOW = 1  # low part (EVT3)
+ROW = 2  # y of the row (EVT3); -1 before the first
+COLUMN = 3  # next x of a vector (EVT3); -1 before the first
+ON = 4  # polarity of a vector (EVT3)
+TIME_KNOWN = 5  # 0 while the time is in doubt: events are dropped
+EVENTS, TRIGGERS = 6, 7  # numbers written by the last call
+BAD_WORDS, TIME_JUMPS, UNTIMED, OUTSIDE = 8, 9, 10, 11  # counts since the start
+STATE_SIZE = 12
+
+TIME_HIGH = 0x8  # type of the word, in all encodings
+LOOK_AHEAD_WORDS = 1 << 20  # more than a sensor sends between two TIME_HIGH (4 ms at 100 Mev/s: 0.4 M)
+UNCONFIRMED_JUMP_US = 1_000_000  # longest step believed of the last TIME_HIGH, which nothing can confirm
+MAX_COORDINATE = 2047  # 11 bits in all encodings
+
+MISSING = -1  # no further TIME_HIGH word
+UNREAD = -2  # it may come in the part of the file that is not read yet
+
+
+class Decoded(NamedTuple):
+    """Output arrays of a decoder, filled from their start, and its state between calls.
+
+    Attributes
+    ----------
+    t_us : (n,) int64
+    x_px, y_px : (n,) uint16
+    on : (n,) bool
+    trigger_t_us : (m,) int64
+    trigger_value, trigger_id : (m,) uint8
+    state : (STATE_SIZE,) int64
+        See the constants for its indices.
+    """
+
+    t_us: NDArray[np.int64]
+    x_px: NDArray[np.uint16]
+    y_px: NDArray[np.uint16]
+    on: NDArray[np.bool_]
+    trigger_t_us: NDArray[np.int64]
+    trigger_value: NDArray[np.uint8]
+    trigger_id: NDArray[np.uint8]
+    state: NDArray[np.int64]
+
+
+def initial_state() -> NDArray[np.int64]:
+    """State before a file's first word."""
+    state = np.zeros(STATE_SIZE, np.int64)
+    state[[HIGH, ROW, COLUMN]] = -1
+    return state
+
+
+@njit(cache=True, nogil=True)
+def _following(words: NDArray[Any], at: int, bits: int, final: bool) -> int:
+    """Value of the first TIME_HIGH word after `at`, MISSING or UNREAD."""
+    end = min(words.size, at + 1 + LOOK_AHEAD_WORDS)
+    for i in range(at + 1, end):
+        if words[i] >> bits == TIME_HIGH:
+            return int(words[i] & ((1 << bits) - 1))
+    return UNREAD if end == words.size and not final else MISSING
+
+
+@njit(cache=True, nogil=True)
+def take_time_high(
+    state: NDArray[np.int64],
+    words: NDArray[Any],
+    at: int,
+    bits: int,
+    low_bits: int,
+    unchecked_steps: int,
+    final: bool,
+) -> bool:
+    """Take the TIME_HIGH word words[at] into state[HIGH] and state[TIME_KNOWN].
+
+    Parameters
+    ----------
+    state : (STATE_SIZE,) int64
+        State of the decoder.
+    words : (n,) uint16 or uint32
+        Words with the type in the bits above `bits`.
+    at : int
+        Index of the word.
+    bits, low_bits : int
+        Bits of TIME_HIGH, and of the low part below it.
+    unchecked_steps : int
+        Steps ahead that are taken without looking at the next TIME_HIGH; so small that `TimeOrder` repairs a wrong one.
+    final : bool
+        Whether no words follow these.
+
+    Returns
+    -------
+    bool
+        False when the word has to wait for the next TIME_HIGH, which is not among the words.
+
+    Notes
+    -----
+    A value is ignored when the following one lies before it on the way round from the present time. One that is not
+    ignored and lies more than half a turn ahead is a step back (but not to before 0).
+    """
+    turn = np.int64(1) << bits
+    value = np.int64(words[at]) & (turn - 1)
+    high = state[HIGH]
+    ahead = (value - high) & (turn - 1)
+    if high >= 0 and ahead <= unchecked_steps:
+        state[HIGH], state[TIME_KNOWN] = high + ahead, 1
+        return True
+    following = _following(words, at, bits, final)
+    if following == UNREAD:
+        return False
+    if high < 0:
+        if following >= 0 and ((following - value) & (turn - 1)) >= turn >> 1:
+            state[TIME_JUMPS] += 1
+        else:
+            state[HIGH], state[TIME_KNOWN] = value, 1
+        return True
+    if following == MISSING:
+        if ahead << low_bits > UNCONFIRMED_JUMP_US:
+            state[TIME_JUMPS] += 1
+            state[TIME_KNOWN] = 0
+            return True
+    elif ((following - high) & (turn - 1)) < ahead:
+        state[TIME_JUMPS] += 1
+        return True
+    if ahead > turn >> 1 and high + ahead >= turn:
+        ahead -= turn
+    state[HIGH], state[TIME_KNOWN] = high + ahead, 1
+    return True

@@ -1,0 +1,93 @@
+"""Decoder of Prophesee EVT2 (32-bit words, one event each) and EVT2.1 (64 bits, up to 32 pixels of a row)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from .decoding import (
+    BAD_WORDS,
+    EVENTS,
+    HIGH,
+    MAX_COORDINATE,
+    OUTSIDE,
+    TIME_HIGH,
+    TIME_KNOWN,
+    TRIGGERS,
+    UNTIMED,
+    Decoded,
+    take_time_high,
+)
+
+CD_OFF, CD_ON, EXT_TRIGGER, OTHERS, CONTINUED = 0x0, 0x1, 0xA, 0xE, 0xF
+HIGH_BITS, LOW_BITS = 28, 6
+HIGH_MASK, LOW_MASK = (1 << HIGH_BITS) - 1, (1 << LOW_BITS) - 1
+UNCHECKED_STEPS = 155  # 9920 us: within the 10 ms that are put in order
+MAX_EVENTS_PER_WORD = 32
+
+
+@njit(cache=True, nogil=True)
+def decode_evt2(out: Decoded, heads: NDArray[np.uint32], masks: NDArray[np.uint32], final: bool) -> int:
+    """Decode words into `out`.
+
+    Parameters
+    ----------
+    out : Decoded
+        Arrays written to, with room for MAX_EVENTS_PER_WORD events or more.
+    heads : (n,) uint32
+        Type, low time, x, y.
+    masks : (n,) uint32
+        EVT2.1's other half, bit k = there is an event at x + k; (0,) for EVT2.
+    final : bool
+        Whether these are the last words of the file.
+
+    Returns
+    -------
+    int
+        Number of words done, as `decode_evt3`.
+    """
+    state = out.state
+    last_start, trigger_room = out.t_us.size - MAX_EVENTS_PER_WORD, out.trigger_t_us.size
+    events, triggers, done = 0, 0, heads.size
+    high_us, time_known = state[HIGH] << LOW_BITS, state[TIME_KNOWN] != 0
+    vectors = masks.size > 0
+    for i in range(heads.size):
+        if events > last_start or triggers >= trigger_room:
+            done = i
+            break
+        word = int(heads[i])
+        kind = word >> HIGH_BITS
+        if kind in (CD_OFF, CD_ON):
+            x, y = (word >> 11) & 0x7FF, word & 0x7FF
+            now_us = high_us | ((word >> 22) & LOW_MASK)
+            mask = int(masks[i]) if vectors else 1
+            while mask:
+                if mask & 1:
+                    if not time_known:
+                        state[UNTIMED] += 1
+                    elif x > MAX_COORDINATE:
+                        state[OUTSIDE] += 1
+                    else:
+                        out.t_us[events] = now_us
+                        out.x_px[events] = x
+                        out.y_px[events] = y
+                        out.on[events] = kind == CD_ON
+                        events += 1
+                mask >>= 1
+                x += 1
+        elif kind == TIME_HIGH:
+            if not take_time_high(state, heads, i, HIGH_BITS, LOW_BITS, UNCHECKED_STEPS, final):
+                done = i
+                break
+            high_us, time_known = state[HIGH] << LOW_BITS, state[TIME_KNOWN] != 0
+        elif kind == EXT_TRIGGER:
+            if time_known:
+                out.trigger_t_us[triggers] = high_us | ((word >> 22) & LOW_MASK)
+                out.trigger_value[triggers] = word & 1
+                out.trigger_id[triggers] = (word >> 8) & 0x1F
+                triggers += 1
+        elif kind not in (OTHERS, CONTINUED):
+            state[BAD_WORDS] += 1
+    state[EVENTS], state[TRIGGERS] = events, triggers
+    return done

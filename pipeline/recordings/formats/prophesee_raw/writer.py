@@ -1,0 +1,132 @@
+"""Writer of Prophesee RAW files in EVT3."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import IO, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ....errors import RecordingError
+from ....events import EventBatch
+from ...reader import Triggers
+from ..registry import RecordingContent
+from . import evt3
+from .decoding import MAX_COORDINATE, TIME_HIGH
+
+HIGH, LOW, ROW = 0, 1, 2  # indices of `Encoded.state`: value written last, -1 before the first
+TIME_MASK = (1 << evt3.TIME_BITS) - 1
+HIGH_STEP = 1 << (evt3.TIME_BITS - 2)  # TIME_HIGH runs ahead in quarter turns, which no decoder mistakes for steps back
+# Absolute times are counted up to from 0 in whole turns; later ones would need megabytes of time words.
+LIMIT_US = 1 << 40
+OWN_KEYS = ("format", "evt", "geometry", "width", "height", "end")
+
+
+class Encoded(NamedTuple):
+    """Output of the encoder: words (n,) uint16, state (3,) int64."""
+
+    words: NDArray[np.uint16]
+    state: NDArray[np.int64]
+
+
+def write_raw(path: Path, content: RecordingContent) -> None:
+    """Write a new file, with triggers among the events.
+
+    Raises RecordingError for pixels above 2047, and for times before 0 or beyond 2^40 us (12 days).
+    """
+    if max(content.width_px, content.height_px) > MAX_COORDINATE + 1:
+        raise RecordingError(
+            f"EVT3 holds pixels up to {MAX_COORDINATE}, the sensor has {content.width_px} x {content.height_px}: "
+            f"write HDF5 (.h5) or NPZ (.npz): {content.path}"
+        )
+    triggers = content.triggers()
+    triggers = triggers[np.argsort(triggers.t_us, kind="stable")]
+    state = np.full(3, -1, np.int64)
+    with open(path, "xb") as file:
+        file.write(_header(content))
+        for batch in content.batches:
+            upto = int(np.searchsorted(triggers.t_us, batch.t_us[-1], side="right"))
+            _write_words(file, state, batch, triggers[:upto], content.path)
+            triggers = triggers[upto:]
+        _write_words(file, state, EventBatch.empty(), triggers, content.path)
+        if state[HIGH] >= 0:  # once more: confirms the one before
+            file.write(np.uint16((TIME_HIGH << 12) | (int(state[HIGH]) & TIME_MASK)).tobytes())
+
+
+def _header(content: RecordingContent) -> bytes:
+    lines = {key: value for key, value in content.attributes.items() if key not in OWN_KEYS}
+    lines["evt"] = "3.0"
+    lines["format"] = f"EVT3;height={content.height_px};width={content.width_px}"
+    lines["geometry"] = f"{content.width_px}x{content.height_px}"
+    text = "".join(f"% {key} {' '.join(str(value).split())}\n" for key, value in lines.items())
+    return (text + "% end\n").encode()
+
+
+def _write_words(file: IO[bytes], state: NDArray[np.int64], batch: EventBatch, triggers: Triggers, path: Path) -> None:
+    """Encode and write events, and triggers that are not later than the last of them."""
+    ends = [int(t_us[i]) for t_us in (batch.t_us, triggers.t_us) if t_us.size for i in (0, -1)]
+    if not ends:
+        return
+    if min(ends) < 0 or max(ends) >= LIMIT_US:
+        raise RecordingError(
+            f"times from {min(ends)} to {max(ends)} us do not fit in EVT3, which goes from 0 to {LIMIT_US} us: "
+            f"write HDF5 (.h5) or NPZ (.npz): {path}"
+        )
+    steps = ((max(ends) >> evt3.TIME_BITS) - max(int(state[HIGH]), 0)) // HIGH_STEP
+    out = Encoded(np.empty(4 * len(batch) + 3 * len(triggers) + steps + 8, np.uint16), state)
+    edges = (triggers.t_us, triggers.value, triggers.id)
+    count = int(encode_evt3(out, batch.t_us, batch.x_px, batch.y_px, batch.on, *edges))
+    file.write(out.words[:count].tobytes())
+
+
+@njit(cache=True, nogil=True)
+def _write_time(out: Encoded, at: int, t_us: int) -> int:
+    """Write the time words up to a time; returns the index of the next word."""
+    state, high, low = out.state, t_us >> evt3.TIME_BITS, t_us & TIME_MASK
+    if state[HIGH] < 0:
+        state[HIGH] = high if high <= TIME_MASK else 0  # later times are counted up to
+        out.words[at] = (TIME_HIGH << 12) | state[HIGH]
+        at += 1
+    while state[HIGH] < high:
+        state[HIGH] = min(state[HIGH] + HIGH_STEP, high)
+        state[LOW] = -1
+        out.words[at] = (TIME_HIGH << 12) | (state[HIGH] & TIME_MASK)
+        at += 1
+    if state[LOW] != low:
+        state[LOW] = low
+        out.words[at] = (evt3.TIME_LOW << 12) | low
+        at += 1
+    return at
+
+
+@njit(cache=True, nogil=True)
+def encode_evt3(
+    out: Encoded,
+    t_us: NDArray[np.int64],
+    x_px: NDArray[np.uint16],
+    y_px: NDArray[np.uint16],
+    on: NDArray[np.bool_],
+    edge_t_us: NDArray[np.int64],
+    edge_value: NDArray[np.uint8],
+    edge_id: NDArray[np.uint8],
+) -> int:
+    """Encode events and trigger edges, both in order of time, into `out`; returns the number of words."""
+    at, edge = 0, 0
+    for i in range(t_us.size + 1):
+        while edge < edge_t_us.size and (i == t_us.size or edge_t_us[edge] <= t_us[i]):
+            at = _write_time(out, at, edge_t_us[edge])
+            out.words[at] = (evt3.EXT_TRIGGER << 12) | ((int(edge_id[edge]) & 0xF) << 8) | int(edge_value[edge])
+            at += 1
+            edge += 1
+        if i == t_us.size:
+            break
+        at = _write_time(out, at, t_us[i])
+        if out.state[ROW] != y_px[i]:
+            out.state[ROW] = y_px[i]
+            out.words[at] = (evt3.ADDR_Y << 12) | int(y_px[i])
+            at += 1
+        out.words[at] = (evt3.ADDR_X << 12) | (int(on[i]) << 11) | int(x_px[i])
+        at += 1
+    return at

@@ -1,0 +1,106 @@
+"""Registry of recording formats."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...errors import RecordingError
+from ...events import EventBatch
+from ...extensions import Registry
+from ...results import Truth
+from ..reader import FormatReader, Triggers
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordingContent:
+    """Events and all that goes with them, for a format to write.
+
+    Attributes
+    ----------
+    path : Path
+        File as messages name it; what is written has a temporary name.
+    batches : iterable of EventBatch
+        Events in order of time and on the sensor, to be iterated once.
+    width_px, height_px : int
+        Size of the sensor.
+    attributes : mapping of str to str or float
+        Statements about camera and scene, without those about the encoding of another file.
+    triggers : callable returning Triggers
+        Edges of the trigger input. Called before the batches are read, it costs another pass over the source.
+    truth : callable returning Truth or None
+        Simulator's truth, to be called after the batches were read: None if its labels do not fit the events.
+    t_offset_us : int or None
+        Offset of the file's time in DSEC recordings.
+    """
+
+    path: Path
+    batches: Iterable[EventBatch]
+    width_px: int
+    height_px: int
+    attributes: Mapping[str, str | float]
+    triggers: Callable[[], Triggers]
+    truth: Callable[[], Truth | None]
+    t_offset_us: int | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordingFormat:
+    """One format of recordings on disk.
+
+    Attributes
+    ----------
+    name : str
+        Unique name in the registry.
+    label : str
+        Name for people.
+    suffixes : tuple of str
+        Suffixes of its files in lower case, the usual one first; they choose the format for writing only.
+    sniff : callable
+        `sniff(path, head)` tells from the first `HEAD_BYTES` bytes, or from the file, whether it is of this format.
+    open : callable
+        `open(path)` returns the reader of a file; raises RecordingError when the file cannot be read.
+    write : callable or None
+        `write(path, content)` writes a RecordingContent to a new file; raises OSError or RecordingError. None for a
+        format that is only read.
+    keeps_truth : bool
+        Whether written files hold truth and scene of a simulation.
+    """
+
+    name: str
+    label: str
+    suffixes: tuple[str, ...]
+    sniff: Callable[[Path, bytes], bool]
+    open: Callable[[Path], FormatReader]
+    write: Callable[[Path, RecordingContent], None] | None = None
+    keeps_truth: bool = False
+
+    @property
+    def listed(self) -> str:
+        """Label and suffixes for messages: "HDF5 (.h5, .hdf5)"."""
+        return f"{self.label} ({', '.join(self.suffixes)})"
+
+
+HEAD_BYTES = 4096
+FORMATS: Registry[RecordingFormat] = Registry("recording format")
+
+
+def readable_suffixes() -> tuple[str, ...]:
+    """Suffixes of all formats, in lower case with the dot."""
+    return tuple(suffix for format in FORMATS for suffix in format.suffixes)
+
+
+def writable_suffixes() -> tuple[str, ...]:
+    """Suffixes of the formats that can be written."""
+    return tuple(suffix for format in FORMATS if format.write for suffix in format.suffixes)
+
+
+def format_to_write(path: Path) -> RecordingFormat:
+    """Format of the path's suffix; raises RecordingError unless there is one and it can be written."""
+    suffix = path.suffix.lower()
+    for format in FORMATS:
+        if suffix in format.suffixes and format.write is not None:
+            return format
+    known = ", ".join(writable_suffixes())
+    raise RecordingError(f"suffix {suffix!r} is no format that can be written: give another, one of {known}: {path}")

@@ -1,0 +1,233 @@
+"""Interface between the readers of the formats and `Recording`, and the counts of one pass over a file."""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RecordingError
+from ..results import Truth
+from .sensor import Resolution
+
+Progress = Callable[[float], None]  # called with the share done, 0 to 1
+
+CHUNK_EVENTS = 1 << 20  # events handed on at once: 13 MB
+MAX_DISORDER_US = 10_000  # events up to this far behind an earlier one are put in order; see `order.py`
+
+# Whatever the libraries below throw at damaged files; none of it may reach the user as a traceback.
+FILE_ERRORS = (
+    *(OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError, NotImplementedError),
+    *(AttributeError, IndexError, EOFError, SystemError, zlib.error, zipfile.BadZipFile),
+)
+
+
+@dataclass(slots=True)
+class Damage:
+    """Counts of everything wrong that a full pass over a recording found; all zero in a sound file.
+
+    Attributes
+    ----------
+    bad_words : int
+        RAW words of no known type (skipped).
+    backward_steps : int
+        Events earlier than the event before them in the file.
+    late_events : int
+        Of these, events of RAW files more than 10 ms behind (dropped; other files are refused).
+    time_jumps : int
+        RAW time words that the next one contradicts (ignored).
+    untimed_events : int
+        RAW events before the first time or row, or under an unconfirmed time (dropped).
+    outside_events : int
+        Events outside the sensor (dropped).
+    lost_bytes : int
+        Bytes at the file's end that make no whole word (a cut file).
+    """
+
+    bad_words: int = 0
+    backward_steps: int = 0
+    late_events: int = 0
+    time_jumps: int = 0
+    untimed_events: int = 0
+    outside_events: int = 0
+    lost_bytes: int = 0
+
+    def as_dict(self) -> dict[str, int]:
+        """Name and count of every kind."""
+        return asdict(self)
+
+    def sentences(self) -> list[str]:
+        """One sentence for people for every kind that occurred."""
+        texts = {
+            "bad_words": "{} words of no known type were skipped",
+            "backward_steps": "time steps backwards {} times; events up to 10 ms late were put in order",
+            "late_events": "{} events more than 10 ms behind earlier ones were dropped",
+            "time_jumps": "{} time words that the next one contradicts were ignored",
+            "untimed_events": "{} events without a sure time or row were dropped",
+            "outside_events": "{} events outside the sensor were dropped",
+            "lost_bytes": "{} bytes at the end make no whole word: the file was cut",
+        }
+        return [texts[name].format(count) for name, count in self.as_dict().items() if count]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Triggers:
+    """Edges on the camera's trigger input.
+
+    Attributes
+    ----------
+    t_us : (n,) int64
+        Time of the edge.
+    value : (n,) uint8
+        1 for a rising edge, 0 for a falling one.
+    id : (n,) uint8
+        Number of the input.
+    """
+
+    t_us: NDArray[np.int64]
+    value: NDArray[np.uint8]
+    id: NDArray[np.uint8]
+
+    @classmethod
+    def none(cls) -> Triggers:
+        """No edges at all."""
+        return cls.joined([])
+
+    @classmethod
+    def joined(cls, parts: list[Triggers]) -> Triggers:
+        """Concatenation in the order given."""
+        return cls(
+            np.concatenate([np.empty(0, np.int64), *(p.t_us for p in parts)]),
+            np.concatenate([np.empty(0, np.uint8), *(p.value for p in parts)]),
+            np.concatenate([np.empty(0, np.uint8), *(p.id for p in parts)]),
+        )
+
+    def __len__(self) -> int:
+        return self.t_us.size
+
+    def __getitem__(self, rows: slice | NDArray[Any]) -> Triggers:
+        return Triggers(self.t_us[rows], self.value[rows], self.id[rows])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UncheckedEvents:
+    """Events as they are in a file: not yet in order of time, perhaps outside the sensor.
+
+    Attributes
+    ----------
+    t_us : (n,) int64
+    x, y : (n,) integers
+    on : (n,) bool
+    """
+
+    t_us: NDArray[np.int64]
+    x: NDArray[Any]
+    y: NDArray[Any]
+    on: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return self.t_us.size
+
+    def __getitem__(self, rows: slice | NDArray[Any]) -> UncheckedEvents:
+        return UncheckedEvents(self.t_us[rows], self.x[rows], self.y[rows], self.on[rows])
+
+    @classmethod
+    def joined(cls, parts: list[UncheckedEvents]) -> UncheckedEvents:
+        """Concatenation of at least one part."""
+        if len(parts) == 1:
+            return parts[0]
+        return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in ("t_us", "x", "y", "on")))
+
+
+@dataclass(slots=True)
+class ReadPass:
+    """One pass over a file: the request, and the counts so far.
+
+    Attributes
+    ----------
+    max_events : int
+        Most events that a reader hands over at once.
+    start_us, end_us : int or None
+        A reader may leave out events that lie surely outside [start_us, end_us).
+    on_progress : callable or None
+        Called with the share done.
+    first_row : int
+        Number of the first event that the reader gave, set by the reader.
+    damage : Damage
+        Counts, added to by the reader.
+    triggers : list of Triggers
+        Edges found so far, added to by the reader.
+    """
+
+    max_events: int = CHUNK_EVENTS
+    start_us: int | None = None
+    end_us: int | None = None
+    on_progress: Progress | None = None
+    first_row: int = 0
+    damage: Damage = field(default_factory=Damage)
+    triggers: list[Triggers] = field(default_factory=list)
+
+    def report(self, done: float, total: float) -> None:
+        """Tell the share done."""
+        if self.on_progress is not None:
+            self.on_progress(min(done / total, 1.0) if total else 1.0)
+
+    def is_past(self, t_us: int) -> bool:
+        """Whether all events behind one of this time lie after the end, however disordered the file is."""
+        return self.end_us is not None and t_us >= self.end_us + MAX_DISORDER_US
+
+
+class FormatReader(Protocol):
+    """Reader of one file of one format.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    format : str
+        Format and encoding for people.
+    attributes : dict of str to str or float
+        Root attributes or header lines.
+    stated : Resolution or None
+        Size of the sensor where the file states it.
+    t_offset_us : int or None
+        DSEC's offset of the file's time.
+    warnings : list of str
+        Assumptions made on opening.
+    strict_order : bool
+        Whether events far behind others make the file unreadable (columns) or are dropped (RAW).
+    events : int or None
+        Number of events when the file tells without a pass.
+    """
+
+    path: Path
+    format: str
+    attributes: dict[str, str | float]
+    stated: Resolution | None
+    t_offset_us: int | None
+    warnings: list[str]
+    strict_order: bool
+    events: int | None
+
+    def columns(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
+        """Yield the events in file order in parts that are never empty; counts damage and triggers on the way."""
+
+    def truth(self) -> Truth | None:
+        """Read the simulator's truth; None when the file has none."""
+
+
+@contextmanager
+def file_errors(path: Path, kind: str) -> Iterator[None]:
+    """Turn whatever libraries raise on a damaged file into a RecordingError of one line."""
+    try:
+        yield
+    except FILE_ERRORS as error:
+        why = " ".join(str(error).split())[:200] or type(error).__name__
+        raise RecordingError(f"{kind} file is damaged or was cut ({why}): copy or export it again: {path}") from error
