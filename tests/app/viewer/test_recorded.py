@@ -207,14 +207,14 @@ def test_a_failed_write_leaves_the_old_file_and_no_litter(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("spinscope.app.viewer.recorded.file_with", full)
-    with pytest.raises(RecordingError, match=r"No space left on device.*--save"):
+    with pytest.raises(RecordingError, match=r"No space left on device.*free space"):
         write_rrd(flight, path, "all")
     assert [file.name for file in tmp_path.iterdir()] == ["run.rrd"]
     assert path.read_bytes() == b"precious"
 
 
 def test_a_folder_that_is_not_there_is_named(no_ball: ViewedRun, tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"No such file or directory.*missing/run\.rrd"):
+    with pytest.raises(RecordingError, match=r"its folder does not exist.*missing/run\.rrd"):
         write_rrd(no_ball, tmp_path / "missing" / "run.rrd", "all")
 
 
