@@ -98,7 +98,13 @@ def test_prophesees_ecf_compression_is_undone(tmp_path: Path, way: int, dense: b
         data = h5py.h5d.create(group.id, b"events", h5py.h5t.py_create(kind), space, plist)
         for start in range(0, n, rows):
             part = slice(start, min(start + rows, n))
-            data.write_direct_chunk((start,), ecf_block(t[part], x[part], y[part], p[part], way), 0)
+            if start == rows:  # a block may be stored as it is
+                records = np.zeros(rows, kind)
+                for name, column in {"t": t, "x": x, "y": y, "p": p}.items():
+                    records[name] = column[part]
+                data.write_direct_chunk((start,), records.tobytes(), 1)
+            else:
+                data.write_direct_chunk((start,), ecf_block(t[part], x[part], y[part], p[part], way), 0)
         file.attrs["geometry"] = "1280x720"
     recording = open_recording(tmp_path / "a.h5")
     columns = {"t": t, "x": x, "y": y, "p": p}
@@ -107,6 +113,34 @@ def test_prophesees_ecf_compression_is_undone(tmp_path: Path, way: int, dense: b
     assert_columns(
         middle, {c: v[np.searchsorted(t, t[1200]) : np.searchsorted(t, t[2100])] for c, v in columns.items()}
     )
+
+
+RUNS = st.sampled_from([1, 2, 14, 15, 16, 30, 31, 32, 126, 127, 128, 300])
+STEPS = st.sampled_from([0, 1, 14, 15, 16, 255, 256, 4095, 1 << 20, 1 << 33])
+
+
+@settings(max_examples=60)
+@given(
+    st.lists(st.tuples(RUNS, STEPS, st.integers(0, 1279), st.integers(0, 719), st.booleans()), min_size=1, max_size=8),
+    st.sampled_from([0, 1, 2]),
+    st.booleans(),
+)
+def test_runs_of_every_length_and_steps_of_every_size_are_decoded_from_ecf(
+    runs: list[tuple[int, int, int, int, bool]], way: int, rising: bool
+) -> None:
+    """Runs and steps at and around the lengths at which the encoding takes more bytes."""
+    from spinscope.pipeline.recordings.formats.hdf5.ecf import PAD_BYTES, _empty_block, decode_ecf
+
+    lengths = [run[0] for run in runs]
+    n = sum(lengths)
+    t = np.repeat(5 + np.cumsum([run[1] for run in runs]), lengths)
+    x = (np.repeat([run[2] for run in runs], lengths) + np.arange(n) * rising) % 1280
+    y, p = np.repeat([run[3] for run in runs], lengths), np.repeat([int(run[4]) for run in runs], lengths)
+    out = _empty_block(n)
+    data = np.frombuffer(ecf_block(t, x, y, p, way) + bytes(PAD_BYTES), np.uint8)
+    assert decode_ecf(out, data) == n
+    for found, expected in zip(out, (t, x, y, p), strict=True):
+        np.testing.assert_array_equal(found, expected)
 
 
 def test_damaged_ecf_blocks_are_refused_not_misread(tmp_path: Path) -> None:
@@ -253,6 +287,32 @@ def test_a_window_is_the_events_of_it(window_files: dict[str, Recording], start:
     assert_columns(recording.read(start, start + span), {c: v[inside] for c, v in some_columns().items()})
 
 
+@pytest.mark.parametrize("kind", ["h5", "npz"])
+@pytest.mark.parametrize("span_us", [1, 3000, 40_000])
+def test_a_window_of_a_disordered_file_misses_no_event(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, span_us: int
+) -> None:
+    """Events up to 10 ms out of order, the last one by all of it: neither end of the window may be cut too close."""
+    monkeypatch.setattr("spinscope.pipeline.recordings.recording.CHUNK_EVENTS", 5)
+    rng = np.random.default_rng(span_us)
+    columns = some_columns(900)
+    columns["t"] = np.arange(900) * 400 + rng.choice([0, 1, 5000, 9999, 10_000], 900)
+    path = tmp_path / f"a.{kind}"
+    if kind == "h5":
+        write_columns(path, columns, chunks=(64,))
+    else:
+        np.savez(path, **columns)
+    recording = open_recording(path, sensor=(640, 480))
+    order = np.argsort(columns["t"], kind="stable")
+    ordered = {name: column[order] for name, column in columns.items()}
+    for start_us in [*range(0, 370_000, 7300), *columns["t"][::90].tolist()]:
+        inside = (ordered["t"] >= start_us) & (ordered["t"] < start_us + span_us)
+        found = recording.read(start_us, start_us + span_us)
+        assert_columns(found, {name: column[inside] for name, column in ordered.items()})
+    assert_columns(recording.read(None, 50_000), {n: c[ordered["t"] < 50_000] for n, c in ordered.items()})
+    assert_columns(recording.read(50_000), {n: c[ordered["t"] >= 50_000] for n, c in ordered.items()})
+
+
 @pytest.fixture(scope="module")
 def window_files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Recording]:
     folder = tmp_path_factory.mktemp("window")
@@ -387,6 +447,34 @@ def test_dat_files_are_read_and_their_times_wrap(tmp_path: Path) -> None:
         open_recording(path)
     path.write_bytes(header)
     assert len(open_recording(path).read()) == 0
+
+
+@pytest.mark.parametrize(
+    ("lines", "kind", "size"),
+    [
+        (["Data file containing CD events."], 0x0C, None),
+        (["Data file containing Event2D events.", "Width 640"], 0x00, None),
+        (["Date 2020-1-1", "Height 480", "Width 640"], 0x0C, (640, 480)),  # told by the bytes behind the header
+        (["Height 0", "Width 640", "Data file"], 0x0C, None),
+    ],
+)
+def test_dat_files_are_told_by_first_line_or_kind(
+    tmp_path: Path, lines: list[str], kind: int, size: tuple[int, int] | None
+) -> None:
+    words = np.array([[7, 5 | 9 << 14 | 1 << 28], [9, 16383 & 303 | 239 << 14]], "<u4")
+    header = "".join(f"% {line}\n" for line in lines).encode()
+    (tmp_path / "a.bin").write_bytes(header + bytes((kind, 8)) + words.tobytes())
+    recording = open_recording(tmp_path / "a.bin")
+    assert recording.format == "DAT"
+    assert_columns(recording.read(), {"t": [7, 9], "x": [5, 303], "y": [9, 239], "p": [1, 0]})
+    assert (recording.width_px, recording.height_px) == (size or (304, 240))
+
+
+def test_hdf5_behind_a_user_block_is_read(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w", userblock_size=512) as file:
+        for name, values in some_columns().items():
+            file[f"events/{name}"] = values
+    assert_columns(open_recording(tmp_path / "a.h5").read(), some_columns())
 
 
 @pytest.mark.parametrize("places", ["root", "events"])

@@ -83,6 +83,27 @@ def test_identity_is_of_the_content(tmp_path: Path) -> None:
     assert a == b != c
 
 
+@pytest.mark.parametrize("place", [0, 50, 99])
+def test_of_large_files_start_middle_and_end_are_told_apart(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: int
+) -> None:
+    monkeypatch.setattr("spinscope.pipeline.recordings.recording.HASH_ALL_BYTES", 99)
+    monkeypatch.setattr("spinscope.pipeline.recordings.recording.HASH_BLOCK_BYTES", 4)
+    path, data = tmp_path / "a.raw", bytearray(b"% evt 3.0\n% end\n" + bytes(84))
+    path.write_bytes(data)
+    before, stamp = open_recording(path).identity(), path.stat().st_mtime_ns
+    path.write_bytes(data[:20] + b"\1" + data[21:])
+    os.utime(path, ns=(stamp, stamp))
+    assert open_recording(path).identity() == before  # what lies between is not looked at
+    os.utime(path, ns=(stamp, stamp + 1))
+    assert open_recording(path).identity() != before
+    recording = open_recording(path)
+    data[place] ^= 1
+    path.write_bytes(data)
+    os.utime(path, ns=(stamp, stamp))
+    assert recording.identity() != before
+
+
 def test_a_sensor_that_is_none_is_refused(tmp_path: Path) -> None:
     write_recording(tmp_path / "a.npz", moving_edge(10), width_px=1280, height_px=720)
     for size in ((0, 720), (1280, -1), (100_000, 10)):
