@@ -1,4 +1,4 @@
-"""`spinscope info`: what a recording holds, for programs and for people."""
+"""`spinscope info`: summary of a recording for programs and for people."""
 
 from __future__ import annotations
 
@@ -14,13 +14,16 @@ SHOWN = 60  # characters of an attribute; a simulation's scene is a page long
 
 
 def information(path: Path, sensor_px: tuple[int, int] | None, on_progress: Progress) -> RecordingInfo:
-    """One pass over the recording; raises RecordingError."""
-    recording = open_recording(path, sensor=sensor_px, on_progress=lambda share: on_progress(share, "reading"))
-    return summary(recording, on_progress=lambda share: on_progress(share, "reading"))
+    """Summarise a recording in one pass; raises RecordingError."""
+
+    def report(share: float) -> None:
+        on_progress(share, "reading")
+
+    return summary(open_recording(path, sensor=sensor_px, on_progress=report), report)
 
 
 def print_information(info: RecordingInfo) -> None:
-    """A table of what was found, with units."""
+    """Print a table of the summary, with units."""
     damage = ", ".join(f"{count:,} {name.replace('_', ' ')}" for name, count in info.damage.items() if count)
     rows = {
         "format": info.format,

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import zipfile
 import zlib
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -184,43 +185,50 @@ class ReadPass:
         return self.end_us is not None and t_us >= self.end_us + MAX_DISORDER_US
 
 
-class FormatReader(Protocol):
+class FormatReader(ABC):
     """Reader of one file of one format.
 
-    Attributes
+    Parameters
     ----------
     path : Path
         The file.
+
+    Attributes
+    ----------
     format : str
         Format and encoding for people.
+    strict_order : bool
+        Whether events far behind others make the file unreadable (columns) or are dropped (RAW).
     attributes : dict of str to str or float
         Root attributes or header lines.
+    warnings : list of str
+        Assumptions made on opening.
     stated : Resolution or None
         Size of the sensor where the file states it.
     t_offset_us : int or None
         DSEC's offset of the file's time.
-    warnings : list of str
-        Assumptions made on opening.
-    strict_order : bool
-        Whether events far behind others make the file unreadable (columns) or are dropped (RAW).
     events : int or None
         Number of events when the file tells without a pass.
     """
 
-    path: Path
     format: str
-    attributes: dict[str, str | float]
-    stated: Resolution | None
-    t_offset_us: int | None
-    warnings: list[str]
-    strict_order: bool
-    events: int | None
+    strict_order = True
 
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.attributes: dict[str, str | float] = {}
+        self.warnings: list[str] = []
+        self.stated: Resolution | None = None
+        self.t_offset_us: int | None = None
+        self.events: int | None = None
+
+    @abstractmethod
     def columns(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
         """Yield the events in file order in parts that are never empty; counts damage and triggers on the way."""
 
     def truth(self) -> Truth | None:
         """Read the simulator's truth; None when the file has none."""
+        return None
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..biases import CURVES, PAPER, BiasParameters, Curve, physical
+from ..biases import CURVES, PAPER, BiasCurve, BiasParameters, physical
 from ..errors import ParameterError
 from ..events import EventBatch
 
@@ -119,7 +119,7 @@ class Sensor:
         return max(self.refractory_us, self.reset_settling * self.tau_us)
 
     @classmethod
-    def of(cls, biases: BiasParameters = PAPER, curves: Mapping[str, Curve] = CURVES) -> Sensor:
+    def of(cls, biases: BiasParameters = PAPER, curves: Mapping[str, BiasCurve] = CURVES) -> Sensor:
         """The sensor at these biases; `curves` may hold one's own measurements."""
         pixel = physical(biases, curves)
         base = cls()

@@ -15,6 +15,7 @@ from spinscope.app.cli import cli
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.recordings import (
     FORMATS,
+    FormatReader,
     ReadPass,
     RecordingContent,
     RecordingFormat,
@@ -29,28 +30,16 @@ from tests.pipeline.recordings.test_recordings_raw import assert_same_events, mo
 FIRST_LINE = "toy recording"
 
 
-class ToyReader:
+class ToyReader(FormatReader):
     """Reader of a text file with one event a line."""
 
     format = "toy text"
-    strict_order = True
-    stated = None
-    t_offset_us = None
-    events = None
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.warnings: list[str] = []
-        self.attributes: dict[str, str | float] = {}
 
     def columns(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
         """Yield all events at once."""
         t, x, y, on = np.loadtxt(self.path, np.int64, skiprows=1).T
         yield UncheckedEvents(t, x, y, on != 0)
         reading.report(1, 1)
-
-    def truth(self) -> None:
-        """Return None."""
 
 
 def write_toy(path: Path, content: RecordingContent) -> None:

@@ -15,9 +15,8 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ...errors import RecordingError
-from ...results import Truth
 from ..column_types import COLUMN_TYPES, ColumnTypes, check_expansion, check_types, columns_of, named_columns
-from ..reader import ReadPass, UncheckedEvents, file_errors
+from ..reader import FormatReader, ReadPass, UncheckedEvents, file_errors
 from ..sensor import Resolution, resolution_or_none
 from .registry import FORMATS, RecordingContent, RecordingFormat
 
@@ -26,16 +25,13 @@ COPY_BYTES = 1 << 20
 ZIP_LEVEL = 1  # 7 times faster than the default level, for 4 % more bytes
 
 
-class NpzReader:
+class NpzReader(FormatReader):
     """Reader of one NPZ recording: one array a column, or one array of records."""
 
     format = "NPZ"
-    strict_order = True
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-        self.warnings: list[str] = []
-        self.attributes: dict[str, str | float] = {}
+        super().__init__(path)
         with file_errors(path, "NPZ"), zipfile.ZipFile(path) as archive:
             arrays = {name: NpzArray(archive, name, path) for name in _array_names(archive)}
             self._members, self._fields = _chosen(arrays, path)
@@ -46,7 +42,7 @@ class NpzReader:
             for array in used:
                 array.check_length(path)
             check_expansion(sum(a.packed_bytes for a in used), sum(a.unpacked_bytes for a in used), path)
-            self.events: int | None = used[0].shape[0]
+            self.events = used[0].shape[0]
             types = {c: arrays[m].dtype for c, m in self._members.items()}
             if self._fields:
                 types = {c: types[c][name] for c, name in self._fields.items()}
@@ -54,7 +50,7 @@ class NpzReader:
             self.stated = _stated_sensor(archive, arrays, self.warnings)
             self.t_offset_us = _scalar(archive, arrays, "t_offset")
             with NpzColumns(archive, self._members, self._fields) as reader:
-                first_times = reader.next_rows(min(self.events, SAMPLED_ROWS))[0]
+                first_times = reader.next_rows(min(used[0].shape[0], SAMPLED_ROWS))[0]
         self._types = ColumnTypes(path, types["t"], first_times)
         if self._types.warning:
             self.warnings.append(self._types.warning)
@@ -74,10 +70,6 @@ class NpzReader:
                 reading.report(upto, rows)
                 if reading.is_past(int(block.t_us[-1])):
                     return
-
-    def truth(self) -> Truth | None:
-        """Return None: NPZ files hold no truth."""
-        return None
 
 
 class NpzArray:

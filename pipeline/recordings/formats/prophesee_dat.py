@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import RecordingError
-from ...results import Truth
 from ..prophesee_header import MAX_HEADER_BYTES, parse_header
-from ..reader import ReadPass, UncheckedEvents, file_errors
+from ..reader import FormatReader, ReadPass, UncheckedEvents, file_errors
 from ..sensor import resolution_or_none
 from .registry import FORMATS, RecordingFormat
 
@@ -19,29 +18,26 @@ EVENT_KINDS = (0x00, 0x0C)  # 2D events of version 1 and CD events of version 2
 FIELDS = np.dtype([("t", "<u4"), ("pixel", "<u4")])  # pixel: x 14 bits, y 14 bits, polarity 4 bits
 
 
-class DatReader:
+class DatReader(FormatReader):
     """Reader of one DAT recording."""
 
     format = "DAT"
     strict_order = False
-    t_offset_us: int | None = None
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-        self.warnings: list[str] = []
+        super().__init__(path)
         with file_errors(path, "DAT"), open(path, "rb") as file:
             header, start = parse_header(file.read(MAX_HEADER_BYTES))
             file.seek(start)
             kind, size = (*file.read(2), 0, 0)[:2]
             self._start, self._end = start + 2, file.seek(0, 2)
-        self.attributes: dict[str, str | float] = dict(header)
+        self.attributes |= header
         if self._end > start and (kind not in EVENT_KINDS or size != EVENT_BYTES):
             raise RecordingError(
                 f"DAT file holds events of kind {kind} with {size} bytes, not CD events (kind 12, 8 bytes): "
                 f"export the CD events: {path}"
             )
-        self.events: int | None = max(self._end - self._start, 0) // EVENT_BYTES
-        self.stated = None
+        self.events = max(self._end - self._start, 0) // EVENT_BYTES
         if "Width" in header and "Height" in header:
             self.stated = resolution_or_none(header["Width"], header["Height"], self.warnings)
 
@@ -62,10 +58,6 @@ class DatReader:
                 pixel = events["pixel"]
                 yield UncheckedEvents(t + (wraps << 32), pixel & 0x3FFF, (pixel >> 14) & 0x3FFF, pixel >> 28 != 0)
                 reading.report(file.tell() - self._start, self._end - self._start)
-
-    def truth(self) -> Truth | None:
-        """Return None: DAT files hold no truth."""
-        return None
 
 
 def is_dat(path: Path, head: bytes) -> bool:

@@ -8,7 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spinscope.pipeline.biases import CURVES, FACTORY, PAPER, BiasParameters, Curve, physical, read_biases, write_biases
+from spinscope.pipeline.biases import (
+    CURVES,
+    FACTORY,
+    PAPER,
+    BiasCurve,
+    BiasParameters,
+    physical,
+    read_biases,
+    write_biases,
+)
 from spinscope.pipeline.errors import ParameterError, RecordingError
 
 # Which way the quantity goes as its bias rises.
@@ -38,7 +47,7 @@ def test_curves_are_monotone_over_the_makers_whole_range(name):
 
 
 def test_ones_own_curves_replace_ours():
-    mine = Curve("refr", "us", ((-20, 100.0), (235, 10.0)), "measured", calibrated=True)
+    mine = BiasCurve("refr", "us", ((-20, 100.0), (235, 10.0)), "measured", calibrated=True)
     assert physical(PAPER, {**CURVES, "refractory_us": mine}).refractory_us == pytest.approx(mine.at(80))
     assert physical(PAPER).noise_on == pytest.approx(1.0)
     assert physical(FACTORY).threshold_on < physical(PAPER).threshold_on

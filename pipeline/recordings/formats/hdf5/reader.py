@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ....errors import RecordingError
 from ....results import Truth
 from ...column_types import ColumnTypes, check_expansion, check_types, named_columns
-from ...reader import MAX_DISORDER_US, ReadPass, Triggers, UncheckedEvents, file_errors
+from ...reader import MAX_DISORDER_US, FormatReader, ReadPass, Triggers, UncheckedEvents, file_errors
 from ...sensor import Resolution, geometry_or_none, resolution_or_none
 from .heap import check_heap
 
@@ -24,14 +24,11 @@ COMPOUNDS = ("CD/events", "events")
 TRIGGERS = "EXT_TRIGGER/events"
 
 
-class Hdf5Reader:
+class Hdf5Reader(FormatReader):
     """Reader of one HDF5 recording."""
 
-    strict_order = True
-
     def __init__(self, path: Path) -> None:
-        self.path = path
-        self.warnings: list[str] = []
+        super().__init__(path)
         with file_errors(path, "HDF5"), h5py.File(path, "r") as file:
             self._layout = Hdf5Layout.found(file, path)
             self.format = self._layout.format
@@ -41,7 +38,7 @@ class Hdf5Reader:
             self.stated = _stated_sensor(file, self._layout, self.warnings)
             self.t_offset_us = _t_offset_us(file)
             table = Hdf5Table(file, self._layout, path)
-            self.events: int | None = table.rows
+            self.events = table.rows
             first = table.times_of(0, min(SAMPLED_ROWS, table.rows))
             last = table.times_of(max(table.rows - SAMPLED_ROWS, 0), table.rows)
         self._types = ColumnTypes(path, first.dtype, np.concatenate([first, last]))

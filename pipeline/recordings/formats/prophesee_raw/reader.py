@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....errors import RecordingError
-from ....results import Truth
 from ...prophesee_header import MAX_HEADER_BYTES, parse_header
-from ...reader import ReadPass, Triggers, UncheckedEvents, file_errors
+from ...reader import FormatReader, ReadPass, Triggers, UncheckedEvents, file_errors
 from ...sensor import SENSOR_OF_SYSTEM_ID, Resolution, geometry_or_none, resolution_or_none
 from .decoding import BAD_WORDS, EVENTS, OUTSIDE, TIME_HIGH, TIME_JUMPS, TRIGGERS, UNTIMED, Decoded, initial_state
 from .evt2 import HIGH_BITS, HIGH_MASK, decode_evt2
@@ -23,20 +22,17 @@ STEADY_STEPS = 16  # of 64 us between two TIME_HIGH words: sensors send one each
 WORD_BYTES = {"EVT2": 4, "EVT2.1": 8, "EVT3": 2}
 
 
-class RawReader:
+class RawReader(FormatReader):
     """Reader of one RAW recording."""
 
     strict_order = False
-    t_offset_us: int | None = None
-    events: int | None = None
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-        self.warnings: list[str] = []
+        super().__init__(path)
         with file_errors(path, "RAW"), open(path, "rb") as file:
             head = file.read(MAX_HEADER_BYTES)
         header, self._start = parse_header(head)
-        self.attributes: dict[str, str | float] = dict(header)
+        self.attributes |= header
         options = format_options(header)
         self._encoding = _encoding(header, options, path)
         self.format = f"{self._encoding} RAW"
@@ -55,10 +51,6 @@ class RawReader:
                 yield from decoder.feed(block, final=False)
                 reading.report(file.tell(), size)
             yield from decoder.feed(b"", final=True)
-
-    def truth(self) -> Truth | None:
-        """Return None: RAW files hold no truth."""
-        return None
 
     def _is_legacy(self, endianness: str, data: bytes) -> bool:
         """Whether the half with the type comes first (IMX636): by the header, else by the words' times."""
