@@ -120,11 +120,11 @@ def decode_ecf(out: EcfBlock, data: Bytes) -> int:
     if at == DAMAGED:
         return DAMAGED
     if head & ALL_PACKED:
-        at = _pixels_packed(out, count, data, at)
+        at = _packed(out, count, data, at, 4)
     else:
         at = _runs(out.y, count, data, at, 2, 5)
         if at != DAMAGED and head & X_P_PACKED:
-            at = _columns_packed(out, count, data, at)
+            at = _packed(out, count, data, at, 2)
         elif at != DAMAGED:
             at = _columns_masked(out.x, count, data, at)
             if at != DAMAGED:
@@ -199,33 +199,31 @@ def _columns_masked(x: NDArray[np.uint16], count: int, data: Bytes, at: int) -> 
 
 
 @njit(cache=True, nogil=True)
-def _columns_packed(out: EcfBlock, count: int, data: Bytes, at: int) -> int:
-    """Decode four events of 12 bits (x, p) in three 16-bit words; second and third begin with their low bits."""
-    end = data.size - PAD_BYTES
-    for first in range(0, count, 4):
-        if at >= end:
-            return DAMAGED
-        a, b, c = _number(data, at, 2), _number(data, at + 2, 2), _number(data, at + 4, 2)
-        at += 6
-        four = (a >> 4, (a & 0xF) | ((b >> 8) << 4), (b & 0xFF) | ((c >> 12) << 8), c & 0xFFF)
-        for k in range(min(4, count - first)):
-            out.x[first + k] = four[k] >> 1
-            out.p[first + k] = four[k] & 1
-    return at
+def _four_values(data: Bytes, at: int, size: int) -> tuple[int, int, int, int]:
+    """Read four values of 6 x `size` bits from three words of `size` bytes; the next value's low bits end a word."""
+    bits = 2 * size
+    low, half, most = (1 << bits) - 1, (1 << 2 * bits) - 1, (1 << 3 * bits) - 1
+    a, b, c = _number(data, at, size), _number(data, at + size, size), _number(data, at + 2 * size, size)
+    return (
+        a >> bits,
+        (a & low) | ((b >> 2 * bits) << bits),
+        (b & half) | ((c >> 3 * bits) << 2 * bits),
+        c & most,
+    )
 
 
 @njit(cache=True, nogil=True)
-def _pixels_packed(out: EcfBlock, count: int, data: Bytes, at: int) -> int:
-    """Decode four events of 24 bits (y, x, p) in three 32-bit words, split in the same way."""
+def _packed(out: EcfBlock, count: int, data: Bytes, at: int, size: int) -> int:
+    """Decode groups of four events: x and p in words of 2 bytes, or y, x and p in words of 4."""
     end = data.size - PAD_BYTES
     for first in range(0, count, 4):
         if at >= end:
             return DAMAGED
-        a, b, c = _number(data, at, 4), _number(data, at + 4, 4), _number(data, at + 8, 4)
-        at += 12
-        four = (a >> 8, (a & 0xFF) | ((b >> 16) << 8), (b & 0xFFFF) | ((c >> 24) << 16), c & 0xFFFFFF)
+        values = _four_values(data, at, size)
+        at += 3 * size
         for k in range(min(4, count - first)):
-            out.y[first + k] = (four[k] >> 12) & 0x7FF
-            out.x[first + k] = (four[k] >> 1) & 0x7FF
-            out.p[first + k] = four[k] & 1
+            if size == 4:
+                out.y[first + k] = (values[k] >> 12) & 0x7FF
+            out.x[first + k] = (values[k] >> 1) & 0x7FF
+            out.p[first + k] = values[k] & 1
     return at
