@@ -49,6 +49,16 @@ def guarded(room: int, trigger_room: int) -> tuple[Decoded, list[NDArray[Any]]]:
     st.sampled_from(["EVT2.1", "EVT3"]),
 )
 def test_no_decoder_writes_behind_the_room_given(kinds: list[str], room: int, trigger_room: int, encoding: str) -> None:
+    check_room(kinds, room, trigger_room, encoding)
+
+
+@pytest.mark.parametrize("encoding", ["EVT2.1", "EVT3"])
+@pytest.mark.parametrize("singles", range(33))
+def test_full_vectors_may_come_with_any_room_left(singles: int, encoding: str) -> None:
+    check_room(["one"] * singles + ["all"] * 12, 64, 1, encoding)
+
+
+def check_room(kinds: list[str], room: int, trigger_room: int, encoding: str) -> None:
     """Dense vectors in little room: every call stops before it would overflow, and the next goes on there."""
     masks = {"one": 1, "all": 0xFFFFFFFF, "most": 0xFFFFFFFE, "none": 0, "trigger": 0}
     if encoding == "EVT3":
