@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from sample_recordings.make import FOLDER, SAMPLES, make
-from spinscope.app.simulate import BIASES, DESCRIPTION
 from spinscope.pipeline.biases import FACTORY, PAPER
 from spinscope.pipeline.recordings import open_recording
-from spinscope.pipeline.simulator import Scene, Sensor
+from spinscope.pipeline.simulated_recordings import BIASES, DESCRIPTION
+from spinscope.pipeline.simulator import Scene, SensorModel
 
 FOREIGN = sorted(FOLDER.parent.glob("*.h5"))
 OWN = [FOLDER / f"{name}.h5" for name in SAMPLES]
@@ -52,7 +52,7 @@ def test_our_own_hold_scene_seed_and_biases(path: Path) -> None:
     assert description["seed"] == options["seed"]
     biases = FACTORY if path.stem == "shot_factory_biases" else PAPER
     assert json.loads(str(recording.attributes[BIASES])) == description["biases"] == biases.as_dict()
-    assert Sensor(**description["sensor"]) == Sensor.of(biases)
+    assert SensorModel(**description["sensor"]) == SensorModel.of(biases)
     scene = Scene.from_dict(description["scene"])
     truth = recording.truth
     assert truth is not None

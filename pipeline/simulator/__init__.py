@@ -1,9 +1,9 @@
 """A physically reasoned event camera in front of spinning table tennis balls, with exact truth."""
 
-from .recipes import flight, rally, spinner
 from .scene import Air, Arm, Background, Ball, Fixed, Flight, Light, Scene
-from .sensor import Lens, Sensor
-from .simulation import SimulatedRecording, default_camera, simulate, simulate_again
+from .scenes import flight, rally, spinner
+from .sensor import Lens, SensorModel
+from .simulation import SimulatedRecording, default_camera, simulate_again, simulate_scene
 from .thrower import human_shot, thrown
 
 __all__ = [
@@ -16,14 +16,14 @@ __all__ = [
     "Lens",
     "Light",
     "Scene",
-    "Sensor",
+    "SensorModel",
     "SimulatedRecording",
     "default_camera",
     "flight",
     "human_shot",
     "rally",
-    "simulate",
     "simulate_again",
+    "simulate_scene",
     "spinner",
     "thrown",
 ]

@@ -1,4 +1,4 @@
-"""Balls and arms as the kernels want them: when they are seen, how fast they move, their poses."""
+"""Balls and arms in the kernels' form: their times in the image, largest speeds and poses."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..camera import Camera
 from . import kernels_light as columns
 from .logos import RADIUS_MM, texture
-from .motion import Path, arm_ends, path
+from .motion import Trajectory, arm_ends, trajectory
 from .scene import Arm, Ball, Scene
 from .sensor import Lens
 
@@ -32,7 +32,7 @@ class PackedBody:
     pose: Floats
     box: NDArray[np.int32]
     kind: Floats
-    ink: NDArray[np.float32]
+    texture: NDArray[np.float32]
 
 
 class BallBody:
@@ -43,13 +43,13 @@ class BallBody:
         self.ball: Ball = scene.balls[number]
 
     @cached_property
-    def paths(self) -> list[Path]:
-        return [path(motion, self.ball, self.scene) for motion in self.ball.motions]
+    def trajectories(self) -> list[Trajectory]:
+        return [trajectory(motion, self.ball, self.scene) for motion in self.ball.motions]
 
     def visible(self, camera: Camera, end_s: float) -> Spans:
-        """When some of the ball may be in the image."""
+        """Spans of time in which some of the ball may be in the image."""
         spans: Spans = []
-        for one in self.paths:
+        for one in self.trajectories:
             start, stop = max(one.start_s, 0.0), min(one.end_s, end_s)
             if start >= stop:
                 continue
@@ -62,9 +62,9 @@ class BallBody:
         return spans
 
     def speeds_px_s(self, camera: Camera, start_s: float, stop_s: float) -> tuple[float, float]:
-        """How fast the outline and the ball's surface move in the image at most."""
+        """Largest speeds of the outline and of the ball's surface in the image."""
         outline, surface = 0.0, 0.0
-        for one in self.paths:
+        for one in self.trajectories:
             inside = (one.time_s >= start_s - LOOK_S) & (one.time_s <= stop_s + LOOK_S)
             if one.start_s > stop_s or one.end_s < start_s or not inside.any():
                 if not one.start_s <= start_s <= one.end_s:
@@ -79,25 +79,25 @@ class BallBody:
         return outline, surface
 
     def distance_m(self, time_s: Floats) -> float:
-        one = self._path_at(float(time_s[time_s.size // 2]))
+        one = self._trajectory_at(float(time_s[time_s.size // 2]))
         return float(one.at(time_s[time_s.size // 2 : time_s.size // 2 + 1]).position_m[0, 2])
 
-    def _path_at(self, time_s: float) -> Path:
-        for one in self.paths:
+    def _trajectory_at(self, time_s: float) -> Trajectory:
+        for one in self.trajectories:
             if one.start_s <= time_s <= one.end_s:
                 return one
-        return self.paths[-1]
+        return self.trajectories[-1]
 
     def packed(self, camera: Camera, lens: Lens, time_s: Floats, every: int, slower: int) -> PackedBody:
         """The ball at these times, looked at in every so many of them; slower: see `kernels_light`."""
-        there = self._path_at(float(time_s[time_s.size // 2])).at(time_s)
+        there = self._trajectory_at(float(time_s[time_s.size // 2])).at(time_s)
         pose = np.empty((time_s.size, columns.POSE_COLUMNS))
         pose[:, columns.CENTRE : columns.CENTRE + 3] = there.position_m
         pose[:, columns.TURN : columns.TURN + 9] = np.swapaxes(there.rotation, 1, 2).reshape(-1, 9)
         sigma = _sigma_px(camera, lens, there.position_m[:, 2])
         pose[:, columns.SIGMA] = sigma
         # The texture's own blur: one for the ball's whole time, so that it is drawn once.
-        far = float(np.median(np.concatenate([one.position_m[:, 2] for one in self.paths])))
+        far = float(np.median(np.concatenate([one.position_m[:, 2] for one in self.trajectories])))
         typical = float(_sigma_px(camera, lens, np.array([far]))[0])
         blur_mm = TEXTURE_SHARE * typical * far / camera.focal_px * 1e3 * RADIUS_MM / (self.ball.radius_m * 1e3)
         printed = texture(self.ball.logo, round(blur_mm, 2))
@@ -110,12 +110,12 @@ class BallBody:
         )
         kind[columns.RADIUS] = self.ball.radius_m
         kind[[columns.ALBEDO, columns.ALBEDO_2]] = self.ball.albedo, self.ball.ink_albedo
-        kind[[columns.HALF_EXTENT, columns.TEXELS]] = printed.half_extent, printed.ink.shape[0]
+        kind[[columns.HALF_EXTENT, columns.TEXELS]] = printed.half_extent, printed.values.shape[0]
         kind[columns.CAP_COSINE] = 2.0 if self.ball.logo.name == "none" else math.cos(printed.cap_rad)
-        kind[[columns.INK_X, columns.INK_Y]] = printed.ink_u, printed.ink_w
+        kind[[columns.EXTENT_X, columns.EXTENT_Y]] = printed.extent_u, printed.extent_w
         kind[columns.SAMPLE] = math.sqrt(3 * (1 - TEXTURE_SHARE**2)) * typical
         box = self._box(camera, there.position_m, 4 * float(sigma.max()) + 1.0)
-        return PackedBody(pose, box, kind, printed.ink)
+        return PackedBody(pose, box, kind, printed.values)
 
     def _box(self, camera: Camera, position_m: Floats, margin_px: float) -> NDArray[np.int32]:
         x, y, _ = camera.silhouette(position_m, self.ball.radius_m)
@@ -142,7 +142,7 @@ class ArmBody:
         return list(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True))
 
     def speeds_px_s(self, camera: Camera, start_s: float, stop_s: float) -> tuple[float, float]:
-        """How fast elbow and hand move in the image at most."""
+        """Largest speeds of elbow and hand in the image."""
         arm = self.arm
         turn = 2 * math.pi * arm.frequency_hz
         swing = np.abs(np.cos(turn * np.linspace(start_s, stop_s, 9) + arm.phase_rad)).max()

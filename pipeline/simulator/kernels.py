@@ -45,7 +45,7 @@ def _look(
     fresh: bool,
 ) -> None:
     """Go over the pixels in the box of body k."""
-    box, kind, pose, ink = bodies.box, bodies.kind, bodies.pose, bodies.ink
+    box, kind, pose, texture = bodies.box, bodies.kind, bodies.pose, bodies.texture
     state, role, owner, cursor = pixels.state, pixels.role, pixels.owner, pixels.cursor
     looked, resting, rest_body = pixels.looked, pixels.rest, pixels.rest_body
     events = (cursor, pixels.event_us, pixels.event_word)
@@ -59,7 +59,7 @@ def _look(
             if looked[p] == row or (resting[p] >= row and rest_body[p] == k):
                 continue
             covered, looks, base, intensity, plain = light(
-                owner, background, box, kind, pose, ink, physics, row, x, y, ray_x[p], ray_y[p]
+                owner, background, box, kind, pose, texture, physics, row, x, y, ray_x[p], ray_y[p]
             )
             looked[p] = row
             at_work = role[p] == IN_BOX or role[p] == TAIL

@@ -1,4 +1,4 @@
-"""The light on a pixel: bodies in front of the background. Kernels; see `kernels`."""
+"""Kernels of the light on a pixel: bodies in front of the background; see `kernels`."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ POSE_COLUMNS = 13
     HALF_EXTENT,
     TEXELS,
     CAP_COSINE,
-    INK_X,
-    INK_Y,
+    EXTENT_X,
+    EXTENT_Y,
     SAMPLE,
 ) = range(13)
 BODY_COLUMNS = 13  # SLOWER: so many looks may pass where a body moves slowest
@@ -50,7 +50,7 @@ class Bodies(NamedTuple):
     pose: Floats  # (n, k, POSE_COLUMNS)
     box: Ints  # (n, k, 4) x0, y0, x1, y1 (x1, y1 not included), empty while away
     kind: Floats  # (k, BODY_COLUMNS)
-    ink: Singles  # (k, m, m) textures
+    texture: Singles  # (k, m, m) textures
 
 
 class Physics(NamedTuple):
@@ -76,8 +76,8 @@ class Physics(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _ink_at(ink: Singles, body: Floats, pose: Floats, k: int, row: int, x: float, y: float, z: float) -> float:
-    """Ink of body k in the direction (x, y, z) of the camera frame, bilinear."""
+def _texture_at(texture: Singles, body: Floats, pose: Floats, k: int, row: int, x: float, y: float, z: float) -> float:
+    """Printing of body k in the direction (x, y, z) of the camera frame, bilinear."""
     bz = pose[row, k, TURN + 6] * x + pose[row, k, TURN + 7] * y + pose[row, k, TURN + 8] * z
     if bz <= body[k, CAP_COSINE]:
         return 0.0
@@ -91,19 +91,19 @@ def _ink_at(ink: Singles, body: Floats, pose: Floats, k: int, row: int, x: float
         return 0.0
     i, j = int(u), int(w)
     fu, fw = u - i, w - j
-    upper = ink[k, j, i] * (1.0 - fu) + ink[k, j, i + 1] * fu
-    lower = ink[k, j + 1, i] * (1.0 - fu) + ink[k, j + 1, i + 1] * fu
+    upper = texture[k, j, i] * (1.0 - fu) + texture[k, j, i + 1] * fu
+    lower = texture[k, j + 1, i] * (1.0 - fu) + texture[k, j + 1, i + 1] * fu
     return float(upper * (1.0 - fw) + lower * fw)
 
 
 @njit(cache=True, nogil=True)
 def ball_light(
-    ink: Singles, body: Floats, pose: Floats, k: int, row: int, physics: Physics, ray_x: float, ray_y: float
+    texture: Singles, body: Floats, pose: Floats, k: int, row: int, physics: Physics, ray_x: float, ray_y: float
 ) -> tuple[float, float, float, float]:
     """(cover 0..1, intensity, intensity without logo, looks) of ball k seen along a ray.
 
-    looks : the next look that matters is so many ahead, for neither outline nor logo comes near before, and
-        shading moves by less than a pixel
+    The fourth value is the number of looks until the next one that matters: neither outline nor logo comes near before,
+    and shading moves by less than a pixel.
     """
     cx, cy, cz = pose[row, k, CENTRE], pose[row, k, CENTRE + 1], pose[row, k, CENTRE + 2]
     radius = body[k, RADIUS]
@@ -138,7 +138,7 @@ def ball_light(
     slant = 1.5 * cz / (radius * max(-nz, 0.2))
     reach = step * slant
     pixel = slant / physics.focal_px
-    gap = max(body[k, CAP_COSINE] - bz, abs(bx) - body[k, INK_X], abs(by) - body[k, INK_Y])
+    gap = max(body[k, CAP_COSINE] - bz, abs(bx) - body[k, EXTENT_X], abs(by) - body[k, EXTENT_Y])
     if gap >= reach:
         looks = body[k, SLOWER]
         deep = SURE_SIGMAS * sigma + 1.0
@@ -158,7 +158,7 @@ def ball_light(
             far = (s - math.sqrt(max(s * s - d2 * spare, 0.0))) / d2
             mx, my, mz = far * x - cx, far * y - cy, far - cz
             norm = 1.0 / math.sqrt(mx * mx + my * my + mz * mz)
-            dark += weight * _ink_at(ink, body, pose, k, row, mx * norm, my * norm, mz * norm)
+            dark += weight * _texture_at(texture, body, pose, k, row, mx * norm, my * norm, mz * norm)
     return cover, plain + dark * (body[k, ALBEDO_2] - body[k, ALBEDO]) * shade, plain, 1.0
 
 
@@ -195,7 +195,7 @@ def light(
     box: Ints,
     kind: Floats,
     pose: Floats,
-    ink: Singles,
+    texture: Singles,
     physics: Physics,
     row: int,
     x: int,
@@ -215,7 +215,7 @@ def light(
         if x < box[row, k, 0] or y < box[row, k, 1] or x >= box[row, k, 2] or y >= box[row, k, 3]:
             continue
         if kind[k, KIND] == BALL:
-            cover, body, body_plain, ahead = ball_light(ink, kind, pose, k, row, physics, ray_x, ray_y)
+            cover, body, body_plain, ahead = ball_light(texture, kind, pose, k, row, physics, ray_x, ray_y)
             pace = kind[k, SLOWER]
         else:
             cover, body, ahead, pace = arm_light(kind, pose, k, row, float(x), float(y))

@@ -1,4 +1,4 @@
-"""What a pixel makes of its light. Kernels; see `kernels`.
+"""Kernels of the event pixel: low-pass, thresholds, dead time; see `kernels`.
 
 "Plain" is the same signal had the balls no logo: it tells the logo's events from the others.
 """
@@ -34,7 +34,7 @@ STATE_COLUMNS = 11
 
 
 class Pixels(NamedTuple):
-    """What `run` writes: the state of every pixel, the list of tails, the events."""
+    """Output of `run`: the state of every pixel, the list of tails, the events."""
 
     state: Floats  # (n, STATE_COLUMNS)
     role: Bytes  # (n,)

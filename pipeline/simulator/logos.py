@@ -1,4 +1,4 @@
-"""Logos: ink painted on the ball, drawn in millimetres on its surface.
+"""Logos printed on the ball, drawn in millimetres on its surface.
 
 A logo is drawn in a plane that touches the ball at the logo's centre: the point at (a, b) mm lies at the
 surface distance hypot(a, b) from the centre (azimuthal equidistant, so strokes keep their width). In the
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ..errors import ParameterError
 
 Floats = NDArray[np.float64]
-Drawing = Callable[[Floats, Floats], Floats]  # (a, b) in mm -> distance to the ink in mm, negative inside
+Drawing = Callable[[Floats, Floats], Floats]  # (a, b) in mm -> distance to the print in mm, negative inside
 
 TEXEL_MM = 0.06  # a tenth of the thinnest stroke (0.6 mm)
 RADIUS_MM = 20.0  # logos are drawn for the 40 mm ball
@@ -29,9 +29,16 @@ RADIUS_MM = 20.0  # logos are drawn for the 40 mm ball
 
 @dataclass(frozen=True)
 class Logo:
-    """What is printed on a ball.
+    """Logo of a ball.
 
-    name : one of `NAMES`, or "png" with the file's bytes in base64 and its width on the ball
+    Attributes
+    ----------
+    name : str
+        One of `NAMES`, or "png".
+    png_base64 : str
+        For "png": the file's bytes in base64.
+    width_mm : float
+        For "png": width on the ball.
     """
 
     name: str = "andro"
@@ -46,7 +53,7 @@ class Logo:
 
     @classmethod
     def of(cls, name_or_png: str) -> Logo:
-        """A logo by name or from a PNG file (dark = ink, transparent = none); raises ParameterError."""
+        """A logo by name or from a PNG file (dark = print, transparent = none); raises ParameterError."""
         if not name_or_png.lower().endswith(".png"):
             return cls(name_or_png)
         try:
@@ -54,25 +61,31 @@ class Logo:
         except OSError as error:
             raise ParameterError(f"the logo cannot be read ({error.strerror}): {name_or_png}") from error
         logo = cls("png", base64.b64encode(content).decode("ascii"))
-        _png_ink(logo.png_base64)
+        _png_darkness(logo.png_base64)
         return logo
 
 
 @dataclass(frozen=True, eq=False)
 class Texture:
-    """Ink on the Lambert map.
+    """Printing on the Lambert azimuthal equal-area map.
 
-    ink : (n, n) float32, 0 = ball, 1 = ink; row = w, column = u
-    half_extent : the map's half side in (u, w)
-    cap_rad : no ink farther than this from the logo's centre
-    ink_u, ink_w : no ink beyond these in |u| and |w|
+    Attributes
+    ----------
+    values : (n, n) float32
+        0 = ball, 1 = print; row = w, column = u.
+    half_extent : float
+        Half side of the map in (u, w).
+    cap_rad : float
+        Angle from the logo's centre beyond which nothing is printed.
+    extent_u, extent_w : float
+        Largest |u| and |w| with printing.
     """
 
-    ink: NDArray[np.float32]
+    values: NDArray[np.float32]
     half_extent: float
     cap_rad: float
-    ink_u: float
-    ink_w: float
+    extent_u: float
+    extent_w: float
 
 
 @lru_cache(maxsize=8)
@@ -87,19 +100,19 @@ def texture(logo: Logo, blur_mm: float = 0.0) -> Texture:
     rho = np.hypot(u, w)
     angle = 2 * np.arcsin(np.minimum(rho / 2, 1.0))
     stretch = np.divide(angle * RADIUS_MM, rho, out=np.full_like(rho, RADIUS_MM), where=rho > 0)
-    ink = np.clip(0.5 - drawing(u * stretch, w * stretch) / TEXEL_MM, 0.0, 1.0)
+    values = np.clip(0.5 - drawing(u * stretch, w * stretch) / TEXEL_MM, 0.0, 1.0)
     if blur_mm > 0:
         from scipy.ndimage import gaussian_filter  # a quarter of a second to load, needed here only
 
-        ink = gaussian_filter(ink, blur_mm / TEXEL_MM, mode="constant")
-    ink[angle > cap_rad] = 0.0
-    inked = ink > 1e-4
+        values = gaussian_filter(values, blur_mm / TEXEL_MM, mode="constant")
+    values[angle > cap_rad] = 0.0
+    printed = values > 1e-4
     return Texture(
-        np.ascontiguousarray(ink, np.float32),
+        np.ascontiguousarray(values, np.float32),
         float(half_extent),
         float(cap_rad),
-        float(np.max(np.abs(u), where=inked, initial=0.0)),
-        float(np.max(np.abs(w), where=inked, initial=0.0)),
+        float(np.max(np.abs(u), where=printed, initial=0.0)),
+        float(np.max(np.abs(w), where=printed, initial=0.0)),
     )
 
 
@@ -169,8 +182,8 @@ NAMES = tuple(_DRAWINGS)
 def _drawing(logo: Logo) -> tuple[Drawing, float]:
     if logo.name != "png":
         return _DRAWINGS[logo.name]
-    ink = _png_ink(logo.png_base64)
-    height, width = ink.shape
+    dark = _png_darkness(logo.png_base64)
+    height, width = dark.shape
     pitch = logo.width_mm / width
 
     def sampled(a: Floats, b: Floats) -> Floats:
@@ -178,14 +191,14 @@ def _drawing(logo: Logo) -> tuple[Drawing, float]:
         inside = (column >= 0) & (column <= width - 1) & (row >= 0) & (row <= height - 1)
         row = np.clip(np.rint(row), 0, height - 1).astype(np.intp)
         column = np.clip(np.rint(column), 0, width - 1).astype(np.intp)
-        nearest = ink[row, column]
+        nearest = dark[row, column]
         return (0.5 - np.where(inside, nearest, 0.0)) * TEXEL_MM
 
     return sampled, 0.5 * pitch * float(np.hypot(width, height))
 
 
-def _png_ink(png_base64: str) -> Floats:
-    """(h, w) float64, 0 = blank, 1 = ink; raises ParameterError when it is no PNG."""
+def _png_darkness(png_base64: str) -> Floats:
+    """(h, w) float64, 0 = blank, 1 = print; raises ParameterError when it is no PNG."""
     import cv2  # only for pictures of one's own; 60 ms to load
 
     content = np.frombuffer(base64.b64decode(png_base64), np.uint8)
@@ -196,5 +209,5 @@ def _png_ink(png_base64: str) -> Floats:
     if picture.ndim == 2:
         return 1.0 - picture
     dark = 1.0 - picture[..., :3].mean(axis=2)
-    ink: Floats = dark * picture[..., 3] if picture.shape[2] == 4 else dark
-    return ink
+    printed: Floats = dark * picture[..., 3] if picture.shape[2] == 4 else dark
+    return printed

@@ -1,4 +1,4 @@
-"""How balls and arms move: the physics, and poses at any time."""
+"""Motion of balls and arms: the physics, and poses at any time."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FRICTION = 0.25  # ball on table, sliding
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class Trajectory:
     """A motion sampled at `time_s` (k,), rising; `rotation` (k, 3, 3) is ball frame -> camera frame."""
 
     time_s: Floats
@@ -37,7 +37,7 @@ class Path:
     def end_s(self) -> float:
         return float(self.time_s[-1])
 
-    def at(self, time_s: ArrayLike) -> Path:
+    def at(self, time_s: ArrayLike) -> Trajectory:
         """The poses at these times: cubic Hermite in space, constant spin since the sample before."""
         t = np.asarray(time_s, np.float64)
         row = np.clip(np.searchsorted(self.time_s, t, side="right") - 1, 0, self.time_s.size - 2)
@@ -55,7 +55,7 @@ class Path:
         velocity = 6 * s * (1 - s) * (p1 - p0) / h + (1 - s) * (1 - 3 * s) * v0 + s * (3 * s - 2) * v1
         spin = self.spin_rps[row]
         turned = rotations(spin * 2 * np.pi * (t - self.time_s[row])[:, None]) @ self.rotation[row]
-        return Path(t, position, velocity, spin, turned)
+        return Trajectory(t, position, velocity, spin, turned)
 
 
 def matrix_of(quaternion: Quaternion) -> Floats:
@@ -107,18 +107,18 @@ def accelerations(ball: Ball, air: Air, up: Sequence[float]) -> tuple[Floats, fl
     )
 
 
-def path(motion: Fixed | Flight, ball: Ball, scene: Scene) -> Path:
+def trajectory(motion: Fixed | Flight, ball: Ball, scene: Scene) -> Trajectory:
     """The motion sampled over its whole time."""
     if isinstance(motion, Fixed):
         time = np.array([motion.start_s, motion.end_s])
         still = np.zeros((2, 3))
         spin = np.tile(np.array(motion.spin_rps, np.float64), (2, 1))
         turn = rotations(spin * 2 * np.pi * (time - time[0])[:, None]) @ matrix_of(motion.orientation)
-        return Path(time, np.tile(np.array(motion.position_m, np.float64), (2, 1)), still, spin, turn)
+        return Trajectory(time, np.tile(np.array(motion.position_m, np.float64), (2, 1)), still, spin, turn)
     return _flown(motion, ball, scene)
 
 
-def _flown(flight: Flight, ball: Ball, scene: Scene) -> Path:
+def _flown(flight: Flight, ball: Ball, scene: Scene) -> Trajectory:
     """Runge-Kutta of fourth order, in plain numbers: arrays of three are slower."""
     gravity, drag, magnus = accelerations(ball, scene.air, scene.up)
     count = max(int(np.ceil((flight.end_s - flight.start_s) / STEP_S)), 1)
@@ -155,7 +155,7 @@ def _flown(flight: Flight, ball: Ball, scene: Scene) -> Path:
     rotation[0] = matrix_of(flight.orientation)
     for row, turn in enumerate(rotations(2 * np.pi * h * spin[:-1])):
         rotation[row + 1] = turn @ rotation[row]
-    return Path(np.linspace(flight.start_s, flight.end_s, count + 1), position, velocity, spin, rotation)
+    return Trajectory(np.linspace(flight.start_s, flight.end_s, count + 1), position, velocity, spin, rotation)
 
 
 def _ahead(start: Vector3, slope: Vector3, by: float) -> Vector3:

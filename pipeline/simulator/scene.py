@@ -1,5 +1,4 @@
-"""A scene: balls, an arm, a background and the light, in the camera frame; readable from and writable to
-JSON.
+"""A scene: balls, an arm, a background and the light, in the camera frame, convertible to and from JSON.
 
 Everything random was drawn when the scene was made, so the same scene can be simulated again with other
 biases.
@@ -8,7 +7,6 @@ biases.
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -36,9 +34,15 @@ class Fixed:
 class Flight:
     """A ball in free flight during [start_s, end_s), with gravity, drag and Magnus force.
 
-    position_m, velocity_m_s, spin_rps, orientation : at start_s, camera frame
-    spin_decay_hz : the spin falls as exp(-spin_decay_hz t); 0 = constant
-    bounces : whether the table of the scene throws the ball back
+    Attributes
+    ----------
+    start_s, end_s : float
+    position_m, velocity_m_s, spin_rps, orientation : tuple of float
+        At start_s, camera frame.
+    spin_decay_hz : float
+        The spin falls as exp(-spin_decay_hz t); 0 = constant.
+    bounces : bool
+        Whether the ball bounces off the table of the scene.
     """
 
     start_s: float
@@ -53,11 +57,18 @@ class Flight:
 
 @dataclass(frozen=True)
 class Air:
-    """What acts on a flying ball besides its weight.
+    """Gravity and aerodynamics of a flying ball.
 
-    drag : drag coefficient of a smooth sphere at Reynolds numbers of 10^4 to 10^5
-    magnus : lift coefficient per spin parameter (|spin| radius / speed), so that the Magnus acceleration is
-        magnus rho area radius / (2 mass) spin x velocity; 0.6 lies within the published range for 40 mm balls
+    Attributes
+    ----------
+    gravity_m_s2 : float
+    density_kg_m3 : float
+        Of the air.
+    drag : float
+        Drag coefficient of a smooth sphere at Reynolds numbers of 10^4 to 10^5.
+    magnus : float
+        Lift coefficient per spin parameter (|spin| radius / speed), so that the Magnus acceleration is
+        magnus rho area radius / (2 mass) spin x velocity; 0.6 lies within the published range for 40 mm balls.
     """
 
     gravity_m_s2: float = 9.81
@@ -100,10 +111,18 @@ class Arm:
 
 @dataclass(frozen=True)
 class Background:
-    """What stands still: a plane `height_m` below the camera.
+    """Static background: a plane `height_m` below the camera.
 
-    kind : "plain" (table everywhere), "table" (with white lines, and the floor beyond)
-    contrast : standard deviation of a random texture in log intensity, of grain_px pixels
+    Attributes
+    ----------
+    kind : str
+        "plain" (table everywhere) or "table" (with white lines, and the floor beyond).
+    height_m : float
+    albedo, line_albedo, floor_albedo : float
+        Of the table, its lines and the floor.
+    contrast, grain_px : float
+        Standard deviation in log intensity and grain of a random texture.
+    texture_seed : int
     """
 
     kind: str = "table"
@@ -128,8 +147,17 @@ class Light:
     that the events of a flying ball lie on its disc as they do for real balls (accumulated frames of
     cogsys-tuebingen/snn-edge-benchmark: occupancy flat up to 0.6 radii, a ring above); with a ball darker at
     its limb OFF events begin far inside it.
-    illuminance_lux : on the table (the paper's 1,930 lx are the reference of all intensities)
-    flicker_depth : half the swing of the light over its mean, 0 = steady LED panels
+
+    Attributes
+    ----------
+    illuminance_lux : float
+        On the table (the paper's 1,930 lx are the reference of all intensities).
+    sky, bounce : float
+        Shares of the ceiling and of the light from below.
+    flicker_depth : float
+        Amplitude of the flicker over the mean, 0 = steady LED panels.
+    flicker_hz : float
+        Frequency of the flicker.
     """
 
     illuminance_lux: float = 1930.0
@@ -172,9 +200,6 @@ class Scene:
         plain: dict[str, Any] = _plain(self)
         return plain
 
-    def to_json(self) -> str:
-        return json.dumps(self.to_dict(), sort_keys=True)
-
     @classmethod
     def from_dict(cls, plain: Mapping[str, Any]) -> Scene:
         """The scene again; raises ParameterError when something is missing or unknown."""
@@ -187,15 +212,6 @@ class Scene:
             return _made(cls, values)
         except (KeyError, TypeError, AttributeError, ValueError) as error:
             raise ParameterError(f"this is no scene of the simulator: {error}") from error
-
-    @classmethod
-    def from_json(cls, text: str) -> Scene:
-        """The scene written by `to_json`; raises ParameterError."""
-        try:
-            plain = json.loads(text)
-        except json.JSONDecodeError as error:
-            raise ParameterError(f"this is no scene of the simulator: {error}") from error
-        return cls.from_dict(plain)
 
 
 Kind = TypeVar("Kind")

@@ -1,4 +1,4 @@
-"""The sensor around the light: what a pixel is like, its noise, and the readout.
+"""The event sensor: its pixels, noise and readout.
 
 Model after the published ones (Lichtsteiner 2008; v2e, Hu 2021; IEBCS, Joubert 2021; Graca 2021): log
 intensity, first-order low-pass whose cut-off falls with darkness, two contrast thresholds with mismatch, a
@@ -25,9 +25,14 @@ NOISE, EDGE, LOGO, OTHER, HOT = range(5)  # labels of the truth
 class Lens:
     """Sharpness of the optics.
 
-    blur_px : sigma of the sharp image's point spread (diffraction, aberration, micro lenses); 0.5 px is usual
-    aperture_mm : diameter of the opening (8 mm at f/4 = 2 mm), which decides how fast defocus grows
-    focus_m : distance of the plane in focus
+    Attributes
+    ----------
+    blur_px : float
+        Sigma of the point spread in focus (diffraction, aberration, micro lenses); 0.5 px is usual.
+    aperture_mm : float
+        Diameter of the aperture (8 mm at f/4 = 2 mm), on which the defocus depends.
+    focus_m : float
+        Distance of the plane in focus.
     """
 
     blur_px: float = 0.5
@@ -49,24 +54,41 @@ class Lens:
 
 
 @dataclass(frozen=True)
-class Sensor:
+class SensorModel:
     """A pixel array in physical units. Intensities are relative to white at 1,930 lx.
 
-    threshold_on, threshold_off : contrast thresholds, log intensity; `mismatch` is their relative sigma over
-        pixels
-    cutoff_hz : of the low-pass in bright light; dark_tau_us : time constant added at intensity 1, growing as
-        1 / intensity
-    highpass_hz : rate at which the reference forgets; refractory_us : dead time after an event
-    reset_settling : time constants of the low-pass for which a reset lasts at least, see `dead_us`
-    off_after_on_us : an OFF event waits until this long after an ON event of its pixel (the paper's
-        limitation)
-    contrast_noise : sigma of the temporal noise in log intensity at intensity 1; grows as intensity ** -0.5
-    delay_us, jitter_us : constant part of the latency and its sigma; the rest comes from low-pass and noise
-    noise_hz : rate of uniform noise per pixel at intensity 1, at ON : OFF shares in noise_on : noise_off
-    hot_share, hot_median_hz, hot_sigma : log-normal rates of the pixels that make most of the noise
-    timestamp_us : step of the readout's clock; rate_limit_hz : events a second let through, 0 = no limit
-    pattern_seed : of mismatch and hot pixels (one camera = one pattern); None = drawn from the recording's
-        seed
+    Attributes
+    ----------
+    threshold_on, threshold_off : float
+        Contrast thresholds, log intensity.
+    mismatch : float
+        Relative sigma of the thresholds over pixels.
+    cutoff_hz : float
+        Of the low-pass in bright light.
+    dark_tau_us : float
+        Time constant added at intensity 1, growing as 1 / intensity.
+    highpass_hz : float
+        Rate at which the reference decays to the signal.
+    refractory_us : float
+        Dead time after an event.
+    reset_settling : float
+        Time constants of the low-pass for which a reset lasts at least, see `dead_us`.
+    off_after_on_us : float
+        An OFF event waits until this long after an ON event of its pixel (the paper's limitation).
+    contrast_noise : float
+        Sigma of the temporal noise in log intensity at intensity 1; grows as intensity ** -0.5.
+    delay_us, jitter_us : float
+        Constant part of the latency and its sigma; the rest comes from low-pass and noise.
+    noise_hz, noise_on_share : float
+        Rate of uniform noise per pixel at intensity 1, and the share of ON events in it.
+    hot_share, hot_median_hz, hot_sigma : float
+        Share and log-normal rates of the hot pixels, which make most of the noise.
+    timestamp_us : int
+        Step of the readout's clock.
+    rate_limit_hz : float
+        Events a second let through, 0 = no limit.
+    pattern_seed : int or None
+        Of mismatch and hot pixels (one camera = one pattern); None = drawn from the recording's seed.
     """
 
     threshold_on: float = 0.27
@@ -119,7 +141,7 @@ class Sensor:
         return max(self.refractory_us, self.reset_settling * self.tau_us)
 
     @classmethod
-    def of(cls, biases: BiasParameters = PAPER, curves: Mapping[str, BiasCurve] = CURVES) -> Sensor:
+    def of(cls, biases: BiasParameters = PAPER, curves: Mapping[str, BiasCurve] = CURVES) -> SensorModel:
         """The sensor at these biases; `curves` may hold one's own measurements."""
         pixel = physical(biases, curves)
         base = cls()
@@ -136,7 +158,7 @@ class Sensor:
         )
 
     @classmethod
-    def ideal(cls, threshold: float = 0.27) -> Sensor:
+    def ideal(cls, threshold: float = 0.27) -> SensorModel:
         """Equal pixels that answer at once and without noise."""
         return cls(
             threshold_on=threshold,
@@ -163,7 +185,7 @@ class LabelledEvents:
     label: NDArray[np.uint8]
 
 
-def thresholds(sensor: Sensor, pixels: int, random: np.random.Generator) -> tuple[NDArray[np.float32], ...]:
+def thresholds(sensor: SensorModel, pixels: int, random: np.random.Generator) -> tuple[NDArray[np.float32], ...]:
     """(pixels,) float32 ON and OFF thresholds with mismatch, kept above a quarter of the nominal."""
     result = []
     for nominal in (sensor.threshold_on, sensor.threshold_off):
@@ -173,16 +195,16 @@ def thresholds(sensor: Sensor, pixels: int, random: np.random.Generator) -> tupl
 
 
 def hot_rates_hz(
-    sensor: Sensor, pixels: int, random: np.random.Generator
+    sensor: SensorModel, pixels: int, random: np.random.Generator
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Which pixels are hot (flat indices, rising) and their rates."""
+    """Flat indices of the hot pixels, rising, and their rates."""
     count = int(random.binomial(pixels, sensor.hot_share))
     where = np.sort(random.choice(pixels, count, replace=False)).astype(np.int64)
     return where, sensor.hot_median_hz * np.exp(sensor.hot_sigma * random.standard_normal(count))
 
 
 def noise(
-    sensor: Sensor,
+    sensor: SensorModel,
     intensity: NDArray[np.float64],
     duration_us: int,
     width_px: int,
@@ -191,7 +213,14 @@ def noise(
 ) -> LabelledEvents:
     """Background noise: uniform Poisson noise, more of it in the dark, and hot pixels; not sorted.
 
-    intensity : (pixels,) float64 of the background, relative to white
+    Parameters
+    ----------
+    sensor : SensorModel
+    intensity : (pixels,) float64
+        Of the background, relative to white.
+    duration_us, width_px : int
+    pattern, random : numpy.random.Generator
+        For the hot pixels, and for the events.
     """
     pixels = intensity.size
     # Shot noise in log intensity falls with the root of the photocurrent, and so does the noise rate (v2e's
@@ -215,7 +244,7 @@ def noise(
     return LabelledEvents(EventBatch(time.astype(np.int64), x.astype(np.uint16), y.astype(np.uint16), on), label)
 
 
-def read_out(parts: list[LabelledEvents], sensor: Sensor, duration_us: int) -> LabelledEvents:
+def read_out(parts: list[LabelledEvents], sensor: SensorModel, duration_us: int) -> LabelledEvents:
     """Put events in order of time, on the readout's clock and under its rate limit.
 
     The limit counts in windows of 1 ms; what exceeds it in a window is lost, later events first (as the

@@ -1,4 +1,4 @@
-"""From a scene to events: `simulate`."""
+"""Simulation of a scene: `simulate_scene`."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from ..errors import ParameterError
 from ..events import EventBatch
 from ..results import Truth
 from . import kernels, kernels_light, kernels_pixel
-from .backdrop import intensity_map
+from .background import intensity_map
 from .bodies import ArmBody, BallBody, bodies_of
-from .motion import Path
+from .motion import Trajectory
 from .scene import Scene
-from .sensor import EDGE, LOGO, OTHER, LabelledEvents, Lens, Sensor, noise, read_out, thresholds
+from .sensor import EDGE, LOGO, OTHER, LabelledEvents, Lens, SensorModel, noise, read_out, thresholds
 
 EDGE_STEP_PX = 0.25  # an outline moves less than this between two looks at it
 LONGEST_STEP_S = 250e-6
@@ -38,12 +38,25 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedRecording:
-    """Events with their truth, and what is needed to simulate them again."""
+    """Events with their truth and scene.
+
+    Attributes
+    ----------
+    events : EventBatch
+    truth : Truth
+        Of the scene's first ball, and one label an event.
+    width_px, height_px : int
+        Size of the sensor.
+    scene : Scene
+    description : dict
+        Everything that `simulate_again` needs, ready for JSON.
+    """
 
     events: EventBatch
     truth: Truth
     width_px: int
     height_px: int
+    scene: Scene
     description: dict[str, Any]
 
 
@@ -52,26 +65,40 @@ def default_camera(width_px: int = 1280, height_px: int = 720) -> Camera:
     return Camera.of(CameraParameters(), width_px, height_px)
 
 
-def simulate(
+def simulate_scene(
     scene: Scene,
     *,
     camera: Camera | None = None,
-    sensor: Sensor | BiasParameters = PAPER,
+    sensor: SensorModel | BiasParameters = PAPER,
     lens: Lens | None = None,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> SimulatedRecording:
-    """The events of a scene, with exact truth; the same arguments give the same events.
+    """Simulate a scene with exact truth; the same arguments give the same events.
 
-    sensor : a pixel array in physical units, or biases to make one from
-    progress : called with the share done, 0 to 1
-    Raises ParameterError for a negative seed.
+    Parameters
+    ----------
+    scene : Scene
+    camera : Camera or None
+        None = the paper's.
+    sensor : SensorModel or BiasParameters
+        A pixel array in physical units, or biases to make one from.
+    lens : Lens or None
+    seed : int
+        Of pixel mismatch, noise and jitter.
+    progress : callable or None
+        Called with the share done, 0 to 1.
+
+    Raises
+    ------
+    ParameterError
+        For a negative seed.
     """
     if seed < 0:
         raise ParameterError(f"seed {seed} is out of range: 0 or more")
     camera = default_camera() if camera is None else camera
     lens = Lens() if lens is None else lens
-    array = Sensor.of(sensor) if isinstance(sensor, BiasParameters) else sensor
+    array = SensorModel.of(sensor) if isinstance(sensor, BiasParameters) else sensor
     pattern, background, pixel = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
     if array.pattern_seed is not None:
         pattern = np.random.default_rng(array.pattern_seed)
@@ -93,13 +120,13 @@ def simulate(
         "biases": sensor.as_dict() if isinstance(sensor, BiasParameters) else None,
     }
     truth = truth_of(scene, camera, read.label)
-    return SimulatedRecording(read.events, truth, camera.width_px, camera.height_px, description)
+    return SimulatedRecording(read.events, truth, camera.width_px, camera.height_px, scene, description)
 
 
 def simulate_again(
     description: dict[str, Any],
     *,
-    sensor: Sensor | BiasParameters | None = None,
+    sensor: SensorModel | BiasParameters | None = None,
     progress: Progress | None = None,
 ) -> SimulatedRecording:
     """The recording of a description again, or the same scene with another sensor; raises ParameterError."""
@@ -111,20 +138,20 @@ def simulate_again(
         seed = int(description["seed"])
         if sensor is None:
             biases = description.get("biases")
-            sensor = Sensor(**description["sensor"]) if biases is None else BiasParameters(**biases)
+            sensor = SensorModel(**description["sensor"]) if biases is None else BiasParameters(**biases)
     except (KeyError, TypeError, ValueError) as error:
         raise ParameterError(f"this is no description of a simulated recording: {error}") from error
-    return simulate(scene, camera=camera, sensor=sensor, lens=lens, seed=seed, progress=progress)
+    return simulate_scene(scene, camera=camera, sensor=sensor, lens=lens, seed=seed, progress=progress)
 
 
 def truth_of(scene: Scene, camera: Camera, label: NDArray[np.uint8]) -> Truth:
     """The truth of the first ball every 500 us of its motions."""
-    rows: list[tuple[NDArray[np.int64], Path]] = []
-    for path in BallBody(scene, 0).paths if scene.balls else ():
-        first = -(-max(round(path.start_s * 1e6), 0) // TRUTH_STEP_US) * TRUTH_STEP_US
-        last = round(min(path.end_s, scene.duration_s) * 1e6)
+    rows: list[tuple[NDArray[np.int64], Trajectory]] = []
+    for flown in BallBody(scene, 0).trajectories if scene.balls else ():
+        first = -(-max(round(flown.start_s * 1e6), 0) // TRUTH_STEP_US) * TRUTH_STEP_US
+        last = round(min(flown.end_s, scene.duration_s) * 1e6)
         t_us = np.arange(first, last, TRUTH_STEP_US, dtype=np.int64)
-        rows.append((t_us, path.at(t_us * 1e-6)))
+        rows.append((t_us, flown.at(t_us * 1e-6)))
     nowhere = np.empty((0, 3))
     position = np.concatenate([nowhere, *(pose.position_m for _, pose in rows)])
     x_px, y_px, radius_px = camera.silhouette(position, scene.balls[0].radius_m if scene.balls else 1.0)
@@ -141,13 +168,13 @@ def truth_of(scene: Scene, camera: Camera, label: NDArray[np.uint8]) -> Truth:
 
 
 class _Simulation:
-    """The moving part: pixel state carried through the segments in which something moves in the image."""
+    """Pixel states carried through the segments of time in which something moves in the image."""
 
     def __init__(
         self,
         scene: Scene,
         camera: Camera,
-        sensor: Sensor,
+        sensor: SensorModel,
         lens: Lens,
         backdrop: NDArray[np.float64],
         pattern: np.random.Generator,
@@ -297,13 +324,13 @@ def _packed(
     """The bodies at these times in the kernels' form, from far to near."""
     order = sorted(range(len(there)), key=lambda k: -there[k].distance_m(time_s))
     packed = [there[k].packed(camera, lens, time_s, every[k], max(slower[k], 1)) for k in order]
-    side = max((body.ink.shape[0] for body in packed), default=2)
-    ink = np.zeros((len(packed), side, side), np.float32)
+    side = max((body.texture.shape[0] for body in packed), default=2)
+    texture = np.zeros((len(packed), side, side), np.float32)
     for k, body in enumerate(packed):
-        ink[k, : body.ink.shape[0], : body.ink.shape[1]] = body.ink
+        texture[k, : body.texture.shape[0], : body.texture.shape[1]] = body.texture
     pose = np.empty((time_s.size, len(packed), kernels_light.POSE_COLUMNS))
     box = np.empty((time_s.size, len(packed), 4), np.int32)
     kind = np.empty((len(packed), kernels_light.BODY_COLUMNS))
     for k, body in enumerate(packed):
         pose[:, k], box[:, k], kind[k] = body.pose, body.box, body.kind
-    return kernels_light.Bodies(pose, box, kind, ink)
+    return kernels_light.Bodies(pose, box, kind, texture)

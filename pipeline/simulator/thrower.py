@@ -8,8 +8,8 @@ from types import MappingProxyType
 import numpy as np
 
 from ..errors import ParameterError
-from .recipes import flight
 from .scene import Scene
+from .scenes import flight
 
 # Velocity setting -> metres per second (section 4.3).
 THROWER_SPEED_M_S = MappingProxyType({10: 4.0, 15: 5.5, 20: 7.5, 25: 9.0})

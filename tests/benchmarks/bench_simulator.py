@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from spinscope.pipeline.camera import Camera, CameraParameters
-from spinscope.pipeline.simulator import flight, simulate, spinner
-from tests.naive_simulator import naive_pixel
+from spinscope.pipeline.simulator import flight, simulate_scene, spinner
 from tests.pipeline.simulator.test_simulator_pixel import IDEAL, events_of
+from tests.reference.simulator import naive_pixel
 
 # The thread's own time: what other programs do on a shared machine does not count.
 pytestmark = pytest.mark.benchmark(timer=time.thread_time)
@@ -23,7 +23,7 @@ CAMERA = Camera.of(CameraParameters(), 1280, 720)
 def test_flight(benchmark: Any, speed_m_s: float) -> None:
     """A whole flight at 1280 x 720; the aim is 3 s for 120 ms."""
     scene = flight(speed_m_s=speed_m_s, seed=1)
-    recording = benchmark.pedantic(simulate, (scene,), {"camera": CAMERA}, rounds=3, warmup_rounds=1)
+    recording = benchmark.pedantic(simulate_scene, (scene,), {"camera": CAMERA}, rounds=3, warmup_rounds=1)
     benchmark.extra_info.update(ms=scene.duration_s * 1e3, events=len(recording.events))
 
 
@@ -31,7 +31,7 @@ def test_flight(benchmark: Any, speed_m_s: float) -> None:
 def test_crowded_flight(benchmark: Any, what: str) -> None:
     """A flight with something else that moves."""
     scene = flight(speed_m_s=9.0, seed=1, **{what: True})  # type: ignore[arg-type]
-    benchmark.pedantic(simulate, (scene,), {"camera": CAMERA}, rounds=2, warmup_rounds=1)
+    benchmark.pedantic(simulate_scene, (scene,), {"camera": CAMERA}, rounds=2, warmup_rounds=1)
 
 
 @pytest.mark.parametrize("scale", [1, 2], ids=["1280x720", "2560x1440"])
@@ -39,7 +39,7 @@ def test_sensor_area(benchmark: Any, scale: int) -> None:
     """The same ball on a sensor of four times the pixels: what grows is the fixed part, maps and noise."""
     camera = Camera.of(CameraParameters(), 1280 * scale, 720 * scale)
     scene = spinner(magnitude_rps=60.0, position_m=(0.0, 0.0, 2.0), seed=1)
-    benchmark.pedantic(simulate, (scene,), {"camera": camera}, rounds=3, warmup_rounds=1)
+    benchmark.pedantic(simulate_scene, (scene,), {"camera": camera}, rounds=3, warmup_rounds=1)
 
 
 def test_pixel_against_its_twin(benchmark: Any) -> None:

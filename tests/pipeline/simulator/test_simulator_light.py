@@ -14,8 +14,8 @@ from spinscope.pipeline.simulator.logos import NAMES, Logo, texture
 from spinscope.pipeline.simulator.motion import matrix_of
 from spinscope.pipeline.simulator.scene import Ball, Fixed, Light, Scene
 from spinscope.pipeline.simulator.sensor import Lens
-from tests.naive_simulator import naive_picture
 from tests.pipeline.simulator.test_simulator_pixel import IDEAL
+from tests.reference.simulator import naive_picture
 
 CAMERA = Camera.of(CameraParameters(), 1280, 720)
 BACKGROUND = 0.12
@@ -27,12 +27,12 @@ def picture(ball: Ball, lens: Lens) -> tuple[np.ndarray, np.ndarray, range, rang
     body = BallBody(scene, 0).packed(CAMERA, lens, np.array([0.0, 0.001]), 1, 1)
     x0, y0, x1, y1 = (int(v) for v in body.box[0])
     physics = IDEAL._replace(focal_px=CAMERA.focal_px, width_px=CAMERA.width_px)
-    pose, kind, ink = body.pose[:, None], body.kind[None], body.ink[None]
+    pose, kind, texture = body.pose[:, None], body.kind[None], body.texture[None]
     intensity, cover = np.empty((y1 - y0, x1 - x0)), np.empty((y1 - y0, x1 - x0))
     for y in range(y0, y1):
         rays = CAMERA.rays(np.arange(x0, x1), np.full(x1 - x0, y))
         for x in range(x0, x1):
-            part, value, _, _ = columns.ball_light(ink, kind, pose, 0, 0, physics, rays[x - x0, 0], rays[x - x0, 1])
+            part, value, _, _ = columns.ball_light(texture, kind, pose, 0, 0, physics, rays[x - x0, 0], rays[x - x0, 1])
             cover[y - y0, x - x0] = part
             intensity[y - y0, x - x0] = BACKGROUND + part * (value - BACKGROUND)
     return intensity, cover, range(x0, x1), range(y0, y1)
@@ -79,15 +79,15 @@ def test_looks_are_left_out_only_where_nothing_changes():
     step_s = 0.25 / (2 * math.pi * spin * 1.1 * 0.02 * CAMERA.focal_px / 1.78)
     body = BallBody(Scene(0.01, (ball,)), 0).packed(CAMERA, Lens(), np.arange(40) * step_s, 1, 8)
     physics = IDEAL._replace(focal_px=CAMERA.focal_px, width_px=CAMERA.width_px)
-    pose, kind, ink = body.pose[:, None], body.kind[None], body.ink[None]
+    pose, kind, texture = body.pose[:, None], body.kind[None], body.texture[None]
     for y in range(int(body.box[0, 1]), int(body.box[0, 3])):
         for x in range(int(body.box[0, 0]), int(body.box[0, 2])):
             ray = CAMERA.rays(x, y)[0]
-            _, value, plain, looks = columns.ball_light(ink, kind, pose, 0, 0, physics, ray[0], ray[1])
+            _, value, plain, looks = columns.ball_light(texture, kind, pose, 0, 0, physics, ray[0], ray[1])
             if looks < 2:
                 continue
             row = min(int(looks) - 1, 39)
-            _, later, _, _ = columns.ball_light(ink, kind, pose, 0, row, physics, ray[0], ray[1])
+            _, later, _, _ = columns.ball_light(texture, kind, pose, 0, row, physics, ray[0], ray[1])
             assert value == plain
             assert abs(later - value) < 0.01
 
@@ -95,16 +95,16 @@ def test_looks_are_left_out_only_where_nothing_changes():
 @pytest.mark.parametrize("name", NAMES)
 def test_logos_keep_their_strokes(name):
     drawn = texture(Logo(name))
-    side = drawn.ink.shape[0]
-    row = drawn.ink[side // 2]
+    side = drawn.values.shape[0]
+    row = drawn.values[side // 2]
     width_mm = row.sum() * 2 * drawn.half_extent / (side - 1) * 20.0
     if name.startswith("line"):
-        column = drawn.ink[:, side // 2].sum() * 2 * drawn.half_extent / (side - 1) * 20.0
+        column = drawn.values[:, side // 2].sum() * 2 * drawn.half_extent / (side - 1) * 20.0
         assert column == pytest.approx(float(name[5:8]), abs=0.1)
         assert width_mm == pytest.approx(26.0 + float(name[5:8]), rel=0.03)
     elif name == "double_circle":
         assert width_mm == pytest.approx(4 * 0.6, abs=0.15)
     elif name == "none":
-        assert not drawn.ink.any()
+        assert not drawn.values.any()
     else:
-        assert 60 < drawn.ink.sum() * (2 * drawn.half_extent / (side - 1) * 20.0) ** 2 < 140  # mm^2
+        assert 60 < drawn.values.sum() * (2 * drawn.half_extent / (side - 1) * 20.0) ** 2 < 140  # mm^2

@@ -15,8 +15,8 @@ from spinscope.pipeline.camera import Camera, CameraParameters
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.kernels.rotation import rotations
 from spinscope.pipeline.simulator import Air, Ball, Flight, Scene, flight, human_shot, rally, spinner, thrown
-from spinscope.pipeline.simulator.motion import bounced, matrix_of, path, quaternion_of
-from spinscope.pipeline.simulator.shots import SPINNER_BALLS, mounted
+from spinscope.pipeline.simulator.flights import SPINNER_BALLS, mounted
+from spinscope.pipeline.simulator.motion import bounced, matrix_of, quaternion_of, trajectory
 from spinscope.pipeline.simulator.thrower import THROWER_BACKTOP_RPS, THROWER_SIDE_RPS, thrower_spin
 
 UP = np.array([0.0, 0.0, -1.0])
@@ -27,7 +27,7 @@ VACUUM = Air(drag=0.0, magnus=0.0)
 def flown(velocity, spin=(0.0, 0.0, 0.0), air=VACUUM, seconds=0.2, bounces=False, decay_hz=0.0):
     motion = Flight(0.0, seconds, (0.1, -0.3, 1.7), velocity, spin, (1.0, 0.0, 0.0, 0.0), decay_hz, bounces)
     ball = Ball((motion,))
-    return path(motion, ball, Scene(seconds, (ball,), air=air))
+    return trajectory(motion, ball, Scene(seconds, (ball,), air=air))
 
 
 def test_a_flight_without_air_is_a_parabola():
@@ -116,7 +116,7 @@ def test_a_bounce_obeys_mechanics(velocity, spin):
 @pytest.mark.parametrize("kind", ["top", "back", "left", "right", "corkscrew"])
 def test_flights_cross_the_image_with_the_spin_asked_for(kind, seed):
     scene = flight(kind=kind, magnitude_rps=60.0, speed_m_s=8.0, seed=seed)
-    way = path(scene.balls[0].motions[0], scene.balls[0], scene)
+    way = trajectory(scene.balls[0].motions[0], scene.balls[0], scene)
     x, y, radius = CAMERA.silhouette(way.position_m, 0.02)
     inside = (x > -radius) & (x < 1280 + radius) & (y > -radius) & (y < 720 + radius)
     assert inside.any()
@@ -137,7 +137,7 @@ def test_flights_cross_the_image_with_the_spin_asked_for(kind, seed):
 def test_flights_keep_their_logo_where_it_was_mounted():
     for ball, (angle, _) in SPINNER_BALLS.items():
         scene = flight(spin_rps=(30.0, 5.0, -40.0), ball=ball, seed=ball)
-        way = path(scene.balls[0].motions[0], scene.balls[0], scene)
+        way = trajectory(scene.balls[0].motions[0], scene.balls[0], scene)
         axis = way.spin_rps[0] / np.linalg.norm(way.spin_rps[0])
         centre = way.rotation[:, :, 2]
         assert np.abs(centre @ axis) == pytest.approx(math.cos(math.radians(angle)), abs=1e-6)
@@ -166,7 +166,7 @@ def test_a_second_ball_crosses_the_image_too(seed):
 
 def test_bouncing_flights_meet_the_table():
     scene = flight(bounce=True, speed_m_s=7.0, seed=2)
-    way = path(scene.balls[0].motions[0], scene.balls[0], scene)
+    way = trajectory(scene.balls[0].motions[0], scene.balls[0], scene)
     height = 2.0 - way.position_m[:, 2]
     assert height.min() == pytest.approx(0.02, abs=2e-3)
     assert way.velocity_m_s[0, 2] > 0 > way.velocity_m_s[-1, 2]

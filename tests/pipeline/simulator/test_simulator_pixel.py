@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from spinscope.pipeline.simulator import Light, kernels_pixel
 from spinscope.pipeline.simulator.kernels_light import Physics
-from tests.naive_simulator import naive_pixel
+from tests.reference.simulator import naive_pixel
 
 IDEAL = Physics(
     tau_us=1e-3,

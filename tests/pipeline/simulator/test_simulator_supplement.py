@@ -9,10 +9,18 @@ import pytest
 
 from spinscope.pipeline.biases import CURVES, FACTORY, PAPER, BiasParameters, Curve
 from spinscope.pipeline.camera import Camera, CameraParameters
-from spinscope.pipeline.simulator import Background, Scene, Sensor, SimulatedRecording, flight, simulate, spinner
+from spinscope.pipeline.simulator import (
+    Background,
+    Scene,
+    SensorModel,
+    SimulatedRecording,
+    flight,
+    simulate_scene,
+    spinner,
+)
 
 SMALL = Camera.of(CameraParameters(), 160, 120)
-QUIET = replace(Sensor(), noise_hz=0.0, hot_share=0.0)
+QUIET = replace(SensorModel(), noise_hz=0.0, hot_share=0.0)
 
 
 def shot(seed: int) -> Scene:
@@ -23,9 +31,9 @@ def shot(seed: int) -> Scene:
 def test_noise_falls_with_the_thresholds():
     noise, counts = [], []
     for value in (-35, 0, 20, 40, 60, 90, 140):
-        sensor = Sensor.of(BiasParameters(diff_on=value, diff_off=value))
+        sensor = SensorModel.of(BiasParameters(diff_on=value, diff_off=value))
         noise.append(sensor.noise_hz)
-        counts.append(len(simulate(Scene(0.5, ()), camera=SMALL, sensor=sensor, seed=1).events))
+        counts.append(len(simulate_scene(Scene(0.5, ()), camera=SMALL, sensor=sensor, seed=1).events))
     assert noise == sorted(noise, reverse=True)
     assert counts == sorted(counts, reverse=True)
     assert noise[1] > 5 * noise[3]  # steeply up to the paper's 40
@@ -33,8 +41,8 @@ def test_noise_falls_with_the_thresholds():
 
 def seen_at(**biases: int) -> SimulatedRecording:
     """A shot at the paper's biases but for these, without background noise."""
-    sensor = replace(Sensor.of(BiasParameters(**biases)), noise_hz=0.0, hot_share=0.0)
-    return simulate(shot(seed=6), camera=SMALL, sensor=sensor, seed=1)
+    sensor = replace(SensorModel.of(BiasParameters(**biases)), noise_hz=0.0, hot_share=0.0)
+    return simulate_scene(shot(seed=6), camera=SMALL, sensor=sensor, seed=1)
 
 
 def test_on_and_off_part_above_60():
@@ -80,14 +88,14 @@ def first_on_us(recording: SimulatedRecording) -> np.ndarray:
 
 def test_ones_own_curves_make_the_sensor():
     mine = Curve("refr", "us", ((-20, 100.0), (235, 10.0)), "measured", calibrated=True)
-    assert Sensor.of(PAPER, {**CURVES, "refractory_us": mine}).refractory_us == pytest.approx(mine.at(80))
+    assert SensorModel.of(PAPER, {**CURVES, "refractory_us": mine}).refractory_us == pytest.approx(mine.at(80))
 
 
 def test_the_paper_and_the_maker_setting_are_not_slowed_by_their_resets():
     for biases in (PAPER, FACTORY):
-        sensor = Sensor.of(biases)
+        sensor = SensorModel.of(biases)
         assert sensor.dead_us == sensor.refractory_us
-    assert Sensor.of(BiasParameters(fo=-10)).dead_us == pytest.approx(2.5e6 / (2 * np.pi * 400.0))
+    assert SensorModel.of(BiasParameters(fo=-10)).dead_us == pytest.approx(2.5e6 / (2 * np.pi * 400.0))
 
 
 def test_a_high_pass_gives_fewer_events():
@@ -98,7 +106,7 @@ def test_a_high_pass_gives_fewer_events():
 
 def test_the_high_pass_takes_slow_motion_away():
     slow = spinner(spin_rps=(1.5, 0.0, 0.0), ball=1, duration_ms=60.0, position_m=(0.0, 0.0, 2.0), seed=1)
-    seen = len(simulate(slow, camera=SMALL, sensor=QUIET).events)
-    passed = replace(Sensor.of(BiasParameters(hpf=120)), noise_hz=0.0, hot_share=0.0)
+    seen = len(simulate_scene(slow, camera=SMALL, sensor=QUIET).events)
+    passed = replace(SensorModel.of(BiasParameters(hpf=120)), noise_hz=0.0, hot_share=0.0)
     assert seen > 50
-    assert len(simulate(slow, camera=SMALL, sensor=passed).events) < 0.7 * seen
+    assert len(simulate_scene(slow, camera=SMALL, sensor=passed).events) < 0.7 * seen

@@ -1,4 +1,4 @@
-"""What stands still: the table with its lines, the floor, and their texture."""
+"""The static background: the table with its lines, the floor, and their texture."""
 
 from __future__ import annotations
 

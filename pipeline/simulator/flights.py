@@ -1,4 +1,4 @@
-"""Shots through the image, and how logos are mounted."""
+"""FlightSampler through the image, and how logos are mounted."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..camera import Camera
 from ..errors import ParameterError
 from ..kernels.rotation import rotations
-from .motion import Path, path, quaternion_of
+from .motion import Trajectory, quaternion_of, trajectory
 from .scene import Air, Background, Ball, Flight, Scene, Vector3
 
 Floats = NDArray[np.float64]
@@ -49,7 +49,7 @@ def mounted(ball: int, spin_rps: Floats, phase_rad: float, toward: Floats) -> Fl
     return result
 
 
-class Shots:
+class FlightSampler:
     """Draws flights through the image."""
 
     def __init__(self, random: np.random.Generator, camera: Camera, air: Air, spin_decay_hz: float) -> None:
@@ -96,7 +96,7 @@ class Shots:
             end_s=here.end_s - start_s,
         )
         ball_there, scene = self._alone(whole)
-        flown = path(whole, ball_there, scene)
+        flown = trajectory(whole, ball_there, scene)
         # It starts outside, so only what comes after the middle counts as leaving.
         end = _leaves(flown, ball_there, self.camera, after_s=-start_s)
         return replace(whole, end_s=round(float(flown.time_s[end]), 6)), -start_s, heading
@@ -128,12 +128,12 @@ class Shots:
         """
         mirrored = replace(here, velocity_m_s=triple(-np.array(here.velocity_m_s)))
         ball, scene = self._alone(mirrored, replace(self.air, drag=-self.air.drag, magnus=-self.air.magnus))
-        back = path(mirrored, ball, scene)
+        back = trajectory(mirrored, ball, scene)
         row = _leaves(back, ball, self.camera, after_s=0.0)
         return -float(back.time_s[row]), back.position_m[row], -back.velocity_m_s[row]
 
 
-def _leaves(ahead: Path, ball: Ball, camera: Camera, after_s: float) -> int:
+def _leaves(ahead: Trajectory, ball: Ball, camera: Camera, after_s: float) -> int:
     """First sample after a time at which the ball has left the image; raises ParameterError when it stays."""
     x, y, radius = camera.silhouette(ahead.position_m, ball.radius_m)
     gone = (x < -radius - 8) | (x > camera.width_px + radius + 8)

@@ -1,7 +1,4 @@
-"""Scenes ready to simulate: the ball spinner, one flight, a rally.
-
-What is not given is drawn from `seed`; the scene that comes back holds every number.
-"""
+"""Scenes of the ball spinner, one flight and a rally; options that are not given are drawn from `seed`."""
 
 from __future__ import annotations
 
@@ -15,10 +12,10 @@ from numpy.typing import NDArray
 from ..camera import Camera
 from ..errors import ParameterError
 from ..kernels.rotation import rotations
+from .flights import HEADING_DEG, FlightSampler, mounted, triple, vector
 from .logos import Logo
 from .motion import quaternion_of
 from .scene import Air, Arm, Background, Ball, Fixed, Flight, Light, Scene
-from .shots import HEADING_DEG, Shots, mounted, triple, vector
 from .simulation import default_camera
 
 Floats = NDArray[np.float64]
@@ -42,12 +39,27 @@ def spinner(
 ) -> Scene:
     """A ball that turns in place (the paper's ball spinner).
 
-    ball : 1 to 7, how the logo is mounted
-    kind, magnitude_rps : "top" (axis +x of the camera), "back" (-x) or "side" (+z), tilted at random by 3
-        degrees
-    spin_rps : (3,) the exact spin in the camera frame instead
-    position_m : (3,) of the centre, camera frame; drawn within 0.2 m of the optical axis at 2 m when not
-        given
+    Parameters
+    ----------
+    ball : int
+        1 to 7, position of the logo on the ball.
+    kind : str
+        "top" (axis +x of the camera), "back" (-x) or "side" (+z), tilted at random by 3 degrees.
+    magnitude_rps : float
+    spin_rps : (3,) sequence of float or None
+        Exact spin in the camera frame instead.
+    duration_ms : float
+    logo : str or Logo
+    position_m : (3,) sequence of float or None
+        Of the centre, camera frame; None = drawn within 0.2 m of the optical axis at 2 m.
+    background : Background or None
+    light : Light or None
+    seed : int
+
+    Raises
+    ------
+    ParameterError
+        For an unknown kind, ball or logo.
     """
     random = np.random.default_rng([seed, 1])
     if spin_rps is None:
@@ -91,18 +103,42 @@ def flight(
 ) -> Scene:
     """One shot across the image, from border to border.
 
-    kind, magnitude_rps : the spin relative to the direction of flight (CONTRACTS: signs), tilted at random by
-        about 8 degrees; "mixed" is any direction
-    spin_rps : (3,) the exact spin in the camera frame instead
-    speed_m_s : in the middle of the image (with `bounce`: where it comes down on the table)
-    heading_deg : direction in the image, 0 = +x, 90 = +y (down); drawn about 90 or 270 when not given
-    ball : 1-7 mounts the logo on the spin axis as on the spinner; at random when not given
-    second_ball, arm : another ball crosses, an arm swings at the border; both count as other objects
+    Parameters
+    ----------
+    kind : str
+        Spin relative to the direction of flight, tilted at random by about 8 degrees; "mixed" = any direction.
+    magnitude_rps : float
+    spin_rps : (3,) sequence of float or None
+        Exact spin in the camera frame instead.
+    speed_m_s : float
+        In the middle of the image (with `bounce`: at the table).
+    heading_deg : float or None
+        Direction in the image, 0 = +x, 90 = +y (down); None = drawn about 90 or 270.
+    ball : int or None
+        1 to 7, position of the logo relative to the spin axis as on the spinner; None = at random.
+    logo : str or Logo
+    second_ball, arm : bool
+        Whether another ball crosses, an arm swings at the border; both count as other objects.
+    bounce : bool
+        Whether the ball bounces off the table.
+    background : Background or None
+    light : Light or None
+    air : Air or None
+    spin_decay_hz : float
+        The spin falls as exp(-spin_decay_hz t).
+    camera : Camera or None
+        None = the paper's.
+    seed : int
+
+    Raises
+    ------
+    ParameterError
+        For an unknown kind, ball or logo, a value out of range, a ball that does not leave the image.
     """
     random = np.random.default_rng([seed, 2])
     camera = default_camera() if camera is None else camera
     air = Air() if air is None else air
-    draw = Shots(random, camera, air, spin_decay_hz)
+    draw = FlightSampler(random, camera, air, spin_decay_hz)
     shot, middle_s, heading = draw.shot(kind, magnitude_rps, spin_rps, speed_m_s, heading_deg, ball, bounce)
     balls = [Ball((shot,), logo=_logo(logo))]
     if second_ball:
@@ -124,7 +160,7 @@ def flight(
     )
 
 
-def _second(draw: Shots, speed_m_s: float, heading_deg: float) -> tuple[Flight, float]:
+def _second(draw: FlightSampler, speed_m_s: float, heading_deg: float) -> tuple[Flight, float]:
     """A second ball's flight and the time of its middle; one so slow that it would fall before it has crossed the
     image is taken faster."""
     while True:
@@ -156,7 +192,7 @@ def rally(
     if shots < 1:
         raise ParameterError(f"a rally of {shots} shots is out of range: 1 or more")
     slot = duration_s / shots
-    draw = Shots(random, camera, Air(), 0.0)
+    draw = FlightSampler(random, camera, Air(), 0.0)
     motions: list[Fixed | Flight] = []
     for number in range(shots):
         shot, _, _ = draw.shot(
