@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from .session import Result as Result
     from .session import Session as Session
     from .shots import Shot as Shot
+    from .simulated_recordings import simulate as simulate
+    from .simulator import SimulatedRecording as SimulatedRecording
 
 # Names of the API by the module that defines them.
 _MODULES = {
@@ -45,6 +47,8 @@ _MODULES = {
     "Result": "session",
     "Session": "session",
     "Shot": "shots",
+    "simulate": "simulated_recordings",
+    "SimulatedRecording": "simulator",
 }
 __all__ = sorted(_MODULES)
 

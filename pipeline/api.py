@@ -11,10 +11,12 @@ from .events import EventBatch
 from .recordings.in_memory import RecordingInMemory
 from .registry import Parameters
 from .session import AnyRecording, Choices, Progress, Result, Session, check_method
+from .simulated_recordings import in_memory
+from .simulator import SimulatedRecording
 
 
 def estimate(
-    recording: AnyRecording | EventBatch | str | Path,
+    recording: AnyRecording | SimulatedRecording | EventBatch | str | Path,
     parameters: Parameters | Mapping[str, Mapping[str, Any]] | Sequence[str] | None = None,
     *,
     preset: str | Path | None = None,
@@ -28,9 +30,9 @@ def estimate(
 
     Parameters
     ----------
-    recording : path, Recording or EventBatch
-        File of any format that `open_recording` reads, an opened recording, or events in memory (then `sensor_px` says
-        how large the sensor is).
+    recording : path, Recording, SimulatedRecording or EventBatch
+        File of any format that `open_recording` reads, an opened recording, the result of `simulate`, or events in
+        memory (then `sensor_px` says how large the sensor is).
     parameters : Parameters, mapping or sequence of str, optional
         All parameters, or changes to the preset: `{"logo": {"pad_px": 3.0}}` or `["logo.pad_px=3"]`. What the
         recording states of its camera is taken unless it is changed here; `Parameters` are taken as they are.
@@ -77,6 +79,8 @@ def estimate(
         assignments = tuple(parameters)
     if isinstance(recording, EventBatch):
         recording = _in_memory(recording, sensor_px)
+    elif isinstance(recording, SimulatedRecording):
+        recording = in_memory(recording)
     choices = Choices(preset, assignments, window_us, None, sensor_px)
     session = Session.open(recording, choices, on_progress)
     if isinstance(parameters, Parameters):

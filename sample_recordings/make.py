@@ -10,8 +10,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from spinscope.app.simulate import Written, simulate_to_file
 from spinscope.app.terminal import ProgressBar, note
+from spinscope.pipeline.simulated_recordings import WrittenSimulation, simulate_to_file
 
 FOLDER = Path(__file__).parent / "own"
 
@@ -38,7 +38,7 @@ SAMPLES: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 
-def make(name: str, folder: Path) -> Written:
+def make(name: str, folder: Path) -> WrittenSimulation:
     """Simulate one sample into a folder; raises SpinscopeError."""
     kind, options = SAMPLES[name]
     with ProgressBar() as bar:

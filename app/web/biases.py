@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spinscope.app.simulate import BIASES, DESCRIPTION, simulate_again_to_file
 from spinscope.pipeline.biases import CURVES, BiasParameters, read_biases, write_biases
 from spinscope.pipeline.errors import ParameterError, RecordingError, SpinscopeError
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.recordings import open_recording, readable_suffixes
 from spinscope.pipeline.registry import Parameters
 from spinscope.pipeline.session import AnyRecording
+from spinscope.pipeline.simulated_recordings import BIASES, DESCRIPTION, simulate_again_to_file
 from spinscope.pipeline.simulator import simulate_again
 
 from .bench import Bench, Clip
@@ -82,7 +82,7 @@ def taken_again(job: Job, bench: Bench, biases: BiasParameters, folder: Path) ->
         job.tell(share=share)
 
     tell(0.0, "")
-    simulate_again_to_file(bench.original, target, biases_path=bias_path, on_progress=tell)
+    simulate_again_to_file(bench.original, target, biases=biases, on_progress=tell)
     return target
 
 

@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 import pytest
 
-from spinscope.app.simulate import simulate_to_file
 from spinscope.pipeline.registry import STAGES
+from spinscope.pipeline.simulated_recordings import simulate_to_file
 
 from .conftest import Served, served
 

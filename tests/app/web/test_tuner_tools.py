@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 
-from spinscope.app.simulate import simulate_to_file
 from spinscope.app.web.biases import known_biases
 from spinscope.app.web.controls import scale_of, sections
 from spinscope.app.web.curve import values_over
@@ -16,6 +15,7 @@ from spinscope.pipeline.biases import BiasParameters
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.registry import Parameters
 from spinscope.pipeline.session import Choices
+from spinscope.pipeline.simulated_recordings import simulate_to_file
 
 from .conftest import Client, served
 
