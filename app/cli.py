@@ -15,8 +15,8 @@ from spinscope.pipeline.files import atomic_file, check_writable
 from spinscope.pipeline.recordings import writable_suffixes
 from spinscope.pipeline.registry import methods
 from spinscope.pipeline.session import DEFAULT_SAMPLE, Choices, Session
+from spinscope.pipeline.simulated_recordings import KINDS, SceneParameters
 
-from .simulate import KINDS, SimulateParameters
 from .terminal import ProgressBar, announce_compilation, note, print_reports
 
 LAYOUTS = ("all", "tracker", "logo", "spin", "coach")
@@ -108,7 +108,7 @@ def _choices(command: Callable[..., None]) -> Callable[..., None]:
 def _tunables(command: Callable[..., None]) -> Callable[..., None]:
     """One option for each parameter of a simulated scene, from its declaration."""
     types: dict[str, Any] = {"number": float, "whole number": int}
-    for name, declared in reversed(SimulateParameters.tunables().items()):
+    for name, declared in reversed(SceneParameters.tunables().items()):
         flag = "--" + name.replace("_", "-")
         help = f"{declared.help} [{declared.allowed}]"
         if declared.kind == "switch":
@@ -288,18 +288,20 @@ def simulate(
 
     `spinscope simulate again --scene FILE.h5 --biases FILE.bias --out OUT` takes a simulated scene once more.
     """
-    from .simulate import simulate_again_to_file, simulate_to_file
+    from spinscope.pipeline.biases import read_biases
+    from spinscope.pipeline.simulated_recordings import simulate_again_to_file, simulate_to_file
 
     if (kind == "again") != (scene is not None):
         raise ParameterError("`simulate again` and --scene FILE.h5 go together: give both or neither")
+    values = read_biases(biases) if biases else None
     with ProgressBar() as bar:
         if scene is not None:
             if given := sorted(name for name, value in options.items() if value not in (None, False)):
                 raise ParameterError(f"{given[0]} does not belong to `simulate again`: the scene stays as it is")
-            written = simulate_again_to_file(scene, out, biases_path=biases, on_progress=bar)
+            written = simulate_again_to_file(scene, out, biases=values, on_progress=bar)
         else:
             written = simulate_to_file(
-                kind, out, spin_rps=spin_rps, logo=logo, biases_path=biases, on_progress=bar, **options
+                kind, out, spin_rps=spin_rps, logo=logo, biases=values, on_progress=bar, **options
             )
     for warning in written.warnings:
         note(f"warning: {warning}")
@@ -309,8 +311,19 @@ def simulate(
     )
 
 
+def _list_suites(context: click.Context, _: click.Parameter, wanted: bool) -> None:
+    if wanted:
+        from .evaluate import suite_list
+
+        click.echo(suite_list())
+        context.exit()
+
+
 @cli.command()
 @click.argument("suites", nargs=-1, required=True, metavar="SUITE...")
+@click.option(
+    "--list", is_flag=True, is_eager=True, expose_value=False, callback=_list_suites, help="List the suites and exit."
+)
 @click.option("--quick", is_flag=True, help="A thinned suite, about ten seconds.")
 @click.option("--json", "output", type=click.Path(path_type=Path), metavar="OUT", help="Write JSON, one suite a line.")
 @click.option("--figures", type=click.Path(path_type=Path), metavar="DIR", help="Write figures (PNG) and rows (CSV).")
@@ -328,8 +341,8 @@ def evaluate(
 ) -> None:
     """Run the paper's experiments on simulated recordings, next to the paper's own numbers.
 
-    Suites: detector, spinner, thrower, frames, biases, filters, runtime. Recordings and results are kept, so that an
-    interrupted run goes on where it stopped.
+    `spinscope evaluate --list` lists the suites. Recordings and results are kept, so that an interrupted run resumes
+    where it stopped.
     """
     from . import evaluate as running
 

@@ -1,4 +1,4 @@
-"""`spinscope evaluate`: run a suite, show its tables, write JSON, CSV, figures and a page."""
+"""Evaluation suites: run one, show its tables, write JSON, CSV, figures and a page."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from rich.markup import escape
 from rich.table import Table as ScreenTable
 
 from spinscope.pipeline.errors import RecordingError
-from spinscope.pipeline.evaluation import SUITES, Bench, Report, Row, evaluate, executor
-from spinscope.pipeline.evaluation.figures import draw
-from spinscope.pipeline.evaluation.work import write_whole
+from spinscope.pipeline.evaluation import SUITES, Report, Row, TaskContext, evaluate, executor
+from spinscope.pipeline.evaluation.plots import draw
+from spinscope.pipeline.evaluation.tasks import write_whole
 from spinscope.pipeline.registry import Parameters
 
 Progress = Callable[[float, str], None]
@@ -32,9 +32,19 @@ WIDE = ("picture",)  # columns that no table of text should hold
 
 @dataclass(frozen=True)
 class Evaluation:
-    """A suite's report with where and when it was made.
+    """A suite's report with its date, machine and version.
 
-    seconds : of this run; kept results make it short
+    Attributes
+    ----------
+    report : Report
+    date : str
+        ISO 8601, UTC.
+    machine : str
+        Processor, cores and system.
+    version : str
+        Of Spinscope.
+    seconds : float
+        Wall-clock time of this run; kept results make it short.
     """
 
     report: Report
@@ -66,31 +76,52 @@ def evaluate_suite(
 ) -> Evaluation:
     """Run a suite.
 
-    quick : thinned, about ten seconds
-    parameters : of the pipeline that is evaluated, None = the defaults
-    workers : processes on this machine, None = one a core, 0 = this process alone; with `cluster` (address of a Dask
-        scheduler) its workers do it
-    cache : folder of recordings and results, None = the user's own cache folder
-    Raises SpinscopeError.
+    Parameters
+    ----------
+    name : str
+        Of a registered suite.
+    quick : bool
+        Whether to thin the suite to about ten seconds.
+    parameters : Parameters or None
+        Of the pipeline under evaluation; None = the defaults.
+    workers : int or None
+        Processes on this machine; None = one a core.
+    cluster : str or None
+        Address of a Dask scheduler whose workers run the tasks instead.
+    cache : Path or None
+        Folder of recordings and results; None = the user's own cache folder.
+    on_progress : callable or None
+        Called with the share done (0..1) and what is being done.
+
+    Raises
+    ------
+    SpinscopeError
+        For an unknown suite, no cluster, a cache that cannot be written.
     """
-    if name in SUITES and SUITES[name].alone:
-        workers, cluster = 0, None
-    bench = Bench(cache or default_cache(), parameters or Parameters())
+    if SUITES[name].timed:
+        workers, cluster = 1, None
+    context = TaskContext(cache or default_cache(), parameters or Parameters())
     begin = time.perf_counter()
-    with executor(_cores() if workers is None else workers, cluster) as by:
-        report = evaluate(name, bench, quick=quick, by=by, on_progress=on_progress)
+    with executor(_cores() if workers is None else workers, cluster) as parallel:
+        report = evaluate(name, context, quick=quick, parallel=parallel, on_progress=on_progress)
     seconds = time.perf_counter() - begin
     today = datetime.datetime.now(datetime.UTC).date().isoformat()
     return Evaluation(report, today, _machine(), _version(), seconds)
 
 
 def default_cache() -> Path:
-    """Where recordings and results are kept between runs."""
+    """Folder of the recordings and results kept between runs."""
     return Path(platformdirs.user_cache_dir("spinscope")) / "evaluation"
 
 
+def suite_list() -> str:
+    """Name and description of every suite, one a line."""
+    width = max(map(len, SUITES.names))
+    return "\n".join(f"{suite.name:{width}}  {suite.help}" for suite in sorted(SUITES, key=lambda suite: suite.name))
+
+
 def print_evaluation(evaluation: Evaluation, console: Console | None = None) -> None:
-    """The tables for people."""
+    """Show the tables on a terminal."""
     console = console or Console()
     for table in evaluation.report.tables:
         screen = ScreenTable(title=escape(table.title), header_style="bold", title_justify="left")
@@ -105,13 +136,13 @@ def print_evaluation(evaluation: Evaluation, console: Console | None = None) -> 
 
 
 def write_json(evaluations: Sequence[Evaluation], path: Path) -> None:
-    """One object a suite and line; raises RecordingError."""
+    """Write one JSON object a suite and line; raises RecordingError."""
     text = "".join(json.dumps(one.as_dict(), allow_nan=False) + "\n" for one in evaluations)
     write_whole(path, text)
 
 
 def write_csv(evaluation: Evaluation, path: Path) -> None:
-    """The rows as measured, a column a quantity; raises RecordingError."""
+    """Write the rows as measured, a column a quantity; raises RecordingError."""
     rows: list[Row] = evaluation.report.rows
     names = [name for name in dict.fromkeys(name for row in rows for name in row) if name not in WIDE]
     text = io.StringIO(newline="")
@@ -122,7 +153,7 @@ def write_csv(evaluation: Evaluation, path: Path) -> None:
 
 
 def write_figures(evaluation: Evaluation, folder: Path) -> list[Path]:
-    """The suite's figures and its rows as CSV in a folder; returns their paths; raises RecordingError."""
+    """Write the suite's figures and its rows as CSV into a folder; returns their paths; raises RecordingError."""
     if (folder.exists() and not folder.is_dir()) or not os.access(_existing(folder), os.W_OK):
         raise RecordingError(f"figures cannot be written, this is no folder that may be written to: {folder}")
     paths = draw(evaluation.report, folder)
@@ -136,7 +167,8 @@ ABOUT = """\
 
 Made by `spinscope evaluate`: the paper's experiments on recordings of Spinscope's simulator, beside the paper's own
 numbers on its real ones. The simulator stands in for the lab; its numbers are no measurement of a real camera. The
-seeds of these recordings were used for nothing else: nothing was tuned on them.
+seeds of these recordings are used for nothing else; `contrast.rival_sigmas` and its treatment of the rim were changed
+after earlier results on them, all other parameters were chosen on other recordings.
 
 Errors: mean ± standard deviation (median). A refusal, or no ball, counts as failed in the success rate and not in the
 errors. `triplet` is the paper's method, `best` the answer that the program itself trusts.
@@ -144,13 +176,19 @@ errors. `triplet` is the paper's method, `best` the answer that the program itse
 
 
 def write_page(evaluations: Sequence[Evaluation], path: Path, pictures: Sequence[Path] = ()) -> None:
-    """The tables of all these suites as one page of Markdown; raises RecordingError.
+    """Write the tables of these suites as one page of Markdown; raises RecordingError.
 
-    pictures : the suites' figures, as `write_figures` names them; shown under their suite
+    Parameters
+    ----------
+    evaluations : sequence of Evaluation
+    path : Path
+        The page.
+    pictures : sequence of Path
+        The suites' figures as `write_figures` names them, shown under their suite.
     """
     lines = [ABOUT]
     for one in evaluations:
-        lines += [f"## {one.report.suite.title} (`{one.report.suite.name}`)", "", _how_made(one), ""]
+        lines += [f"## {one.report.suite.label} (`{one.report.suite.name}`)", "", _how_made(one), ""]
         for picture in pictures:
             if picture.suffix == ".png" and picture.name.startswith(f"{one.report.suite.name}_"):
                 place = Path(os.path.relpath(picture, path.parent)).as_posix()

@@ -1,7 +1,20 @@
 """The paper's experiments on simulated recordings, as suites; `spinscope evaluate` runs them."""
 
-from .suites import SUITES, Report, Suite, evaluate
-from .tables import Row, Summary, Table
-from .work import Bench, executor
+from . import suites  # registers them
+from .suite import SUITES, Report, Suite, evaluate
+from .tables import ResultTable, Row, Summary
+from .tasks import Task, TaskContext, executor
 
-__all__ = ["SUITES", "Bench", "Report", "Row", "Suite", "Summary", "Table", "evaluate", "executor"]
+__all__ = [
+    "SUITES",
+    "Report",
+    "ResultTable",
+    "Row",
+    "Suite",
+    "Summary",
+    "Task",
+    "TaskContext",
+    "evaluate",
+    "executor",
+    "suites",
+]

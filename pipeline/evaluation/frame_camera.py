@@ -1,4 +1,4 @@
-"""A frame camera beside the event camera: what it sees of the ball, with the blur of its exposure."""
+"""Images of the ball from a frame camera beside the event camera, with the blur of the exposure."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from scipy.special import erfc
 
 from ..camera import Camera
 from ..simulator import Lens, Light, Scene, default_camera
-from ..simulator.backdrop import intensity_map
+from ..simulator.background import intensity_map
 from ..simulator.logos import RADIUS_MM, Texture, texture
-from ..simulator.motion import Path, path
+from ..simulator.motion import Trajectory, trajectory
 
 Floats = NDArray[np.float64]
 
@@ -24,10 +24,18 @@ Floats = NDArray[np.float64]
 class FrameCamera:
     """The paper's frame camera (sections 4.1 and 4.3): the event camera's view at 1.5 times its resolution.
 
-    rate_hz : 380, that of the state of the art's setup (Tebbe 2020)
-    exposure_us : not published; ours lets a ball of 50 rps turn by 9 degrees
-    white_snr : signal over noise at white; 100 (40 dB) is usual for a full well of 10,000 electrons and more
-    levels : of the quantisation
+    Attributes
+    ----------
+    rate_hz : float
+        That of the state of the art's setup (Tebbe 2020).
+    resolution : float
+        Over the event camera's.
+    exposure_us : float
+        Not published; ours lets a ball of 50 rps turn by 9 degrees.
+    white_snr : float
+        Signal over noise at white; 100 (40 dB) is usual for a full well of 10,000 electrons and more.
+    levels : int
+        Of the quantisation.
     """
 
     rate_hz: float = 380.0
@@ -49,8 +57,14 @@ class FrameCamera:
 class Frame:
     """The part of a frame around the ball.
 
-    t_s : middle of the exposure
-    image, background : (side, side) float64, white = 1; x0_px, y0_px : the first pixel's place in the frame
+    Attributes
+    ----------
+    t_s : float
+        Middle of the exposure.
+    image, background : (side, side) float64
+        White = 1.
+    x0_px, y0_px : int
+        Position of the first pixel in the frame.
     """
 
     t_s: float
@@ -65,7 +79,7 @@ def frames(scene: Scene, of: FrameCamera, seed: int) -> Iterator[Frame]:
     random = np.random.default_rng([seed, 8])
     camera = of.camera
     ball = scene.balls[0]
-    flown = path(ball.motions[0], ball, scene)
+    flown = trajectory(ball.motions[0], ball, scene)
     backdrop = intensity_map(scene, camera).reshape(camera.height_px, camera.width_px)
     exposure_s = of.exposure_us * 1e-6
     for number in range(int(scene.duration_s * of.rate_hz)):
@@ -84,7 +98,7 @@ def frames(scene: Scene, of: FrameCamera, seed: int) -> Iterator[Frame]:
 
 
 def _exposed(
-    scene: Scene, flown: Path, camera: Camera, t_s: float, exposure_s: float, background: Floats, x0: int, y0: int
+    scene: Scene, flown: Trajectory, camera: Camera, t_s: float, exposure_s: float, background: Floats, x0: int, y0: int
 ) -> Floats:
     """The mean over the exposure, in steps in which nothing moves by more than half a pixel."""
     ball = scene.balls[0]
@@ -104,8 +118,8 @@ def _exposed(
     total = np.zeros(side * side)
     for centre, turn in zip(poses.position_m, poses.rotation, strict=True):
         cover, normals = _seen(rays, centre, ball.radius_m, sigma_px / camera.focal_px)
-        ink = 0.0 if printed is None else _ink(printed, normals @ turn)
-        albedo = ball.albedo + ink * (ball.ink_albedo - ball.albedo)
+        printing = 0.0 if printed is None else _print_at(printed, normals @ turn)
+        albedo = ball.albedo + printing * (ball.ink_albedo - ball.albedo)
         total += background.ravel() * (1 - cover) + cover * albedo * _shade(scene.light, normals @ np.array(scene.up))
     return (total / steps).reshape(side, side)
 
@@ -129,12 +143,12 @@ def _shade(light: Light, lift: Floats) -> Floats:
     return shade
 
 
-def _ink(printed: Texture, there: Floats) -> Floats:
-    """(n,) ink at directions (n, 3) in the ball's own frame, the nearest texel's (each is 0.06 mm)."""
+def _print_at(printed: Texture, there: Floats) -> Floats:
+    """(n,) texture values at directions (n, 3) in the ball's own frame, the nearest texel's (each is 0.06 mm)."""
     z = np.maximum(there[:, 2], -0.999)
-    last = printed.ink.shape[0] - 1
+    last = printed.values.shape[0] - 1
     place = (there[:, :2] * (np.sqrt(2 / (1 + z)) / printed.half_extent)[:, None] + 1) * 0.5 * last
     texel = np.clip(np.rint(place), 0, last).astype(np.intp)
-    ink: Floats = printed.ink[texel[:, 1], texel[:, 0]].astype(np.float64)
-    ink[(z < math.cos(printed.cap_rad)) | np.any((place < 0) | (place > last), axis=1)] = 0.0
-    return ink
+    printing: Floats = printed.values[texel[:, 1], texel[:, 0]].astype(np.float64)
+    printing[(z < math.cos(printed.cap_rad)) | np.any((place < 0) | (place > last), axis=1)] = 0.0
+    return printing

@@ -1,8 +1,7 @@
 """Spin from frames, after Tebbe 2020 in outline: take the logo off the ball, match its orientation, regress the spin.
 
-Every frame gives the ink on the visible side of the ball, and so, with the known logo, the ball's orientation. Two
-frames that follow each other suggest a spin; the one that explains the ink of all frames best, those without ink
-included, is the answer.
+Every frame gives the albedo of the ball's visible side, and so, with the known logo, the ball's orientation. Two frames
+that follow each other suggest a spin; the one that explains the albedo in all frames best is the answer.
 """
 
 from __future__ import annotations
@@ -18,12 +17,12 @@ from scipy.optimize import minimize
 from ..camera import Camera
 from ..kernels.rotation import rotations
 from ..simulator.logos import Logo, Texture, texture
+from .frame_albedo import SurfaceAlbedo, surface_albedos
 from .frame_camera import Frame
-from .frame_ink import Ink, inks
 
 Floats = NDArray[np.float64]
 
-LEAST_INK = 0.01  # share of the disc that must be dark for a frame to give an orientation
+LEAST_DARK = 0.01  # share of the disc that must be dark for a frame to give an orientation
 POINTS = 300  # of a frame that are matched
 BLUR_MM = 1.2  # of the logo: that of a sharp lens and pixels of 1 mm, and of some motion
 GRID_DEG = 7.0  # of orientations; a letter's stroke is 4 degrees wide, the blur bridges the rest
@@ -31,18 +30,18 @@ ORIENTATIONS, APART_DEG = 3, 30.0  # kept of a frame, so far from each other at 
 MAX_RPS = 160.0  # beyond 190 rps neighbours are more than half a turn apart
 STARTS = 6  # spins that are followed up
 WINDOWS = (2, 4, 8, 16, 32, 10_000)  # frames to both sides that a spin must explain, step by step
-LEAST_MATCH = 0.4  # correlation of ink seen and ink expected, or there is no answer
+LEAST_MATCH = 0.4  # correlation of darkening seen and darkening expected, or there is no answer
 
 
 def spin_from_frames(
     seen: Sequence[Frame], camera: Camera, radius_m: float, rate_hz: float, logo: Logo
 ) -> tuple[Floats | None, str]:
     """(3,) spin in rps, camera frame, or None, and what happened in words."""
-    inked = inks(seen, camera, radius_m)
-    dark = [k for k, one in enumerate(inked) if one.ink.mean() >= LEAST_INK]
+    surfaces = surface_albedos(seen, camera, radius_m)
+    dark = [k for k, one in enumerate(surfaces) if one.darkening.mean() >= LEAST_DARK]
     if len(dark) < 2:
         return None, f"the logo is seen in {len(dark)} frames"
-    flight = _Flight(inked, texture(logo, BLUR_MM))
+    flight = _Flight(surfaces, texture(logo, BLUR_MM))
     starts = _starts(flight, dark, rate_hz)
     if not starts:
         return None, "the logo is not seen in two frames that follow each other"
@@ -80,21 +79,21 @@ def _starts(flight: _Flight, dark: Sequence[int], rate_hz: float) -> list[tuple[
 
 
 class _Flight:
-    """The ink of all frames, and how well a spin explains it."""
+    """The darkening of all frames, and how well a spin explains it."""
 
-    def __init__(self, inked: Sequence[Ink], printed: Texture) -> None:
-        self.time_s = np.array([one.t_s for one in inked])
-        self.normals, self.ink = np.empty((len(inked), POINTS, 3)), np.empty((len(inked), POINTS))
-        for k, one in enumerate(inked):
-            rows = np.linspace(0, len(one.ink) - 1, POINTS).round().astype(np.intp)
-            self.normals[k], self.ink[k] = one.normals[rows], one.ink[rows]
-        self.logo = (printed.ink, printed.half_extent, math.cos(printed.cap_rad))
+    def __init__(self, surfaces: Sequence[SurfaceAlbedo], printed: Texture) -> None:
+        self.time_s = np.array([one.t_s for one in surfaces])
+        self.normals, self.darkening = np.empty((len(surfaces), POINTS, 3)), np.empty((len(surfaces), POINTS))
+        for k, one in enumerate(surfaces):
+            rows = np.linspace(0, len(one.darkening) - 1, POINTS).round().astype(np.intp)
+            self.normals[k], self.darkening[k] = one.normals[rows], one.darkening[rows]
+        self.logo = (printed.values, printed.half_extent, math.cos(printed.cap_rad))
 
     def orientations(self, frame: int, grid: Floats) -> list[Floats]:
-        """The (3, 3) rotations camera -> ball that explain one frame's ink best."""
+        """The (3, 3) rotations camera -> ball that explain one frame's darkening best."""
         values = np.empty(len(grid))
         some = slice(None, None, 3)  # enough to choose from a grid
-        _match_orientations(values, grid, self.normals[frame, some], self.ink[frame, some], *self.logo)
+        _match_orientations(values, grid, self.normals[frame, some], self.darkening[frame, some], *self.logo)
         chosen: list[Floats] = []
         for turn in grid[np.argsort(-values)[:500]]:
             near = math.cos(math.radians(APART_DEG)) * 2 + 1  # trace of the rotation between two
@@ -105,7 +104,7 @@ class _Flight:
         return chosen
 
     def match(self, frame: int, turn: Floats, spin_rps: Floats, window: int) -> float:
-        """Correlation of the ink seen and expected in the frames around one, where the ball stands at `turn`."""
+        """Correlation of the darkening seen and expected in the frames around one, where the ball stands at `turn`."""
         low, high = max(frame - window, 0), frame + window + 1
         return float(
             _match_spin(
@@ -113,7 +112,7 @@ class _Flight:
                 spin_rps,
                 self.time_s[low:high] - self.time_s[frame],
                 self.normals[low:high],
-                self.ink[low:high],
+                self.darkening[low:high],
                 *self.logo,
             )
         )
@@ -170,7 +169,7 @@ def _rotation_vector(turn: Floats) -> Floats:
 def _expected(
     turn: Floats, x: float, y: float, z: float, logo: NDArray[np.float32], half_extent: float, cap_cosine: float
 ) -> float:
-    """The logo's ink where the surface has this normal in the camera frame."""
+    """The logo's darkening where the surface has this normal in the camera frame."""
     bz = turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * z
     if bz <= cap_cosine:
         return 0.0
@@ -196,14 +195,14 @@ def _add(
     sums: Floats,
     turn: Floats,
     normals: Floats,
-    ink: Floats,
+    darkening: Floats,
     logo: NDArray[np.float32],
     half_extent: float,
     cap_cosine: float,
 ) -> None:
     """Add one frame's points to `sums`, the ball standing at `turn`."""
-    for p in range(ink.size):
-        a = ink[p]
+    for p in range(darkening.size):
+        a = darkening[p]
         b = _expected(turn, normals[p, 0], normals[p, 1], normals[p, 2], logo, half_extent, cap_cosine)
         sums[0] += 1.0
         sums[1] += a
@@ -218,15 +217,15 @@ def _match_orientations(
     values: Floats,
     turns: Floats,
     normals: Floats,
-    ink: Floats,
+    darkening: Floats,
     logo: NDArray[np.float32],
     half_extent: float,
     cap_cosine: float,
 ) -> None:
-    """Write into values the correlation of one frame's ink with the logo at each of the turns."""
+    """Write into values the correlation of one frame's darkening with the logo at each of the turns."""
     for k in range(turns.shape[0]):
         sums = np.zeros(6)
-        _add(sums, turns[k], normals, ink, logo, half_extent, cap_cosine)
+        _add(sums, turns[k], normals, darkening, logo, half_extent, cap_cosine)
         values[k] = _correlation(sums)
 
 
@@ -236,7 +235,7 @@ def _match_spin(
     spin_rps: Floats,
     since_s: Floats,
     normals: Floats,
-    ink: Floats,
+    darkening: Floats,
     logo: NDArray[np.float32],
     half_extent: float,
     cap_cosine: float,
@@ -255,5 +254,5 @@ def _match_spin(
         back[0, 0], back[0, 1], back[0, 2] = c + x * x * v, x * y * v - z * s, x * z * v + y * s
         back[1, 0], back[1, 1], back[1, 2] = y * x * v + z * s, c + y * y * v, y * z * v - x * s
         back[2, 0], back[2, 1], back[2, 2] = z * x * v - y * s, z * y * v + x * s, c + z * z * v
-        _add(sums, turn @ back, normals[k], ink[k], logo, half_extent, cap_cosine)
+        _add(sums, turn @ back, normals[k], darkening[k], logo, half_extent, cap_cosine)
     return _correlation(sums)

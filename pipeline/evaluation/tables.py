@@ -14,10 +14,14 @@ Row = dict[str, Value]  # one measurement; names carry their units
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """Errors as the paper gives them, with what it leaves out.
+    """Statistics of errors.
 
-    count : number of values; of : number of attempts, so that count / of is the success rate
-    mean, sd (of the sample), median : None without values; sd needs two
+    Attributes
+    ----------
+    count, of : int
+        Number of values and of attempts; count / of is the success rate.
+    mean, sd, median : float or None
+        None without values; the standard deviation of the sample needs two.
     """
 
     count: int
@@ -53,10 +57,16 @@ Cell = Value | Summary
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class ResultTable:
     """A table for people; a Summary reads "mean ± sd (median)".
 
-    note : what the numbers mean, one or two sentences
+    Attributes
+    ----------
+    title : str
+    columns : tuple of str
+    rows : list of tuple
+    note : str
+        Explanation of the numbers in one or two sentences.
     """
 
     title: str

@@ -5,8 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
@@ -21,28 +22,34 @@ from spinscope.app.evaluate import (
     write_page,
 )
 from spinscope.pipeline.errors import ParameterError, RecordingError
-from spinscope.pipeline.evaluation import SUITES, Bench, Row, Suite, Summary, Table
-from spinscope.pipeline.evaluation import figures as figures_of_suites
-from spinscope.pipeline.evaluation.work import Task
+from spinscope.pipeline.evaluation import SUITES, ResultTable, Row, Suite, Summary, Task, TaskContext
+from spinscope.pipeline.evaluation.plots import curve, panels
 
 
-def measure(bench: Bench, number: int) -> list[Row]:
+def measure(context: TaskContext, number: int) -> list[Row]:
     return [{"number": number, "error_px": number / 2, "picture": "QUJD"}]
 
 
-def tables(rows: Sequence[Row]) -> list[Table]:
-    return [
-        Table("Errors [px]", ("what", "error [px]"), [("all", Summary.over(row["error_px"] for row in rows))], "Note.")
-    ]
+def tasks(quick: bool) -> list[Task]:
+    return [Task(measure, {"number": number}) for number in range(2 if quick else 4)]
+
+
+def tables(rows: Sequence[Row]) -> list[ResultTable]:
+    errors = Summary.over(row["error_px"] for row in rows)
+    return [ResultTable("Errors [px]", ("what", "error [px]"), [("all", errors)], "Note.")]
+
+
+def figures(rows: Sequence[Row]) -> dict[str, Any]:
+    figure, axes = panels(1, 1)
+    curve(axes[0, 0], rows, "number", "error_px", "errors")
+    return {"errors": figure}
 
 
 @pytest.fixture
-def evaluation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Evaluation:
-    tasks = [Task(measure, {"number": number}) for number in range(4)]
-    monkeypatch.setitem(
-        SUITES, "made_up", Suite("made_up", "Made up", lambda quick: tasks[: 2 if quick else 4], tables)
-    )
-    return evaluate_suite("made_up", workers=0, cache=tmp_path / "cache")
+def evaluation(tmp_path: Path) -> Iterator[Evaluation]:
+    suite = Suite(name="made_up", label="Made up", help="", tasks=tasks, tables=tables, figures=figures)
+    with SUITES.registered(suite):
+        yield evaluate_suite("made_up", workers=1, cache=tmp_path / "cache")
 
 
 def test_tables_on_screen_keep_their_units(evaluation: Evaluation) -> None:
@@ -68,18 +75,12 @@ def test_json_csv_and_page(evaluation: Evaluation, tmp_path: Path) -> None:
 
 
 def test_quick_is_said(evaluation: Evaluation, tmp_path: Path) -> None:
-    quick = evaluate_suite("made_up", quick=True, workers=0, cache=tmp_path / "cache")
+    quick = evaluate_suite("made_up", quick=True, workers=1, cache=tmp_path / "cache")
     write_page([quick], tmp_path / "page.md")
     assert len(quick.report.rows) == 2 and "thinned" in (tmp_path / "page.md").read_text()
 
 
-def test_figures_in_a_new_folder(evaluation: Evaluation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def drawn(rows: Sequence[Row]) -> dict[str, object]:
-        figure, axes = figures_of_suites._panels(1, 1)
-        figures_of_suites._curve(axes[0, 0], rows, "number", "error_px", "errors")
-        return {"errors": figure}
-
-    monkeypatch.setitem(figures_of_suites.DRAWINGS, "made_up", drawn)
+def test_figures_in_a_new_folder(evaluation: Evaluation, tmp_path: Path) -> None:
     paths = write_figures(evaluation, tmp_path / "new" / "folder")
     assert [path.name for path in paths] == ["made_up_errors.png", "made_up.csv"]
     assert sorted(path.name for path in (tmp_path / "new" / "folder").iterdir()) == [
@@ -90,7 +91,7 @@ def test_figures_in_a_new_folder(evaluation: Evaluation, tmp_path: Path, monkeyp
 
 def test_nonsense(evaluation: Evaluation, tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="there is no suite 'spiner'"):
-        evaluate_suite("spiner", workers=0, cache=tmp_path)
+        evaluate_suite("spiner", workers=1, cache=tmp_path)
     (tmp_path / "file").write_text("")
     with pytest.raises(RecordingError, match="no folder"):
         write_figures(evaluation, tmp_path / "file")

@@ -9,7 +9,7 @@ import statistics
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spinscope.pipeline.evaluation.tables import Summary, Table, text
+from spinscope.pipeline.evaluation.tables import ResultTable, Summary, text
 
 numbers = st.floats(-1e6, 1e6)
 
@@ -42,6 +42,6 @@ def test_cells_read_well() -> None:
 
 
 def test_tables_go_through_json() -> None:
-    table = Table("t", ("a", "b"), [("x", Summary.over([1.0, 3.0]))], "note")
+    table = ResultTable("t", ("a", "b"), [("x", Summary.over([1.0, 3.0]))], "note")
     back = json.loads(json.dumps(table.as_dict(), allow_nan=False))
     assert back["rows"][0][1] == {"count": 2, "of": 2, "mean": 2.0, "sd": math.sqrt(2), "median": 2.0}

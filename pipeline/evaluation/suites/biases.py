@@ -5,16 +5,22 @@ from __future__ import annotations
 import base64
 import dataclasses
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..biases import PAPER, BiasParameters
-from ..results import Truth
-from ..simulator import Background, Scene, flight, simulate
-from .estimating import LOGO
-from .tables import Cell, Row, Table, distinct, summary, where
-from .work import Bench, Task
+from ...biases import PAPER, BiasParameters
+from ...results import Truth
+from ...simulator import Background, Scene, flight, simulate_scene
+from ...simulator.sensor import LOGO
+from ..plots import curve, label_axes, panels
+from ..suite import SUITES, Suite
+from ..tables import Cell, ResultTable, Row, distinct, summary, where
+from ..tasks import Task, TaskContext
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SEED = 74_000
 FLIGHTS = 5  # the paper averages over 5 samples
@@ -34,7 +40,7 @@ PICTURES = {
     "refr": ((120, 80, -20), 2000),
     "fo": ((-35, 55), 1000),
 }
-NEEDS = ("simulator", "biases.py", "evaluation/biases.py")  # the estimators have no part in it
+NEEDS = ("simulator", "biases.py", "evaluation/suites/biases.py")  # the estimators have no part in it
 PICTURE_PX = 64  # side of a picture; the ball has a radius of about 17 px
 
 
@@ -66,10 +72,10 @@ def _row(what: str, sweep: str, value: int, seed: int) -> Row:
     return {"what": what, "sweep": sweep, "value": value, "paper": paper, "seed": seed}
 
 
-def measure_noise(bench: Bench, sweep: str, value: int, seed: int) -> list[Row]:
+def measure_noise(context: TaskContext, sweep: str, value: int, seed: int) -> list[Row]:
     """Events a second of a scene in which nothing moves."""
     scene = Scene(STATIC_S, (), background=Background())
-    on = simulate(scene, sensor=_set(sweep, value), seed=seed).events.on
+    on = simulate_scene(scene, sensor=_set(sweep, value), seed=seed).events.on
     row = _row("noise", sweep, value, seed)
     row |= {"on_hz": float(on.sum()) / STATIC_S, "off_hz": float((~on).sum()) / STATIC_S, "logo_hz": None}
     return [row]
@@ -82,10 +88,10 @@ def _flying(seed: int, duration_ms: int | None) -> Scene:
     return dataclasses.replace(scene, duration_s=min(scene.duration_s, duration_ms / 1000))
 
 
-def measure_ball(bench: Bench, sweep: str, value: int, seed: int, duration_ms: int | None) -> list[Row]:
+def measure_ball(context: TaskContext, sweep: str, value: int, seed: int, duration_ms: int | None) -> list[Row]:
     """Events a second of everything while a ball flies through, as the supplement counts them, and of its logo."""
     scene = _flying(seed, duration_ms)
-    made = simulate(scene, sensor=_set(sweep, value), seed=seed)
+    made = simulate_scene(scene, sensor=_set(sweep, value), seed=seed)
     on, seconds = made.events.on, scene.duration_s
     row = _row("ball", sweep, value, seed)
     row |= {"on_hz": float(on.sum()) / seconds, "off_hz": float((~on).sum()) / seconds}
@@ -93,12 +99,12 @@ def measure_ball(bench: Bench, sweep: str, value: int, seed: int, duration_ms: i
     return [row]
 
 
-def take_picture(bench: Bench, sweep: str, value: int, duration_ms: int | None) -> list[Row]:
+def take_picture(context: TaskContext, sweep: str, value: int, duration_ms: int | None) -> list[Row]:
     """The ball at the moment when its logo makes most events (at the paper's biases)."""
     scene = _flying(SEED, duration_ms)
     span_us = PICTURES[sweep][1]
     at_us = _busiest(scene, span_us)
-    made = simulate(scene, sensor=_set(sweep, value), seed=SEED)
+    made = simulate_scene(scene, sensor=_set(sweep, value), seed=SEED)
     shown = made.events.between(at_us - span_us, at_us)
     corner = [round(float(np.interp(at_us, made.truth.t_us, c)) - PICTURE_PX / 2) for c in _centre(made.truth)]
     x, y = shown.x_px.astype(np.int64) - corner[0], shown.y_px.astype(np.int64) - corner[1]
@@ -122,7 +128,7 @@ def picture_of(row: Row) -> NDArray[np.float64]:
 
 def _busiest(scene: Scene, span_us: int) -> int:
     """End of the span with most logo events, the whole ball being in view."""
-    made = simulate(scene, sensor=PAPER, seed=SEED)
+    made = simulate_scene(scene, sensor=PAPER, seed=SEED)
     x, y = _centre(made.truth)
     half = PICTURE_PX / 2
     seen = (x > half) & (x < made.width_px - half) & (y > half) & (y < made.height_px - half)
@@ -136,7 +142,7 @@ def _centre(truth: Truth) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return truth.x_px, truth.y_px
 
 
-def tables(rows: Sequence[Row]) -> list[Table]:
+def tables(rows: Sequence[Row]) -> list[ResultTable]:
     """Rates against each bias."""
     result = []
     for sweep in distinct(rows, "sweep"):
@@ -148,7 +154,7 @@ def tables(rows: Sequence[Row]) -> list[Table]:
             rates = [summary(noise, name).mean for name in ("on_hz", "off_hz")]
             lines.append((mark, *rates, *(summary(ball, name) for name in ("on_hz", "off_hz", "logo_hz"))))
         columns = ("bias", "noise ON [1/s]", "noise OFF [1/s]", "ball ON [1/s]", "ball OFF [1/s]", "logo [1/s]")
-        result.append(Table(f"Event rate against bias_{sweep}", columns, lines, EXPECTED[sweep]))
+        result.append(ResultTable(f"Event rate against bias_{sweep}", columns, lines, EXPECTED[sweep]))
     return result
 
 
@@ -158,3 +164,42 @@ EXPECTED = {
     "hpf": "The supplement: above 0 slow motion is lost; 0 keeps most events.",
     "refr": "The supplement: the rate rises with the bias; above 80 mostly noise, ON more than OFF.",
 }
+
+
+def figures(rows: Sequence[Row]) -> dict[str, Figure]:
+    """Event rates against each bias, and the logo's pictures (the supplement's figures)."""
+    sweeps = distinct(rows, "sweep")
+    figure, axes = panels(2, len(sweeps))
+    for column, sweep in enumerate(sweeps):
+        for line, what in enumerate(("noise", "ball")):
+            part = where(rows, sweep=sweep, what=what)
+            for color, (name, label) in enumerate((("on_hz", "ON"), ("off_hz", "OFF"))):
+                curve(axes[line, column], part, "value", name, label, color=color)
+            for paper in sorted(distinct(where(part, paper=True), "value")):
+                axes[line, column].axvline(paper, color="green", linewidth=1)
+            label_axes(axes[line, column], f"{what}, bias_{sweep}", "bias (green: the paper's)", "events [1/s]")
+        axes[0, column].set_yscale("log")
+    result = {"rates": figure}
+    pictures = where(rows, what="picture")
+    if pictures:
+        columns = min(len(pictures), 4)
+        figure, axes = panels(-(-len(pictures) // columns), columns)
+        for panel in axes.flat:
+            panel.set_axis_off()
+        for panel, row in zip(axes.flat, pictures, strict=False):
+            panel.imshow(picture_of(row), cmap="coolwarm", vmin=-1, vmax=1)
+            panel.set_title(f"bias_{row['sweep']}: {row['value']} ({row['span_us']} us)", fontsize=10)
+        result["pictures"] = figure
+    return result
+
+
+SUITES.register(
+    Suite(
+        name="biases",
+        label="Biases: event rates and pictures of the logo",
+        help="Event rates of noise and ball against each bias, and pictures of the logo (supplement).",
+        tasks=tasks,
+        tables=tables,
+        figures=figures,
+    )
+)

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..chain import Chain
-from ..events import EventBatch
-from ..registry import STAGES
-from ..results import Packet
-from .estimating import COLUMNS, estimate_rows, method_line, shots_of, source_of
-from .tables import Cell, Row, Table, distinct, summary, where
-from .thrower import about_flight, flight_of, settings
-from .work import Bench, Task
+from ...chain import Chain
+from ...events import EventBatch
+from ...registry import STAGES
+from ...results import Packet
+from ..estimation import COLUMNS, estimate_rows, estimated, method_line
+from ..plots import ERRORS, curve, label_axes, panels
+from ..suite import SUITES, Suite
+from ..tables import Cell, ResultTable, Row, distinct, summary, where
+from ..tasks import Task, TaskContext
+from .thrower import flight_of, flights
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FILTERS = ("stc", "trail", "stc_cut_trail")
 THRESHOLDS_US = (100, 200, 500, 1000, 2000, 5000, 10_000, 20_000)
@@ -25,34 +31,33 @@ NOISE, BALL, LOGO = (0, 4), (1, 2), (2,)  # labels of the truth
 
 def tasks(quick: bool) -> list[Task]:
     """One flight and one question a task."""
-    flights = settings(quick)[:1] if quick else settings(quick)[::EVERY]
+    chosen = flights(quick)[:1] if quick else flights(quick)[::EVERY]
     thresholds = SPIN_THRESHOLDS_US[1:2] if quick else SPIN_THRESHOLDS_US
-    kept = [Task(measure_kept, {"setting": list(setting)}) for setting in flights]
+    kept = [Task(measure_kept, flight) for flight in chosen]
     spin = [
-        Task(measure_spin, {"setting": list(setting), "mode": mode, "threshold_us": threshold_us})
-        for setting in flights
+        Task(measure_spin, {**flight, "mode": mode, "threshold_us": threshold_us})
+        for flight in chosen
         for mode, threshold_us in [("off", 1), *((m, t) for m in FILTERS for t in thresholds)]
     ]
     return kept + spin
 
 
-def measure_kept(bench: Bench, setting: list[int]) -> list[Row]:
-    """The share of events that each filter keeps at each threshold, by what made them."""
-    velocity, spin, side, seed = setting
-    recording = flight_of(bench, velocity, spin, bool(side), seed)
+def measure_kept(context: TaskContext, **flight: Any) -> list[Row]:
+    """The share of events that each filter keeps at each threshold, by cause."""
+    recording, about = flight_of(context, **flight)
     label = recording.truth.label
     packet = Packet(0, 0, recording.duration_us, recording.events)
     rows: list[Row] = []
     for mode in FILTERS:
         for threshold_us in THRESHOLDS_US:
-            parameters = bench.parameters.filter.with_values(
+            parameters = context.parameters.filter.with_values(
                 {"mode": mode, "threshold_us": threshold_us, "logo_mode": mode, "logo_threshold_us": threshold_us}
             )
             stage = STAGES["filter"]
-            state = Chain(source_of(recording)).start(bench.parameters.with_groups(filter=parameters), stage)
+            state = Chain(recording.source).start(context.parameters.with_groups(filter=parameters), stage)
             passed = stage.step(parameters, state, packet).surface_events
             kept = np.isin(_keys(recording.events), _keys(passed))
-            row: Row = {"question": "kept", "seed": seed, "mode": mode, "threshold_us": threshold_us}
+            row: Row = {"question": "kept", "seed": about["seed"], "mode": mode, "threshold_us": threshold_us}
             row["kept_all"] = float(kept.mean())
             for name, labels in (("noise", NOISE), ("ball", BALL), ("logo", LOGO)):
                 of_these = np.isin(label, labels)
@@ -61,14 +66,12 @@ def measure_kept(bench: Bench, setting: list[int]) -> list[Row]:
     return rows
 
 
-def measure_spin(bench: Bench, setting: list[int], mode: str, threshold_us: int) -> list[Row]:
+def measure_spin(context: TaskContext, mode: str, threshold_us: int, **flight: Any) -> list[Row]:
     """The errors of the spin with this filter before the logo and the outline."""
-    velocity, spin, side, seed = setting
-    recording = flight_of(bench, velocity, spin, bool(side), seed)
-    parameters = bench.parameters.with_values({"filter": {"logo_mode": mode, "logo_threshold_us": threshold_us}})
-    about = about_flight(recording, velocity, spin, bool(side), seed)
+    recording, about = flight_of(context, **flight)
+    parameters = context.parameters.with_values({"filter": {"logo_mode": mode, "logo_threshold_us": threshold_us}})
     about |= {"question": "spin", "mode": mode, "threshold_us": threshold_us}
-    return estimate_rows(shots_of(recording, parameters), recording.truth, about)
+    return estimate_rows(estimated(recording, parameters), recording.truth, about)
 
 
 def _keys(events: EventBatch) -> NDArray[np.int64]:
@@ -79,7 +82,7 @@ def _keys(events: EventBatch) -> NDArray[np.int64]:
     return key
 
 
-def tables(rows: Sequence[Row]) -> list[Table]:
+def tables(rows: Sequence[Row]) -> list[ResultTable]:
     """Events kept against the threshold; spin errors against filter and threshold."""
     kept = where(rows, question="kept")
     shares = ("kept_all", "kept_ball", "kept_logo", "kept_noise")
@@ -98,12 +101,43 @@ def tables(rows: Sequence[Row]) -> list[Table]:
         for method in distinct(part, "method")
     ]
     return [
-        Table(
+        ResultTable(
             "Events kept by the filters, flying ball",
             ("filter", "threshold [us]", "all", "ball", "logo", "noise"),
             of_kept,
             "Shares of the events that come in. The paper: STC keeps more with a longer threshold, TRAIL fewer, and "
             "beyond 5,000 us little changes for both together.",
         ),
-        Table("Spin with each filter before the logo", ("filter", "threshold [us]", *COLUMNS), of_spin),
+        ResultTable("Spin with each filter before the logo", ("filter", "threshold [us]", *COLUMNS), of_spin),
     ]
+
+
+def figures(rows: Sequence[Row]) -> dict[str, Figure]:
+    """Events kept against the threshold (the supplement's figure), and the spin's errors."""
+    figure, axes = panels(1, 3)
+    kept, spin = where(rows, question="kept"), where(rows, question="spin")
+    for color, mode in enumerate(FILTERS):
+        for name, style in (("kept_ball", "-"), ("kept_noise", ":")):
+            label = f"{mode}, {name.removeprefix('kept_')}"
+            curve(axes[0, 0], where(kept, mode=mode), "threshold_us", name, label, style, color)
+        for column, (name, _) in enumerate(ERRORS, start=1):
+            for method, style in (("contrast", "-"), ("triplet", "--")):
+                part = where(spin, mode=mode, method=method)
+                curve(axes[0, column], part, "threshold_us", name, f"{mode}, {method}", style, color, band=False)
+            axes[0, column].set_yscale("log")
+    for column, label in enumerate(("share of events kept", *(label for _, label in ERRORS))):
+        axes[0, column].set_xscale("log")
+        label_axes(axes[0, column], "flying ball", "threshold [us]", label)
+    return {"thresholds": figure}
+
+
+SUITES.register(
+    Suite(
+        name="filters",
+        label="Filters: events kept, and the spin",
+        help="Events that each filter keeps, and what that does to the spin (supplement).",
+        tasks=tasks,
+        tables=tables,
+        figures=figures,
+    )
+)

@@ -1,4 +1,4 @@
-"""How good the answers are beside what they state of themselves, and beside what is asked of them."""
+"""Calibration of the stated uncertainties, risk-coverage curves, and required quality of the answers."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .tables import Cell, Row, Table, share, where
+from .tables import Cell, ResultTable, Row, share, where
 
-GROSS_RPS, GROSS_DEG = 10.0, 20.0  # an error beyond one of these is no estimate but a mistake
+GROSS_RPS, GROSS_DEG = 10.0, 20.0  # an error beyond one of these is gross
 PAIRS = (("magnitude_error_rps", "magnitude_std_rps"), ("axis_error_deg", "axis_std_deg"))
 
 
@@ -27,7 +27,7 @@ def is_gross(row: Row) -> bool:
     return isinstance(magnitude, float) and isinstance(axis, float) and (magnitude > GROSS_RPS or axis > GROSS_DEG)
 
 
-def honesty(groups: Sequence[tuple[str, Sequence[Row]]], methods: Sequence[str]) -> Table:
+def calibration_table(groups: Sequence[tuple[str, Sequence[Row]]], methods: Sequence[str]) -> ResultTable:
     """Errors over the stated ones, by group of recordings and method."""
     lines: list[tuple[Cell, ...]] = []
     for label, rows in groups:
@@ -44,7 +44,7 @@ def honesty(groups: Sequence[tuple[str, Sequence[Row]]], methods: Sequence[str])
     quantities = [
         f"{name}{what}" for name in ("magnitude", "axis") for what in (" within 1 sigma", ", 2 sigma", ", median")
     ]
-    return Table(
+    return ResultTable(
         "Errors over the stated error (1 sigma)",
         ("recordings", "method", "answers", "gross", *quantities),
         lines,
@@ -64,10 +64,21 @@ def ratios(rows: Sequence[Row], error: str, std: str) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class Goal:
-    """What is asked of the answers to these recordings; None = not asked.
+    """Required quality of the answers to some recordings; None = no requirement.
 
-    answered : least share of answers (most, where `refuse`: the logo is never seen)
-    rps, deg : largest mean absolute errors; gross : largest share of gross errors among the answers
+    Attributes
+    ----------
+    what : str
+        Name of the recordings.
+    rows : sequence of dict
+    answered : float or None
+        Smallest share of answers (largest, where `refuse`).
+    rps, deg : float or None
+        Largest mean absolute errors.
+    gross : float or None
+        Largest share of gross errors among the answers.
+    refuse : bool
+        Whether the logo is never seen, so that an answer is wrong.
     """
 
     what: str
@@ -79,7 +90,7 @@ class Goal:
     refuse: bool = False
 
 
-def goals(title: str, asked: Sequence[Goal], note: str) -> Table:
+def goals(title: str, asked: Sequence[Goal], note: str) -> ResultTable:
     """Each quantity beside its goal, and whether all of them are met."""
     lines: list[tuple[Cell, ...]] = []
     for goal in asked:
@@ -104,11 +115,11 @@ def goals(title: str, asked: Sequence[Goal], note: str) -> Table:
                 met = met and (value >= limit if at_least else value <= limit)
         lines.append((*cells, "yes" if met else "no"))
     quantities = ("answered", "magnitude error [rps]", "axis error [deg]", "gross")
-    return Table(title, ("recordings", "n", *(c for q in quantities for c in (q, "goal")), "met"), lines, note)
+    return ResultTable(title, ("recordings", "n", *(c for q in quantities for c in (q, "goal")), "met"), lines, note)
 
 
-def refusals(groups: Sequence[tuple[str, Sequence[Row]]], method: str) -> Table:
-    """How often a method gave no answer where the logo is visible, by the reason it names."""
+def refusals(groups: Sequence[tuple[str, Sequence[Row]]], method: str) -> ResultTable:
+    """Number and share of refusals where the logo is visible, by the stated reason."""
     lines: list[tuple[Cell, ...]] = []
     for label, rows in groups:
         visible = where(rows, method=method, visible=True)
@@ -118,7 +129,7 @@ def refusals(groups: Sequence[tuple[str, Sequence[Row]]], method: str) -> Table:
         if not reasons:
             lines.append((label, "it never does", 0, None))
     note = "The logo's events may all lie so near the outline that the pipeline takes them for the outline's."
-    return Table(
+    return ResultTable(
         f"Why `{method}` refuses where the logo is visible", ("recordings", "reason", "n", "share"), lines, note
     )
 
@@ -128,7 +139,7 @@ def _mean(rows: Sequence[Row], name: str) -> float | None:
     return float(np.mean(values)) if values else None
 
 
-def by_coverage(rows: Sequence[Row], error: str, std: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def risk_coverage(rows: Sequence[Row], error: str, std: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(coverage 0..1, mean error) when only the answers with the smallest stated errors are given."""
     pairs = [(row[std], row[error]) for row in rows]
     both = sorted((float(s), float(e)) for s, e in pairs if isinstance(s, float) and isinstance(e, float))

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
-from ..chain import Chain
-from ..registry import STAGES as REGISTERED
-from . import paper
-from .estimating import source_of
-from .tables import Cell, Row, Table, distinct, summary, where
-from .thrower import flight_of, settings
-from .work import Bench, Task
+import numpy as np
+
+from ...chain import Chain
+from ...registry import STAGES as REGISTERED
+from .. import paper
+from ..plots import label_axes, panels
+from ..suite import SUITES, Suite
+from ..tables import Cell, ResultTable, Row, distinct, summary, where
+from ..tasks import Task, TaskContext
+from .thrower import flight_of, flights
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # The paper's "from the moment the events are received": up to the logo's events; the rest is spin estimation.
 STAGES = REGISTERED.names
@@ -24,22 +31,17 @@ EVERY = 8  # every so many of the thrower's flights are taken
 
 def tasks(quick: bool) -> list[Task]:
     """One flight and length of tick a task."""
-    flights = settings(quick)[:1] if quick else settings(quick)[::EVERY]
-    return [
-        Task(measure, {"setting": list(setting), "tick_us": tick_us}, keep=False)
-        for tick_us in TICKS_US
-        for setting in flights
-    ]
+    chosen = flights(quick)[:1] if quick else flights(quick)[::EVERY]
+    return [Task(measure, {**flight, "tick_us": tick_us}, keep=False) for tick_us in TICKS_US for flight in chosen]
 
 
-def measure(bench: Bench, setting: list[int], tick_us: int) -> list[Row]:
+def measure(context: TaskContext, tick_us: int, **flight: Any) -> list[Row]:
     """Milliseconds of every stage in every tick, the kernels being loaded before."""
-    velocity, spin, side, seed = setting
-    recording = flight_of(bench, velocity, spin, bool(side), seed)
-    parameters = bench.parameters.with_values({"track": {"tick_us": tick_us}})
-    for _ in Chain(source_of(recording)).run(parameters, forget=STAGES):
+    recording, about = flight_of(context, **flight)
+    parameters = context.parameters.with_values({"track": {"tick_us": tick_us}})
+    for _ in Chain(recording.source).run(parameters, forget=STAGES):
         pass
-    chain = Chain(source_of(recording), clock=time.thread_time)  # other work of the machine does not count
+    chain = Chain(recording.source, clock=time.thread_time)  # other work of the machine does not count
     rows: list[Row] = []
     before = dict.fromkeys(STAGES, 0.0)
     for tick in chain.run(parameters, forget=STAGES):
@@ -48,7 +50,7 @@ def measure(bench: Bench, setting: list[int], tick_us: int) -> list[Row]:
         latency_ms = sum(taken_ms[name] for name in LATENCY_STAGES)
         row: Row = {
             "tick_us": tick_us,
-            "seed": seed,
+            "seed": about["seed"],
             "t_us": tick.packet.end_us,
             "tick_ms": (tick.packet.end_us - tick.packet.start_us) / 1e3,
             "events": len(tick.packet.events),
@@ -59,7 +61,7 @@ def measure(bench: Bench, setting: list[int], tick_us: int) -> list[Row]:
     return rows
 
 
-def tables(rows: Sequence[Row]) -> list[Table]:
+def tables(rows: Sequence[Row]) -> list[ResultTable]:
     """The paper's two numbers, and the stages one by one."""
     lengths = sorted(distinct(rows, "tick_us"), reverse=True)
     totals: list[tuple[Cell, ...]] = [
@@ -84,7 +86,7 @@ def tables(rows: Sequence[Row]) -> list[Table]:
         for name in STAGES
     ]
     return [
-        Table(
+        ResultTable(
             "Run time",
             ("tick", "ticks", "events to logo [ms]", "longest [ms]", *(f"{what} / recording" for what in SHARES)),
             totals,
@@ -93,7 +95,7 @@ def tables(rows: Sequence[Row]) -> list[Table]:
             "paper's method and normal flow; contrast on top of it. All of them give an answer at the end of every "
             "tick. Processor time of one thread.",
         ),
-        Table("Run time by stage, ticks with a ball", ("tick", "stage", "time [ms]"), stages),
+        ResultTable("Run time by stage, ticks with a ball", ("tick", "stage", "time [ms]"), stages),
     ]
 
 
@@ -109,3 +111,36 @@ def _of_recording(rows: Sequence[Row]) -> Row:
         "contrast_share": total("contrast") / length_ms,
         "all_share": total(*STAGES) / length_ms,
     }
+
+
+def figures(rows: Sequence[Row]) -> dict[str, Figure]:
+    """The latency's distribution, and its parts."""
+    lengths = sorted(distinct(rows, "tick_us"), reverse=True)
+    figure, axes = panels(1, 2)
+    for number, tick_us in enumerate(lengths):
+        flown = where(rows, tick_us=tick_us, has_ball=True)
+        latency_ms = [row["latency_ms"] for row in flown]
+        weights = np.full(len(flown), 1 / max(len(flown), 1))
+        axes[0, 0].hist(latency_ms, bins=40, weights=weights, alpha=0.6, label=f"tick of {tick_us} us")
+        bottom = 0.0
+        for color, name in enumerate(STAGES):
+            mean = summary(flown, f"{name}_ms").mean or 0.0
+            label = name if number == 0 else None
+            axes[0, 1].bar(f"{tick_us} us", mean, bottom=bottom, color=f"C{color}", label=label)
+            bottom += mean
+    label_axes(axes[0, 0], "events to logo", "latency [ms]", "share of ticks")
+    label_axes(axes[0, 1], "stages, ticks with a ball", "tick", "mean time [ms]")
+    return {"times": figure}
+
+
+SUITES.register(
+    Suite(
+        name="runtime",
+        label="Run times",
+        help="Latency up to the logo's events, and processing time over recording time (section 4.4).",
+        tasks=tasks,
+        tables=tables,
+        figures=figures,
+        timed=True,
+    )
+)

@@ -1,4 +1,4 @@
-"""What a frame shows of the ball: its circle, and the ink on its visible side."""
+"""The ball in a frame: its circle, and the relative albedo of its visible side."""
 
 from __future__ import annotations
 
@@ -15,20 +15,30 @@ from .frame_camera import Frame
 Floats = NDArray[np.float64]
 
 CONTRAST = 0.1  # between ball and table, at least; half of what the ball's rim has
-SEEN_COSINE = 0.45  # ink is read up to 63 degrees from the middle of the disc
+SEEN_COSINE = 0.45  # albedo is read up to 63 degrees from the middle of the disc
 
 
 @dataclass(frozen=True, eq=False)
-class Ink:
-    """One frame's ball: ink (n,) 0..1 where the surface has these normals (n, 3), camera frame."""
+class SurfaceAlbedo:
+    """Albedo of the visible side of the ball in one frame.
+
+    Attributes
+    ----------
+    t_s : float
+        Middle of the exposure.
+    normals : (n, 3) float64
+        Outward normals of the surface points, camera frame.
+    darkening : (n,) float64
+        1 - albedo / albedo of the unprinted ball, 0 to 1.
+    """
 
     t_s: float
     normals: Floats
-    ink: Floats
+    darkening: Floats
 
 
-def inks(seen: Sequence[Frame], camera: Camera, radius_m: float) -> list[Ink]:
-    """The ink in every frame; places and sizes of the ball are smoothed over the flight."""
+def surface_albedos(seen: Sequence[Frame], camera: Camera, radius_m: float) -> list[SurfaceAlbedo]:
+    """The albedo in every frame, the circles of the ball being smoothed over the flight; none from under 3 frames."""
     circles = [(frame, circle) for frame in seen if (circle := _circle(frame)) is not None]
     if len(circles) < 3:
         return []
@@ -37,7 +47,9 @@ def inks(seen: Sequence[Frame], camera: Camera, radius_m: float) -> list[Ink]:
     x, y = (np.polynomial.Polynomial.fit(time, place, min(3, time.size - 1))(time) for place in (x, y))
     radius = np.polynomial.Polynomial.fit(time, radius, 1)(time)
     centres = camera.ball_centre_m(x, y, radius, radius_m)
-    return [_ink_of(frame, centre, camera, radius_m) for (frame, _), centre in zip(circles, centres, strict=True)]
+    return [
+        _surface_albedo(frame, centre, camera, radius_m) for (frame, _), centre in zip(circles, centres, strict=True)
+    ]
 
 
 def _circle(frame: Frame) -> tuple[float, float, float] | None:
@@ -60,8 +72,8 @@ def _circle(frame: Frame) -> tuple[float, float, float] | None:
     return frame.x0_px + x, frame.y0_px + y, (min(sides) + 1) / 2 / finer
 
 
-def _ink_of(frame: Frame, centre_m: Floats, camera: Camera, radius_m: float) -> Ink:
-    """The ink of one frame: how much darker the ball is than its shading, which a smooth fit gives."""
+def _surface_albedo(frame: Frame, centre_m: Floats, camera: Camera, radius_m: float) -> SurfaceAlbedo:
+    """Albedo from one frame: the ball's brightness over its shading, which a smooth fit gives."""
     side = frame.image.shape[0]
     column, row = np.meshgrid(np.arange(side) + frame.x0_px, np.arange(side) + frame.y0_px)
     rays = camera.rays(column.ravel(), row.ravel())
@@ -75,12 +87,12 @@ def _ink_of(frame: Frame, centre_m: Floats, camera: Camera, radius_m: float) -> 
     shading = np.column_stack([np.ones(light.size), normals])
     bright = on_ball.copy()
     plain = light
-    for _ in range(4):  # what is darker than the shading is ink and leaves the fit
+    for _ in range(4):  # what is darker than the shading is printed and leaves the fit
         weights, *_ = np.linalg.lstsq(shading[bright], light[bright], rcond=None)
         plain = np.maximum(shading @ weights, 0.05)
         bright = on_ball & (light > 0.9 * plain)
         if bright.sum() < 10:
             bright = on_ball
-    ink = np.clip(1 - light / plain, 0.0, 1.0)
+    darkening = np.clip(1 - light / plain, 0.0, 1.0)
     rows = np.flatnonzero(on_ball)
-    return Ink(frame.t_s, normals[rows], ink[rows])
+    return SurfaceAlbedo(frame.t_s, normals[rows], darkening[rows])

@@ -2,57 +2,50 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
-import numpy as np
-
-from ..simulator import thrown
-from . import paper, thrower
-from .estimating import COLUMNS, method_line
-from .frame_camera import FrameCamera, frames
-from .frame_matching import spin_from_frames
-from .tables import Cell, Row, Table, distinct, where
-from .work import Bench, Task
+from ...simulator import thrown
+from .. import paper
+from ..estimation import COLUMNS, method_line, spin_errors
+from ..frame_camera import FrameCamera, frames
+from ..frame_matching import spin_from_frames
+from ..plots import flight_figure
+from ..suite import SUITES, Suite
+from ..tables import Cell, ResultTable, Row, distinct, where
+from ..tasks import Task, TaskContext
+from . import thrower
 
 FRAME = "frame"  # the rival among the methods
 # What the rival's results depend on: nothing of the event camera's pipeline.
-NEEDS: tuple[str, ...] = ("simulator", "biases.py", "evaluation/thrower.py", "evaluation/rendering.py")
-NEEDS += tuple(f"evaluation/{name}.py" for name in ("frames", "frame_camera", "frame_ink", "frame_matching"))
+NEEDS: tuple[str, ...] = ("simulator", "biases.py", "evaluation/rendering.py")
+NEEDS += ("evaluation/suites/thrower.py", "evaluation/suites/frames.py")
+NEEDS += tuple(f"evaluation/frame_{name}.py" for name in ("camera", "albedo", "matching"))
 EVERY = 3  # every so many of the thrower's flights are taken: the rival needs seconds for each
 BINS_RPS = ((0, 30), (30, 60), (60, 90), (90, 150))
 
 
 def tasks(quick: bool) -> list[Task]:
     """Flights of the suite `thrower`, for both cameras."""
-    flights = thrower.thrower_tasks(quick)
-    own = [
-        Task(measure, {"velocity": velocity, "spin": spin, "side": side, "seed": seed}, needs=NEEDS)
-        for velocity, spin, side, seed in thrower.settings(quick)
-    ]
-    return flights[:1] + own[:1] if quick else flights[::EVERY] + own[::EVERY]
+    chosen = thrower.flights(quick)[:1] if quick else thrower.flights(quick)[::EVERY]
+    events = [Task(thrower.measure, flight) for flight in chosen]
+    return events + [Task(measure, flight, needs=NEEDS) for flight in chosen]
 
 
-def measure(bench: Bench, velocity: int, spin: int, side: bool, seed: int) -> list[Row]:
+def measure(context: TaskContext, velocity: int, spin: int, side: bool, seed: int) -> list[Row]:
     """The frame camera's errors in one flight."""
-    recording = thrower.flight_of(bench, velocity, spin, side, seed)
+    recording, row = thrower.flight_of(context, velocity, spin, side, seed)
     scene = thrown(velocity, spin, side=side, seed=seed)
     rival = FrameCamera()
     found, reason = spin_from_frames(
         list(frames(scene, rival, seed)), rival.camera, scene.balls[0].radius_m, rival.rate_hz, scene.balls[0].logo
     )
-    row = thrower.about_flight(recording, velocity, spin, side, seed)
     row |= {"method": FRAME, "magnitude_error_rps": None, "axis_error_deg": None, "reason": reason}
     if found is not None:
-        true = recording.truth.spin_rps[0]
-        size, true_size = float(np.linalg.norm(found)), float(np.linalg.norm(true))
-        row["magnitude_error_rps"] = abs(size - true_size)
-        cosine = float(found @ true) / max(size * true_size, 1e-9)
-        row["axis_error_deg"] = math.degrees(math.acos(min(max(cosine, -1.0), 1.0)))
+        row["magnitude_error_rps"], row["axis_error_deg"] = spin_errors(found, recording.truth.spin_rps[0])
     return [row]
 
 
-def tables(rows: Sequence[Row]) -> list[Table]:
+def tables(rows: Sequence[Row]) -> list[ResultTable]:
     """Frame against event as in table 2, and by spin."""
     methods = sorted(distinct(rows, "method"), key=lambda method: method != FRAME)
     lines: list[tuple[Cell, ...]] = [
@@ -67,8 +60,8 @@ def tables(rows: Sequence[Row]) -> list[Table]:
             (f"{low} to {high}", *method_line(where(part, method=m), m)) for m in methods if where(part, method=m)
         ]
     return [
-        Table("Frame against event: flying balls", COLUMNS, lines, NOTE),
-        Table("Frame against event by spin", ("spin [rps]", *COLUMNS), by_spin),
+        ResultTable("Frame against event: flying balls", COLUMNS, lines, NOTE),
+        ResultTable("Frame against event by spin", ("spin [rps]", *COLUMNS), by_spin),
     ]
 
 
@@ -77,4 +70,16 @@ NOTE = (
     "The rival is stronger than the paper's (Tebbe 2020): it knows the logo that is printed on the ball, is told "
     "roughly where the ball is, so it never takes anything else for it, and fits all frames of the flight at once, "
     "where Tebbe's matches the logo of neighbouring frames."
+)
+
+
+SUITES.register(
+    Suite(
+        name="frames",
+        label="Frame camera against event camera: the paper's table 2",
+        help="A frame camera beside the event camera on the same flights (table 2).",
+        tasks=tasks,
+        tables=tables,
+        figures=flight_figure,
+    )
 )

@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..camera import BallParameters
-from ..chain import Chain, Tick
-from ..results import Circle, Truth
-from ..simulator import flight
-from ..stages.track_kalman import OBSERVED, BallFilter
-from . import paper
-from .estimating import source_of
-from .rendering import Rendered, rendered
-from .tables import Cell, Row, Summary, Table, distinct, share, summary, where
-from .work import Bench, Task
+from ...camera import BallParameters
+from ...chain import Chain, Tick
+from ...results import Circle, Truth
+from ...simulator import flight
+from ...stages.track_kalman import OBSERVED, BallFilter
+from .. import paper
+from ..plots import curve, label_axes, panels
+from ..rendering import RenderedRecording, render
+from ..suite import SUITES, Suite
+from ..tables import Cell, ResultTable, Row, Summary, distinct, share, summary, where
+from ..tasks import Task, TaskContext
 
-SEED = 73_000  # of this suite alone: nothing was tuned on these recordings
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SEED = 73_000  # of this suite alone
 SPEEDS_M_S = tuple(float(speed) for speed in range(4, 21, 2))
 SCENES = ("one ball", "two balls", "arm")
 FLIGHTS = 3  # of each speed and scene
@@ -29,7 +34,7 @@ HOUGH_STD_PX, FASTEST_M_S, ACCELERATION_M_S2, APPROACH_M_S, MOST_SURPRISE = 1.0,
 MOST_MISSES = 2  # circles in a row that do not fit: the filter follows something else and starts anew
 ASIDE_US = 500  # the truth's velocity is the difference of places so far before and after
 
-Ring = NDArray[np.float64]  # (5,) x, y, vx, vy, radius in px and px/s; NaN where a stage does not say
+BallState = NDArray[np.float64]  # (5,) x, y, vx, vy, radius in px and px/s; NaN where a stage gives none
 
 
 def tasks(quick: bool) -> list[Task]:
@@ -44,7 +49,7 @@ def tasks(quick: bool) -> list[Task]:
     ]
 
 
-def measure(bench: Bench, scene: str, speed_m_s: float, seed: int) -> list[Row]:
+def measure(context: TaskContext, scene: str, speed_m_s: float, seed: int) -> list[Row]:
     """Every stage's errors in every tick in which all of the ball is in view."""
     shown = flight(
         kind="top",
@@ -54,13 +59,13 @@ def measure(bench: Bench, scene: str, speed_m_s: float, seed: int) -> list[Row]:
         arm=scene == "arm",
         seed=seed,
     )
-    recording = rendered(bench, shown, seed=seed)
+    recording = render(context, shown, seed=seed)
     about: Row = {"scene": scene, "speed_m_s": speed_m_s, "seed": seed}
-    chain = Chain(source_of(recording))
-    focal_px = chain.camera(bench.parameters).focal_px
-    follower = HoughKalman(bench.parameters.ball, focal_px)
+    chain = Chain(recording.source)
+    focal_px = chain.camera(context.parameters).focal_px
+    follower = HoughKalman(context.parameters.ball, focal_px)
     rows: list[Row] = []
-    for tick in chain.run(bench.parameters, ("track",), forget=("surface",)):
+    for tick in chain.run(context.parameters, ("track",), forget=("surface",)):
         found = _found(tick, follower)
         truth = _truth_at(recording, tick.track.t_us)
         if truth is not None:
@@ -79,7 +84,7 @@ class HoughKalman:
         self.last_us = 0
         self.misses = 0
 
-    def step(self, end_us: int, tracked: bool, circle: Circle | None) -> Ring | None:
+    def step(self, end_us: int, tracked: bool, circle: Circle | None) -> BallState | None:
         """The filter's state at the end of a tick; None while there is no track."""
         if not tracked:
             self.filter = None
@@ -106,22 +111,22 @@ class HoughKalman:
         )
 
 
-def _found(tick: Tick, follower: HoughKalman) -> dict[str, Ring | None]:
-    """What every stage says at the end of a tick, None where it says nothing."""
+def _found(tick: Tick, follower: HoughKalman) -> dict[str, BallState | None]:
+    """State of the ball after every stage at the end of a tick, None where a stage has none."""
     track = tick.track
     return {
-        "hough": _ring(track.hough),
+        "hough": _ball_state(track.hough),
         "hough + kalman": follower.step(tick.packet.end_us, track.has_ball, track.hough),
-        "refined": _ring(track.measured),
+        "refined": _ball_state(track.measured),
         "refined + kalman": track.mean if track.has_ball else None,
     }
 
 
-def _ring(circle: Circle | None) -> Ring | None:
+def _ball_state(circle: Circle | None) -> BallState | None:
     return None if circle is None else np.array([circle.x_px, circle.y_px, np.nan, np.nan, circle.radius_px])
 
 
-def _truth_at(recording: Rendered, t_us: float) -> Ring | None:
+def _truth_at(recording: RenderedRecording, t_us: float) -> BallState | None:
     """The true ball at a time; None unless all of it is in the image, and for a while on both sides."""
     truth = recording.truth
     around = np.array([t_us - ASIDE_US, t_us, t_us + ASIDE_US])
@@ -136,11 +141,11 @@ def _truth_at(recording: Rendered, t_us: float) -> Ring | None:
     return np.array([x[1], y[1], (x[2] - x[0]) * slope, (y[2] - y[0]) * slope, radius[1]])
 
 
-def _silhouette(truth: Truth) -> tuple[Ring, Ring, Ring]:
+def _silhouette(truth: Truth) -> tuple[BallState, BallState, BallState]:
     return truth.x_px, truth.y_px, truth.radius_px
 
 
-def _row(about: Row, stage: str, found: Ring | None, truth: Ring) -> Row:
+def _row(about: Row, stage: str, found: BallState | None, truth: BallState) -> Row:
     """Errors of one stage in one tick; a circle whose centre lies outside the true ball is another's: not found."""
     row: Row = {**about, "stage": stage, "found": False}
     row |= dict.fromkeys(("centre_error_px", "along_px", "across_px", "radius_error_px", "velocity_error_px_s"))
@@ -157,7 +162,7 @@ def _row(about: Row, stage: str, found: Ring | None, truth: Ring) -> Row:
     return row
 
 
-def tables(rows: Sequence[Row]) -> list[Table]:
+def tables(rows: Sequence[Row]) -> list[ResultTable]:
     """The stages in each scene, and against the speed."""
     scenes, speeds = distinct(rows, "scene"), distinct(rows, "speed_m_s")
     columns = ("stage", "ticks", "found", "centre [px]", "along the motion [px]", "radius [px]", "velocity [px/s]")
@@ -173,8 +178,8 @@ def tables(rows: Sequence[Row]) -> list[Table]:
         if (part := where(rows, scene=scene, speed_m_s=speed, stage=stage))
     ]
     return [
-        Table("Ball detector by scene", ("scene", *columns), by_scene, NOTE),
-        Table("Ball detector by speed", ("scene", "speed [m/s]", *columns), by_speed, NOTE_OF_TWO),
+        ResultTable("Ball detector by scene", ("scene", *columns), by_scene, NOTE),
+        ResultTable("Ball detector by speed", ("scene", "speed [m/s]", *columns), by_speed, NOTE_OF_TWO),
     ]
 
 
@@ -198,3 +203,34 @@ def _line(part: Sequence[Row], stage: str) -> tuple[Cell, ...]:
         summary(part, "radius_error_px"),
         summary(part, "velocity_error_px_s") if "kalman" in stage else Summary.over([]),
     )
+
+
+def figures(rows: Sequence[Row]) -> dict[str, Figure]:
+    """Errors against the speed (the paper's figure of the detector)."""
+    scenes = distinct(rows, "scene")
+    names = (
+        ("centre_error_px", "centre error [px]"),
+        ("radius_error_px", "radius error [px]"),
+        ("velocity_error_px_s", "velocity error [px/s]"),
+    )
+    figure, axes = panels(len(scenes), len(names))
+    for line, scene in enumerate(scenes):
+        for column, (name, label) in enumerate(names):
+            for color, stage in enumerate(STAGES):
+                part = where(rows, scene=scene, stage=stage)
+                curve(axes[line, column], part, "speed_m_s", name, stage, color=color)
+            axes[line, column].set_yscale("log")
+            label_axes(axes[line, column], scene, "speed [m/s]", label)
+    return {"errors": figure}
+
+
+SUITES.register(
+    Suite(
+        name="detector",
+        label="Ball detector: error against speed",
+        help="Errors of the ball's place, size and velocity against its speed (section 4.2).",
+        tasks=tasks,
+        tables=tables,
+        figures=figures,
+    )
+)

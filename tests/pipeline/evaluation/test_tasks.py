@@ -9,25 +9,25 @@ import subprocess
 import sys
 import types
 from collections.abc import Iterator
-from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from joblib import Parallel
 
 from spinscope.pipeline.errors import ParameterError, RecordingError
 from spinscope.pipeline.evaluation.tables import Row
-from spinscope.pipeline.evaluation.work import Bench, Task, _make_room, executor, run, write_whole
+from spinscope.pipeline.evaluation.tasks import Task, TaskContext, _limit_cache, executor, run, write_whole
 from spinscope.pipeline.registry import Parameters
 
 CALLS: list[int] = []
 
 
-def square(bench: Bench, number: int) -> list[Row]:
+def square(context: TaskContext, number: int) -> list[Row]:
     CALLS.append(number)
     return [{"number": number, "square": number * number}]
 
 
-def failing(bench: Bench) -> list[Row]:
+def failing(context: TaskContext) -> list[Row]:
     raise ParameterError("no")
 
 
@@ -42,10 +42,13 @@ def squares(count: int, keep: bool = True) -> list[Task]:
     return [Task(square, {"number": number}, keep) for number in range(count)]
 
 
+def threads(count: int) -> Parallel:
+    return Parallel(count, backend="threading", return_as="generator_unordered")
+
+
 def test_rows_come_in_the_order_of_tasks(tmp_path: Path) -> None:
     shares: list[float] = []
-    with ThreadPoolExecutor(3) as pool:
-        rows = run(squares(20), Bench(tmp_path), pool, lambda share, what: shares.append(share))
+    rows = run(squares(20), TaskContext(tmp_path), threads(3), lambda share, what: shares.append(share))
     assert [row["square"] for row in rows] == [n * n for n in range(20)]
     assert shares == sorted(shares) and shares[-1] == 1.0
 
@@ -56,45 +59,45 @@ def test_interrupted_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run(squares(4), Bench(tmp_path), None, stop)
+        run(squares(4), TaskContext(tmp_path), on_progress=stop)
     assert CALLS == [0, 1, 2]
-    rows = run(squares(4), Bench(tmp_path), None)
+    rows = run(squares(4), TaskContext(tmp_path))
     assert CALLS == [0, 1, 2, 3]
     assert [row["square"] for row in rows] == [0, 1, 4, 9]
 
 
 def test_error_of_a_task_stops_the_run_and_keeps_what_is_done(tmp_path: Path) -> None:
-    with ThreadPoolExecutor(1) as pool, pytest.raises(ParameterError, match="no"):
-        run([*squares(1), Task(failing), *squares(3)[1:]], Bench(tmp_path), pool)
+    with pytest.raises(ParameterError, match="no"):
+        run([*squares(1), Task(failing), *squares(3)[1:]], TaskContext(tmp_path), threads(1))
     assert len(list((tmp_path / "results").iterdir())) >= 1
     assert not list(tmp_path.rglob("*.part"))
 
 
 def test_other_parameters_are_other_results(tmp_path: Path) -> None:
-    run(squares(1), Bench(tmp_path), None)
-    run(squares(1), Bench(tmp_path, Parameters().with_assignments(["logo.pad_px=3"])), None)
+    run(squares(1), TaskContext(tmp_path))
+    run(squares(1), TaskContext(tmp_path, Parameters().with_assignments(["logo.pad_px=3"])))
     assert CALLS == [0, 0]
 
 
 def test_damaged_result_is_made_anew(tmp_path: Path) -> None:
-    run(squares(1), Bench(tmp_path), None)
+    run(squares(1), TaskContext(tmp_path))
     (kept,) = (tmp_path / "results").iterdir()
     kept.write_text("[{")
-    assert run(squares(1), Bench(tmp_path), None) == [{"number": 0, "square": 0}]
+    assert run(squares(1), TaskContext(tmp_path)) == [{"number": 0, "square": 0}]
     assert CALLS == [0, 0]
 
 
 def test_times_and_runs_without_a_cache_are_not_kept(tmp_path: Path) -> None:
     for _ in range(2):
-        run(squares(1, keep=False), Bench(tmp_path), None)
-        run(squares(1), Bench(None), None)
+        run(squares(1, keep=False), TaskContext(tmp_path))
+        run(squares(1), TaskContext(None))
     assert CALLS == [0] * 4
     assert not list(tmp_path.iterdir())
 
 
 def test_local_processes_do_the_work(tmp_path: Path) -> None:
-    with executor(1) as by:
-        rows = run(squares(2), Bench(tmp_path), by)
+    with executor(2) as parallel:
+        rows = run(squares(2), TaskContext(tmp_path), parallel)
     assert [row["square"] for row in rows] == [0, 1]
     assert not CALLS  # not in this process
 
@@ -103,10 +106,11 @@ def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
     """Also when it is killed and cannot stop them."""
     script = (
         "import os, signal\n"
-        "from spinscope.pipeline.evaluation.work import executor\n"
+        "from joblib import delayed\n"
+        "from spinscope.pipeline.evaluation.tasks import executor\n"
         "if __name__ == '__main__':\n"
-        "    with executor(1) as by:\n"
-        "        print(by.submit(os.getpid).result(), flush=True)\n"
+        "    with executor(2) as parallel:\n"
+        "        print(next(parallel(delayed(os.getpid)() for _ in range(2))), flush=True)\n"
         "        os.kill(os.getpid(), signal.SIGKILL)\n"
     )
     (tmp_path / "run.py").write_text(script)
@@ -123,40 +127,22 @@ def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
     assert int(ended.stdout) > 0
 
 
-def test_no_workers_means_this_process() -> None:
-    with executor(0) as by:
-        assert by is None
-
-
 def test_cluster_without_dask_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(ParameterError, match="needs Dask"), executor(cluster="tcp://nowhere:1"):
         pass
 
 
-def test_cluster_that_does_not_answer_and_one_that_does(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Client:
-        def __init__(self, address: str, timeout: float) -> None:
-            if "nowhere" in address:
-                raise OSError("timed out")
+def test_cluster_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    def client(address: str, timeout: float) -> None:
+        raise OSError("timed out")
 
-        def __enter__(self) -> Client:
-            return self
-
-        def __exit__(self, *_: object) -> None:
-            pass
-
-        def get_executor(self) -> Executor:
-            return ThreadPoolExecutor(1)
-
-    monkeypatch.setitem(sys.modules, "distributed", types.SimpleNamespace(Client=Client))
+    monkeypatch.setitem(sys.modules, "distributed", types.SimpleNamespace(Client=client))
     with (
         pytest.raises(ParameterError, match="no Dask cluster answers at tcp://nowhere:1"),
         executor(cluster="tcp://nowhere:1"),
     ):
         pass
-    with executor(cluster="tcp://here:1") as by:
-        assert [row["square"] for row in run(squares(3), Bench(None), by)] == [0, 1, 4]
 
 
 def test_place_that_cannot_be_written_gets_one_line(tmp_path: Path) -> None:
@@ -179,20 +165,20 @@ def test_a_full_disk_leaves_no_half_result(tmp_path: Path) -> None:
 
 def test_results_that_need_only_a_part_do_not_care_for_parameters(tmp_path: Path) -> None:
     task = Task(square, {"number": 3}, needs=("simulator", "biases.py"))
-    run([task], Bench(tmp_path), None)
-    run([task], Bench(tmp_path, Parameters().with_assignments(["logo.pad_px=3"])), None)
-    run([Task(square, {"number": 3}, needs=("simulator",))], Bench(tmp_path), None)
+    run([task], TaskContext(tmp_path))
+    run([task], TaskContext(tmp_path, Parameters().with_assignments(["logo.pad_px=3"])))
+    run([Task(square, {"number": 3}, needs=("simulator",))], TaskContext(tmp_path))
     assert CALLS == [3, 3]
 
 
 def test_cache_keeps_to_its_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("spinscope.pipeline.evaluation.work.CACHE_BYTES", 250)
+    monkeypatch.setattr("spinscope.pipeline.evaluation.tasks.CACHE_BYTES", 250)
     (tmp_path / "results").mkdir()
     for age in range(4):
         file = tmp_path / "results" / str(age)
         file.write_bytes(b"." * 100)
         os.utime(file, (1000 - age, 1000 - age))
-    _make_room(tmp_path)
+    _limit_cache(tmp_path)
     assert sorted(path.name for path in (tmp_path / "results").iterdir()) == ["0", "1"]
 
 
@@ -203,12 +189,14 @@ def test_two_workers_of_a_dask_cluster(tmp_path: Path) -> None:
 
     with (
         dask.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
-        executor(cluster=cluster.scheduler_address) as by,
+        executor(cluster=cluster.scheduler_address) as parallel,
     ):
-        rows = run([Task(pow_of, {"number": number}) for number in range(6)], Bench(tmp_path), by)
+        rows = run([Task(pow_of, {"number": number}) for number in range(6)], TaskContext(tmp_path), parallel)
+        with pytest.raises(ParameterError, match="no"):
+            run([*squares(3), Task(failing), *squares(9)[3:]], TaskContext(tmp_path), parallel)
     assert [row["power"] for row in rows] == [2**n for n in range(6)]
     assert len({row["process"] for row in rows}) <= 2
 
 
-def pow_of(bench: Bench, number: int) -> list[Row]:
+def pow_of(context: TaskContext, number: int) -> list[Row]:
     return [{"power": 2**number, "process": os.getpid()}]

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..simulator import spinner
-from . import paper
-from .estimating import COLUMNS, estimate_rows, logo_events, method_line, shots_of
-from .honesty import Goal, goals, honesty, refusals
-from .rendering import Rendered, rendered
-from .tables import Cell, Row, Table, distinct, summary, where
-from .work import Bench, Task
+from ...results import Truth
+from ...simulator import spinner
+from .. import paper
+from ..estimation import COLUMNS, estimate_rows, estimated, logo_events, method_line
+from ..plots import ERRORS, coverage_figure, curve, label_axes, method_colors, panels
+from ..rendering import render
+from ..suite import SUITES, Suite
+from ..tables import Cell, ResultTable, Row, distinct, summary, where
+from ..tasks import Task, TaskContext
+from ..uncertainty_calibration import Goal, calibration_table, goals, refusals
 
-SEED = 71_000  # of this suite alone: nothing was tuned on these recordings
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SEED = 71_000  # of this suite alone
 CENTRE_STD_PX = 0.3  # how well the place of a mounted ball is known, for centre and radius
 DURATION_MS = 100
 # Logo events from which an answer is asked for.
@@ -39,15 +46,15 @@ def tasks(quick: bool) -> list[Task]:
     ]
 
 
-def measure(bench: Bench, ball: int, kind: str, rps: float, seed: int) -> list[Row]:
+def measure(context: TaskContext, ball: int, kind: str, rps: float, seed: int) -> list[Row]:
     """Every method's errors in the whole recording and in short windows of it."""
     scene = spinner(ball=ball, kind=kind, magnitude_rps=rps, duration_ms=DURATION_MS, seed=seed)
-    recording = rendered(bench, scene, seed=seed)
-    parameters = bench.parameters.with_values({"track": known_circle(recording, seed)})
+    recording = render(context, scene, seed=seed)
+    parameters = context.parameters.with_values({"track": known_circle(recording.truth, seed)})
     rows: list[Row] = []
     for start_ms, end_ms in WINDOWS_MS:
         window_us = (start_ms * 1000, end_ms * 1000)
-        seen = logo_events(recording.truth, recording, window_us)
+        seen = logo_events(recording, window_us)
         about: Row = {
             "ball": ball,
             "kind": kind,
@@ -58,14 +65,13 @@ def measure(bench: Bench, ball: int, kind: str, rps: float, seed: int) -> list[R
             "logo_events": seen,
             "visible": seen >= VISIBLE[end_ms - start_ms],
         }
-        rows += estimate_rows(shots_of(recording, parameters, window_us), recording.truth, about)
+        rows += estimate_rows(estimated(recording, parameters, window_us), recording.truth, about)
     return rows
 
 
-def known_circle(recording: Rendered, seed: int) -> dict[str, str | float]:
-    """Track parameters of the fixed ball: the truth and an error of measuring it."""
+def known_circle(truth: Truth, seed: int) -> dict[str, str | float]:
+    """Track parameters of a mounted ball: its true circle with an error of measurement of CENTRE_STD_PX."""
     x, y, radius = CENTRE_STD_PX * np.random.default_rng([seed, 7]).standard_normal(3)
-    truth = recording.truth
     return {
         "ball": "fixed",
         "fixed_x_px": float(truth.x_px[0] + x),
@@ -75,15 +81,15 @@ def known_circle(recording: Rendered, seed: int) -> dict[str, str | float]:
     }
 
 
-def tables(rows: Sequence[Row]) -> list[Table]:
-    """Table 1 by quantity, the methods over all balls, how honest their uncertainties are, and the goals."""
+def tables(rows: Sequence[Row]) -> list[ResultTable]:
+    """Table 1 by quantity, the methods over all balls, the calibration of their uncertainties, and the goals."""
     methods = distinct(rows, "method")
     windows = [(f"{ms} ms", where(rows, window_ms=ms)) for ms in sorted(distinct(rows, "window_ms"))]
     return [
         _table_1(rows, "magnitude_error_rps", "Table 1: error of the spin magnitude [rps]", 0),
         _table_1(rows, "axis_error_deg", "Table 1: error of the spin axis [degrees]", 1),
         _table_1(rows, None, "Table 1: success rate", None),
-        Table(
+        ResultTable(
             "All balls together",
             ("window", "spin", *COLUMNS),
             [
@@ -95,14 +101,14 @@ def tables(rows: Sequence[Row]) -> list[Table]:
             "Success counts answers over recordings; 'of those with logo' leaves out windows with fewer than 1,000 "
             "(100 ms) or 100 (10 ms) logo events.",
         ),
-        honesty(windows, methods),
+        calibration_table(windows, methods),
         _goals(rows),
         refusals(windows, "contrast"),
     ]
 
 
-def _goals(rows: Sequence[Row]) -> Table:
-    """What is asked of `contrast`; of windows with a visible logo, and of those without one a refusal."""
+def _goals(rows: Sequence[Row]) -> ResultTable:
+    """Goals of `contrast`: answers for windows with a visible logo, refusals for those without one."""
     own = where(rows, method="contrast")
     long, short = (where(own, window_ms=ms, visible=True) for ms in (100, 10))
     asked = [Goal("100 ms, all balls", long, answered=0.95, rps=0.2, deg=3.0)]
@@ -132,7 +138,7 @@ def _groups(rows: Sequence[Row]) -> list[tuple[int, str, list[Row]]]:
     ]
 
 
-def _table_1(rows: Sequence[Row], column: str | None, title: str, of_paper: int | None) -> Table:
+def _table_1(rows: Sequence[Row], column: str | None, title: str, of_paper: int | None) -> ResultTable:
     """One quantity (None = success rate) by window, kind of spin and method, a column a ball."""
     balls = sorted(distinct(rows, "ball"))
     lines: list[tuple[Cell, ...]] = []
@@ -147,4 +153,33 @@ def _table_1(rows: Sequence[Row], column: str | None, title: str, of_paper: int 
                 errors = summary(where(part, method=method, ball=ball), column or "axis_error_deg")
                 cells.append((errors if column else errors.success) if errors.of else None)
             lines.append((f"{window_ms} ms", group, method, *cells))
-    return Table(title, ("window", "spin", "method", *(f"ball {ball}" for ball in balls)), lines)
+    return ResultTable(title, ("window", "spin", "method", *(f"ball {ball}" for ball in balls)), lines)
+
+
+def figures(rows: Sequence[Row]) -> dict[str, Figure]:
+    """Errors against rps (the paper's figure): top/back with balls 1, 6, 7, side with 2, 3, 4."""
+    windows = sorted(distinct(rows, "window_ms"))
+    figure, axes = panels(2, len(windows))
+    chosen = [row for row in rows if row["ball"] in ((2, 3, 4) if group_of(row) == "side" else (1, 6, 7))]
+    for column, window_ms in enumerate(windows):
+        for line, (name, label) in enumerate(ERRORS):
+            for group, style in (("top/back", "-"), ("side", "--")):
+                for color, method in method_colors(rows):
+                    part = [r for r in where(chosen, window_ms=window_ms, method=method) if group_of(r) == group]
+                    curve(axes[line, column], part, "rps", name, f"{method}, {group}", style, color)
+            axes[line, column].set_yscale("log")
+            label_axes(axes[line, column], f"ball spinner, {window_ms} ms", "spin [rps]", label)
+    groups = [(f"ball spinner, {window_ms} ms", where(rows, window_ms=window_ms)) for window_ms in windows]
+    return {"errors": figure, "coverage": coverage_figure(groups)}
+
+
+SUITES.register(
+    Suite(
+        name="spinner",
+        label="Ball spinner: the paper's table 1",
+        help="Spin of a mounted ball: 7 logos, 10 to 100 rps, windows of 10 and 100 ms (table 1).",
+        tasks=tasks,
+        tables=tables,
+        figures=figures,
+    )
+)

@@ -5,8 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from spinscope.pipeline.evaluation.honesty import Goal, by_coverage, goals, honesty, is_gross, ratios, refusals
 from spinscope.pipeline.evaluation.tables import Row
+from spinscope.pipeline.evaluation.uncertainty_calibration import (
+    Goal,
+    calibration_table,
+    goals,
+    is_gross,
+    ratios,
+    refusals,
+    risk_coverage,
+)
 
 
 def row(magnitude: float | None, axis: float | None, std: tuple[float, float] = (1.0, 1.0), method: str = "m") -> Row:
@@ -20,18 +28,18 @@ def row(magnitude: float | None, axis: float | None, std: tuple[float, float] = 
     }
 
 
-def test_honest_errors_are_found_calibrated_and_boasting_ones_not() -> None:
+def test_correct_stated_errors_are_calibrated_and_small_ones_not() -> None:
     random = np.random.default_rng(3)
     rows: list[Row] = []
     for _ in range(4000):
         rows_std = float(random.uniform(0.1, 3.0))
         magnitude, axis = float(abs(random.normal(0, rows_std))), float(np.hypot(*random.normal(0, rows_std, 2)))
-        rows.append(row(magnitude, axis, (rows_std, rows_std * np.sqrt(2)), "honest"))
-        rows.append(row(magnitude, axis, (rows_std / 3, rows_std / 3), "boasting"))
-    honest, boasting = honesty([("all", rows)], ["honest", "boasting"]).rows
-    assert honest[:3] == ("all", "honest", 4000)
-    assert np.array(honest[4:], float) == pytest.approx([0.683, 0.954, 0.674, 0.632, 0.982, 0.833], abs=0.03)
-    assert float(str(boasting[4])) < 0.3
+        rows.append(row(magnitude, axis, (rows_std, rows_std * np.sqrt(2)), "correct"))
+        rows.append(row(magnitude, axis, (rows_std / 3, rows_std / 3), "too_small"))
+    correct, too_small = calibration_table([("all", rows)], ["correct", "too_small"]).rows
+    assert correct[:3] == ("all", "correct", 4000)
+    assert np.array(correct[4:], float) == pytest.approx([0.683, 0.954, 0.674, 0.632, 0.982, 0.833], abs=0.03)
+    assert float(str(too_small[4])) < 0.3
     assert ratios([row(None, None), row(2.0, 1.0)], "magnitude_error_rps", "magnitude_std_rps").tolist() == [2.0]
 
 
@@ -64,7 +72,7 @@ def test_goals_met_and_missed() -> None:
 
 def test_error_against_coverage_takes_the_surest_first() -> None:
     rows = [row(3.0, 0.0, (0.3, 1.0)), row(1.0, 0.0, (0.1, 1.0)), row(None, None), row(2.0, 0.0, (0.2, 1.0))]
-    coverage, error = by_coverage(rows, "magnitude_error_rps", "magnitude_std_rps")
+    coverage, error = risk_coverage(rows, "magnitude_error_rps", "magnitude_std_rps")
     assert coverage.tolist() == [0.25, 0.5, 0.75]
     assert error.tolist() == [1.0, 1.5, 2.0]
 

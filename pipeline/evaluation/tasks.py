@@ -1,0 +1,187 @@
+"""Tasks of a suite: run in parallel, their rows kept on disk, so that an interrupted run resumes where it stopped."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from joblib import Parallel, delayed, parallel_config
+
+from ..errors import ParameterError
+from ..files import atomic_file
+from ..registry import Parameters
+from .tables import Row
+
+PIPELINE = Path(__file__).parents[1]
+CACHE_BYTES = 2 << 30  # a full run of all suites keeps some 200 MB; older versions' files go first
+WORKER_IDLE_S = 5  # after so long without work a process ends, also when the one that started it was killed
+Progress = Callable[[float, str], None]  # share done (0..1) and what is being done
+
+
+@dataclass(frozen=True)
+class TaskContext:
+    """Surroundings of every task.
+
+    Attributes
+    ----------
+    cache : Path or None
+        Folder for recordings and rows; None keeps nothing.
+    parameters : Parameters
+        Of the pipeline under evaluation.
+    """
+
+    cache: Path | None = None
+    parameters: Parameters = field(default_factory=Parameters)
+
+
+@dataclass(frozen=True)
+class Task:
+    """A call that gives rows: `function(context, **arguments)`.
+
+    Attributes
+    ----------
+    function : callable
+        Found by its module and name, so that other processes can call it.
+    arguments : mapping
+        Of values that JSON can hold.
+    keep : bool
+        Whether the rows may be kept for the next run; run times may not.
+    needs : tuple of str
+        The files and packages of `pipeline` whose text the kept rows depend on; "" = all of it, and the parameters.
+    """
+
+    function: Callable[..., list[Row]]
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    keep: bool = True
+    needs: tuple[str, ...] = ("",)
+
+
+@contextmanager
+def executor(workers: int = 1, cluster: str | None = None) -> Iterator[Parallel]:
+    """joblib's `Parallel` over this process, processes of this machine or a running Dask cluster.
+
+    Parameters
+    ----------
+    workers : int
+        Number of processes; up to 1, this process does the work.
+    cluster : str or None
+        Address of a Dask scheduler, like "tcp://127.0.0.1:8786", whose workers do the work instead.
+
+    Raises
+    ------
+    ParameterError
+        Where Dask is not installed, or no cluster answers at the address.
+    """
+    options: dict[str, Any] = {"return_as": "generator_unordered", "batch_size": 1}
+    if cluster is None:
+        if workers > 1:
+            options |= {"backend": "loky", "idle_worker_timeout": WORKER_IDLE_S}
+        yield Parallel(max(workers, 1), **options)
+        return
+    try:
+        dask = importlib.import_module("distributed")  # an extra: not everybody has a cluster
+    except ImportError:
+        raise ParameterError("a cluster needs Dask: install it with `pip install spinscope[cluster]`") from None
+    try:
+        client = dask.Client(cluster, timeout=10)
+    except (OSError, ValueError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise ParameterError(f"no Dask cluster answers at {cluster} ({reason}): is it running?") from error
+    with client, parallel_config("dask"):
+        yield Parallel(-1, **options)
+
+
+def run(
+    tasks: Sequence[Task],
+    context: TaskContext,
+    parallel: Parallel | None = None,
+    on_progress: Progress | None = None,
+) -> list[Row]:
+    """All tasks' rows in the tasks' order, run by an `executor` (None: by this process) unless kept by an earlier run.
+
+    An error in a task cancels the others; the rows of those that are done stay on disk.
+    """
+    parallel = parallel or Parallel(return_as="generator")
+    if context.cache is not None:
+        _limit_cache(context.cache)
+    rows = {number: kept for number, task in enumerate(tasks) if (kept := _kept(context, task)) is not None}
+    pending = [number for number in range(len(tasks)) if number not in rows]
+    for number, result in parallel(delayed(_perform)(context, tasks[number], number) for number in pending):
+        rows[number] = result
+        if on_progress:
+            on_progress(len(rows) / len(tasks), f"{len(rows)} of {len(tasks)}")
+    return [row for number in range(len(tasks)) for row in rows[number]]
+
+
+def _perform(context: TaskContext, task: Task, number: int) -> tuple[int, list[Row]]:
+    """Run a task and keep its rows; its number tells results apart that come in any order."""
+    rows = task.function(context, **task.arguments)
+    path = _path(context, task)
+    if path is not None:
+        write_whole(path, json.dumps(rows))
+    return number, rows
+
+
+def _kept(context: TaskContext, task: Task) -> list[Row] | None:
+    """The rows kept of a task, None where there are none or they are damaged."""
+    path = _path(context, task)
+    if path is None:
+        return None
+    try:
+        rows: list[Row] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return rows
+
+
+def _path(context: TaskContext, task: Task) -> Path | None:
+    """File of a task's rows: named by all that they depend on, the program's own text included."""
+    if context.cache is None or not task.keep:
+        return None
+    name = f"{task.function.__module__}.{task.function.__qualname__}"
+    everything = [name, dict(task.arguments), *(text_digest(part) for part in task.needs)]
+    if "" in task.needs:
+        everything.append(context.parameters.as_dict())
+    return context.cache / "results" / f"{digest(everything)}.json"
+
+
+def digest(value: Any) -> str:
+    """24 hexadecimal digits that tell this value (of JSON's kinds) from any other."""
+    content = json.dumps(value, sort_keys=True).encode()
+    return hashlib.blake2b(content, digest_size=12).hexdigest()
+
+
+@lru_cache
+def text_digest(part: str) -> str:
+    """Digest of the text of `pipeline`, of a package or a file in it: rows are valid for one version only."""
+    hashed = hashlib.blake2b(digest_size=12)
+    place = PIPELINE / part
+    for path in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
+        hashed.update(path.relative_to(PIPELINE).as_posix().encode() + b"\0" + path.read_bytes())
+    return hashed.hexdigest()
+
+
+def write_whole(path: Path, content: str) -> None:
+    """Write a file that is there whole or not at all; raises RecordingError when it cannot be written."""
+    with suppress(OSError):  # the message comes from the writing
+        path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_file(path, "results") as part:
+        part.write_text(content, encoding="utf-8")
+
+
+def _limit_cache(cache: Path) -> None:
+    """Delete what was not written for longest until the cache keeps to its size."""
+    files = [(path.stat().st_mtime, path.stat().st_size, path) for path in cache.glob("*/*") if path.is_file()]
+    total = sum(size for _, size, _ in files)
+    for _, size, path in sorted(files):
+        if total <= CACHE_BYTES:
+            return
+        path.unlink(missing_ok=True)
+        total -= size
