@@ -162,7 +162,7 @@ def test_the_table_for_people_names_units_and_methods(samples: Path) -> None:
         (["{samples}/flight_back.h5", "--window", 5, 5], "START_US must be below END_US"),
         (["{samples}/flight_back.h5", "--fixed-ball", "here"], "auto"),
         (["{samples}/flight_back.h5", "--fixed-ball", 5000, 5000, 3], "1280 x 720"),
-        (["{samples}/flight_back.h5", "--json", "{samples}/no/such/folder/x.json"], "--json"),
+        (["{samples}/flight_back.h5", "--json", "{samples}/no/such/folder/x.json"], "its folder does not exist"),
         (["{samples}/flight_back.h5", "--sensor", "big"], "WIDTHxHEIGHT"),
         (["{samples}/flight_back.h5", "--sensor", "640x480"], "640"),
         (["{samples}/flight_back.h5", "--method", "magic"], "triplet"),
