@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,8 +12,52 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import RecordingError
 
 
+class ColumnBatch:
+    """Base of dataclasses with slots whose fields are columns: one row an event, in order of time `t_us`.
+
+    Attributes
+    ----------
+    KINDS : tuple of str
+        numpy's kind of each column, as in `np.empty(0, kind)`.
+    """
+
+    __slots__: tuple[str, ...] = ()
+    KINDS: ClassVar[tuple[str, ...]]
+    t_us: NDArray[np.int64]
+
+    @classmethod
+    def empty(cls) -> Self:
+        """A batch without events."""
+        return cls(*(np.empty(0, kind) for kind in cls.KINDS))
+
+    @property
+    def columns(self) -> tuple[NDArray[Any], ...]:
+        """All columns, in the order of the fields."""
+        return tuple(getattr(self, name) for name in self.__slots__)
+
+    @classmethod
+    def concatenate(cls, batches: Iterable[Self]) -> Self:
+        """Join batches that follow each other in time."""
+        parts = list(batches)
+        if len(parts) < 2:
+            return parts[0] if parts else cls.empty()
+        return cls(*(np.concatenate(column) for column in zip(*(part.columns for part in parts), strict=True)))
+
+    def __len__(self) -> int:
+        return self.t_us.size
+
+    def __getitem__(self, rows: slice | NDArray[np.bool_] | NDArray[np.intp]) -> Self:
+        """The events of a slice (views), of a mask or of indices (copies)."""
+        return type(self)(*(column[rows] for column in self.columns))
+
+    def between(self, start_us: float, end_us: float) -> Self:
+        """The events of [start_us, end_us), as views."""
+        first, last = np.searchsorted(self.t_us, [start_us, end_us])
+        return self[int(first) : int(last)]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class EventBatch:
+class EventBatch(ColumnBatch):
     """Events in order of time.
 
     All columns are read-only. The constructor trusts its arguments; data from outside the program comes in
@@ -28,6 +73,7 @@ class EventBatch:
         True = ON (brighter), False = OFF (darker).
     """
 
+    KINDS: ClassVar = ("i8", "u2", "u2", "?")
     t_us: NDArray[np.int64]
     x_px: NDArray[np.uint16]
     y_px: NDArray[np.uint16]
@@ -36,11 +82,6 @@ class EventBatch:
     def __post_init__(self) -> None:
         for column in self.columns:
             column.flags.writeable = False
-
-    @classmethod
-    def empty(cls) -> EventBatch:
-        """A batch without events."""
-        return cls(np.empty(0, np.int64), np.empty(0, np.uint16), np.empty(0, np.uint16), np.empty(0, np.bool_))
 
     @classmethod
     def checked(
@@ -75,34 +116,7 @@ class EventBatch:
                 )
         return cls(t, x.astype(np.uint16), y.astype(np.uint16), polarity)
 
-    @classmethod
-    def concatenate(cls, batches: Iterable[EventBatch]) -> EventBatch:
-        """Join batches that follow each other in time."""
-        parts = list(batches)
-        if not parts:
-            return cls.empty()
-        if len(parts) == 1:
-            return parts[0]
-        return cls(
-            np.concatenate([b.t_us for b in parts]),
-            np.concatenate([b.x_px for b in parts]),
-            np.concatenate([b.y_px for b in parts]),
-            np.concatenate([b.on for b in parts]),
-        )
-
     @property
     def columns(self) -> tuple[NDArray[np.int64], NDArray[np.uint16], NDArray[np.uint16], NDArray[np.bool_]]:
         """t_us, x_px, y_px and on, in this order."""
         return self.t_us, self.x_px, self.y_px, self.on
-
-    def __len__(self) -> int:
-        return self.t_us.size
-
-    def __getitem__(self, rows: slice | NDArray[np.bool_] | NDArray[np.intp]) -> EventBatch:
-        """The events of a slice (views), of a mask or of indices (copies)."""
-        return EventBatch(self.t_us[rows], self.x_px[rows], self.y_px[rows], self.on[rows])
-
-    def between(self, start_us: int, end_us: int) -> EventBatch:
-        """The events of [start_us, end_us), as views."""
-        first, last = np.searchsorted(self.t_us, [start_us, end_us])
-        return self[int(first) : int(last)]

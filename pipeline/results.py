@@ -10,9 +10,22 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .events import EventBatch
+from .events import ColumnBatch, EventBatch
 
 Vector = NDArray[np.float64]
+
+
+class ReadOnlyArrays:
+    """Base of results, dataclasses with slots: makes their arrays and column batches read-only."""
+
+    __slots__: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in self.__slots__:
+            value = getattr(self, name)
+            for array in value.columns if isinstance(value, ColumnBatch) else (value,):
+                if isinstance(array, np.ndarray):
+                    array.flags.writeable = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +49,7 @@ class Circle:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SpinEstimate:
+class SpinEstimate(ReadOnlyArrays):
     """Spin estimate of one method, or the reason for its refusal.
 
     Attributes
@@ -154,9 +167,3 @@ def nbytes(result: Any) -> int:
     if dataclasses.is_dataclass(result) and not isinstance(result, type):
         return sum(nbytes(getattr(result, field.name)) for field in dataclasses.fields(result))
     return 0
-
-
-def frozen(array: NDArray[Any]) -> NDArray[Any]:
-    """The same array, made read-only."""
-    array.flags.writeable = False
-    return array

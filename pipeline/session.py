@@ -146,7 +146,7 @@ class Session:
         ticks = Chain(self.source).run(self.parameters, targets, forget=("surface",), together=TICKS_TOGETHER)
         for index, tick in enumerate(ticks):
             flow, contrast = tick.get("flow"), tick.get("contrast")
-            worked += flow is not None and len(flow.t_us) > 0
+            worked += flow is not None and len(flow.events) > 0
             has_contrasted |= contrast is not None and contrast.full
             if (worked >= WARM_UP_TICKS and has_contrasted) or index == 20 * WARM_UP_TICKS:
                 break

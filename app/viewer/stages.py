@@ -127,8 +127,8 @@ def flow_chunks(run: ViewedRun) -> list[Chunk]:
     half_px, bound_px_s = int(np.ceil(1.1 * run.largest_radius_px)), run.fast_flow_px_s or 1.0
     pictures = [
         hsv_image(
-            tick.flow.x_px,
-            tick.flow.y_px,
+            tick.flow.events.x_px,
+            tick.flow.events.y_px,
             tick.flow.vx_px_s,
             tick.flow.vy_px_s,
             bound_px_s=bound_px_s,

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..events import ColumnBatch
 from ..kernels.derotated_normal_flow import derotated_constraints, position_response
 from ..kernels.sphere import spin_rows
 from ..kernels.spin import robust_spin, sampled_spin
@@ -87,6 +89,29 @@ class _Fit:
     overlap: float
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen(ColumnBatch):
+    """Logo events: time, polarity, place on the ball, unit vector from its centre to the camera, off the rim."""
+
+    KINDS: ClassVar = ("i8", "?", "3f8", "3f8", "?")
+    t_us: NDArray[np.int64]
+    on: NDArray[np.bool_]
+    normals: Floats
+    sights: Floats
+    deep: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Planes(ColumnBatch):
+    """Constraints rows . spin = speeds of local planes, fitted in the ball's frame or in the image."""
+
+    KINDS: ClassVar = ("i8", "3f8", "f8", "?")
+    t_us: NDArray[np.int64]
+    rows: Floats
+    speeds: Floats
+    in_image: NDArray[np.bool_]
+
+
 class NormalFlowSpin:
     """Normal flow's spin of one shot, from all its logo events so far (those of the last spin.window_us).
 
@@ -103,15 +128,7 @@ class NormalFlowSpin:
     def __init__(self, parameters: SpinParameters, context: Context) -> None:
         self.parameters = parameters
         self.context = context
-        self.t_us = np.empty(0, np.int64)
-        self.on = np.empty(0, np.bool_)
-        self.normals = np.empty((0, 3))
-        self.sights = np.empty((0, 3))  # unit vectors from the ball's centre to the camera
-        self.deep = np.empty(0, np.bool_)
-        self.plane_t_us = np.empty(0, np.int64)
-        self.plane_rows = np.empty((0, 3))
-        self.plane_speeds = np.empty(0)
-        self.plane_in_image = np.empty(0, np.bool_)
+        self.seen, self.planes = _Seen.empty(), _Planes.empty()
         self.tracks = np.empty((0, 4))  # radius, and 1 sigma of position, radius (px) and velocity (px/s), a tick
         self.last: _Fit | None = None
         self.restarted_with = 0  # number of events at the last start from scratch
@@ -120,13 +137,13 @@ class NormalFlowSpin:
         """The estimate at the end of a tick."""
         self._add(logo, flow)
         self._forget(end_us - self.parameters.window_us)
-        count, deep = len(self.t_us), int(self.deep.sum())
+        count, deep = len(self.seen), int(self.seen.deep.sum())
         if count < FEWEST_EVENTS:
             return self._refused(f"the logo is hardly seen: {count} events, {FEWEST_EVENTS} are needed")
         if deep < FEWEST_DEEP:
             return self._refused(f"the logo is hardly seen: {deep} events off the rim, {FEWEST_DEEP} are needed")
-        if len(self.plane_speeds) < FEWEST_PLANES:
-            return self._refused(f"{len(self.plane_speeds)} events with normal flow, {FEWEST_PLANES} are needed")
+        if len(self.planes) < FEWEST_PLANES:
+            return self._refused(f"{len(self.planes)} events with normal flow, {FEWEST_PLANES} are needed")
         self.last = self._fit()
         if self.last is None:
             return self._refused("the normal flow agrees on no spin")
@@ -134,7 +151,7 @@ class NormalFlowSpin:
 
     def _refused(self, reason: str) -> SpinEstimate:
         self.last = None
-        return SpinEstimate.refused("normal_flow", reason, len(self.t_us))
+        return SpinEstimate.refused("normal_flow", reason, len(self.seen))
 
     def _add(self, logo: LogoResult, flow: FlowResult) -> None:
         """Take in the tick's events, less those that may be the outline's."""
@@ -142,31 +159,22 @@ class NormalFlowSpin:
         normals, points = logo.normals[own], logo.points_m[own]
         away = points - self.context.ball_radius_m * normals
         depth_px = logo.radius_px - logo.pad_px - np.hypot(logo.x_px[own], logo.y_px[own])
-        self.t_us = np.concatenate([self.t_us, logo.events.t_us[own]])
-        self.on = np.concatenate([self.on, logo.events.on[own]])
-        self.normals = np.concatenate([self.normals, normals])
-        self.sights = np.concatenate([self.sights, -away / np.linalg.norm(away, axis=1, keepdims=True)])
-        self.deep = np.concatenate([self.deep, depth_px > DEEP_PX])
-        rows = spin_rows(
-            flow.normal_points_m, flow.normal_normals, flow.normal_direction, self.context.camera.focal_px,
-            self.context.ball_radius_m,
-        )  # fmt: skip
-        self.plane_t_us = np.concatenate([self.plane_t_us, flow.normal_t_us])
-        self.plane_rows = np.concatenate([self.plane_rows, rows])
-        self.plane_speeds = np.concatenate([self.plane_speeds, flow.normal_speed_px_s])
-        self.plane_in_image = np.concatenate([self.plane_in_image, flow.normal_in_image])
+        sights = -away / np.linalg.norm(away, axis=1, keepdims=True)
+        seen = _Seen(logo.events.t_us[own], logo.events.on[own], normals, sights, depth_px > DEEP_PX)
+        self.seen = _Seen.concatenate([self.seen, seen])
+        events, directions = flow.normal_events, flow.normal_direction
+        focal_px, ball_radius_m = self.context.camera.focal_px, self.context.ball_radius_m
+        rows = spin_rows(events.points_m, events.normals, directions, focal_px, ball_radius_m)
+        planes = _Planes(events.t_us, rows, flow.normal_speed_px_s, flow.normal_in_image)
+        self.planes = _Planes.concatenate([self.planes, planes])
         tick = [logo.radius_px, logo.position_std_px, logo.radius_std_px, logo.velocity_std_px_s]
         self.tracks = np.concatenate([self.tracks, [tick]])
 
     def _forget(self, before_us: int) -> None:
-        if len(self.t_us) and self.t_us[0] < before_us:
-            first = int(np.searchsorted(self.t_us, before_us))
-            self.t_us, self.on, self.deep = self.t_us[first:], self.on[first:], self.deep[first:]
-            self.normals, self.sights = self.normals[first:], self.sights[first:]
-        if len(self.plane_t_us) and self.plane_t_us[0] < before_us:
-            keep = self.plane_t_us >= before_us
-            self.plane_t_us, self.plane_rows = self.plane_t_us[keep], self.plane_rows[keep]
-            self.plane_speeds, self.plane_in_image = self.plane_speeds[keep], self.plane_in_image[keep]
+        if len(self.seen) and self.seen.t_us[0] < before_us:
+            self.seen = self.seen.between(before_us, math.inf)
+        if len(self.planes) and self.planes.t_us[0] < before_us:
+            self.planes = self.planes[self.planes.t_us >= before_us]
 
     def _fit(self) -> _Fit | None:
         """The best spin: last tick's brought up to date if that is good, else the best of all starts.
@@ -176,10 +184,10 @@ class NormalFlowSpin:
         """
         if self.last is not None:
             fit = self._refined(self.last.spin, NEXT_TURNS)
-            if fit is not None and (fit.scale < GOOD or len(self.t_us) < 1.25 * self.restarted_with):
+            if fit is not None and (fit.scale < GOOD or len(self.seen) < 1.25 * self.restarted_with):
                 return fit
-        self.restarted_with = len(self.t_us)
-        starts = [self._start(~self.plane_in_image), self._start(self.plane_in_image)]
+        self.restarted_with = len(self.seen)
+        starts = [self._start(~self.planes.in_image), self._start(self.planes.in_image)]
         fits = [self._refined(start, FIRST_TURNS) for start in starts if start is not None]
         if self.last is not None:
             fits.append(self._refined(self.last.spin, NEXT_TURNS))
@@ -200,7 +208,7 @@ class NormalFlowSpin:
 
     def _start(self, which: NDArray[np.bool_]) -> Floats | None:
         """Spin (rad/s) that most of these planes support; None if there are too few."""
-        rows, speeds = self.plane_rows[which], self.plane_speeds[which]
+        rows, speeds = self.planes.rows[which], self.planes.speeds[which]
         if len(speeds) < FEWEST_PLANES:
             return None
         stride = max(1, len(speeds) // PLANES)
@@ -214,7 +222,7 @@ class NormalFlowSpin:
     def _refined(self, spin: Floats, turns: tuple[float, ...]) -> _Fit | None:
         """The spin that the lines ask for which an observer sees who turns with the guess; None if they do not."""
         (t_us, normals, on), stride, looked_at = self._looked_at()
-        sights = self.sights[:: self._thinning()]
+        sights = self.seen.sights[:: self._thinning()]
         radius_px, position_px, _, velocity_px_s = self._track()
         fit = None
         for turn in turns:
@@ -237,15 +245,15 @@ class NormalFlowSpin:
         return fit
 
     def _thinning(self) -> int:
-        return max(1, len(self.t_us) // EVENTS)
+        return max(1, len(self.seen) // EVENTS)
 
     def _looked_at(self) -> tuple[tuple[NDArray[np.int64], Floats, NDArray[np.bool_]], int, int]:
         """Thinned columns t_us, normals, on; every which event of them is looked at; and how many those are."""
         thin = self._thinning()
-        t_us = np.ascontiguousarray(self.t_us[::thin])
+        t_us = np.ascontiguousarray(self.seen.t_us[::thin])
         stride = max(1, len(t_us) // LINES)
         looked_at = len(range(stride // 2, len(t_us), stride))
-        return (t_us, np.ascontiguousarray(self.normals[::thin]), self.on[::thin].copy()), stride, looked_at
+        return (t_us, np.ascontiguousarray(self.seen.normals[::thin]), self.seen.on[::thin].copy()), stride, looked_at
 
     def _track(self) -> tuple[float, float, float, float]:
         """Radius of the ball now, and mean 1 sigmas of position, radius and velocity over the shot."""
@@ -268,7 +276,7 @@ class NormalFlowSpin:
         magnitude_rps = float(np.linalg.norm(spin_rps))
         if magnitude_rps > self.parameters.max_spin_rps:
             return self._doubted(f"{magnitude_rps:.0f} rps is above spin.max_spin_rps")
-        estimate = SpinEstimate("normal_flow", spin_rps, covariance_rps2, None, len(self.t_us))
+        estimate = SpinEstimate("normal_flow", spin_rps, covariance_rps2, None, len(self.seen))
         if estimate.axis_std_deg is None or estimate.axis_std_deg > OPEN_DEG:
             return self._doubted(
                 f"the logo's place leaves the axis open by {estimate.axis_std_deg or 180.0:.0f} degrees"
@@ -277,7 +285,7 @@ class NormalFlowSpin:
 
     def _doubted(self, reason: str) -> SpinEstimate:
         """A refusal that keeps the fit: the next tick may start from it."""
-        return SpinEstimate.refused("normal_flow", reason, len(self.t_us))
+        return SpinEstimate.refused("normal_flow", reason, len(self.seen))
 
     def _with_rate(self, spin_rps: Floats, covariance_rps2: Floats, rate: RateResult) -> tuple[Floats, Floats]:
         """The estimate after seeing the event rate's magnitude, if the two are within three sigma (Kalman update).
@@ -288,11 +296,11 @@ class NormalFlowSpin:
         """
         assert rate.spin_rps is not None and rate.spin_std_rps is not None
         axis = spin_rps / np.linalg.norm(spin_rps)
-        seen = [sight - axis * (sight @ axis) for sight in (self.sights[0], self.sights[-1])]
+        seen = [sight - axis * (sight @ axis) for sight in (self.seen.sights[0], self.seen.sights[-1])]
         turned_rps = 0.0
         if min(float(np.linalg.norm(across)) for across in seen) > STEADY_SIGHT:
             turned = math.atan2(float(axis @ np.cross(seen[0], seen[1])), float(seen[0] @ seen[1]))
-            turned_rps = turned / TAU / max((self.t_us[-1] - self.t_us[0]) * 1e-6, 1e-6)
+            turned_rps = turned / TAU / max((self.seen.t_us[-1] - self.seen.t_us[0]) * 1e-6, 1e-6)
         off_rps = rate.spin_rps + turned_rps - float(np.linalg.norm(spin_rps))
         variance = float(axis @ covariance_rps2 @ axis) + rate.spin_std_rps**2 + (RATE_FLOOR * rate.spin_rps) ** 2
         if off_rps**2 > 9.0 * variance:
@@ -314,14 +322,14 @@ class NormalFlowSpin:
         inverse = np.linalg.inv(fit.matrix)
         gain = inverse @ (fit.rows * fit.weights[:, None]).T
         radius_px, position_px, radius_std_px, _ = self._track()
-        turned = self.t_us[fit.events] * (float(np.linalg.norm(fit.spin)) * 1e-6)
+        turned = self.seen.t_us[fit.events] * (float(np.linalg.norm(fit.spin)) * 1e-6)
         _, block = np.unique(np.floor(turned).astype(np.int64), return_inverse=True)
         blocks = int(block.max()) + 1
         pulls = np.zeros((blocks, 3))
         np.add.at(pulls, block, (gain * (fit.speeds - fit.rows @ fit.spin)).T)
         scatter = pulls.T @ pulls * blocks / max(blocks - 1, 1)
-        normals = self.normals[fit.events]
-        response = position_response(normals, self.sights[fit.events], fit.rows, fit.spin, radius_px)
+        normals = self.seen.normals[fit.events]
+        response = position_response(normals, self.seen.sights[fit.events], fit.rows, fit.spin, radius_px)
         moved = gain @ response
         place = moved @ np.diag([position_px**2, position_px**2, radius_std_px**2]) @ moved.T
         bent = BIAS * gain @ (fit.speeds[:, None] * normals)

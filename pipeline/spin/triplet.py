@@ -65,16 +65,16 @@ class TripletSpin:
         return SpinEstimate("triplet", vector_rps, covariance_rps2, None, int(counts.sum()))
 
     def _add(self, flow: FlowResult) -> None:
-        if not flow.t_us.size:
+        if not len(flow.events):
             return
         velocity = surface_velocity(
-            flow.points_m, flow.normals, flow.vx_px_s, flow.vy_px_s, self.context.camera.focal_px
+            flow.events.points_m, flow.events.normals, flow.vx_px_s, flow.vy_px_s, self.context.camera.focal_px
         )
-        moment = np.cross(flow.normals, velocity) / self.context.ball_radius_m
+        moment = np.cross(flow.events.normals, velocity) / self.context.ball_radius_m
         firsts = np.flatnonzero(np.diff(flow.slice_index, prepend=flow.slice_index[0] - 1))
         for first, last in zip(firsts, [*firsts[1:], flow.slice_index.size], strict=True):
-            normals = flow.normals[first:last]
-            self.end_us.append(int(flow.t_us[last - 1]))
+            normals = flow.events.normals[first:last]
+            self.end_us.append(int(flow.events.t_us[last - 1]))
             self.counts.append(int(last - first))
             self.moments.append(moment[first:last].sum(axis=0))
             self.squares.append((last - first) * np.eye(3) - normals.T @ normals)

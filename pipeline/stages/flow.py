@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..events import ColumnBatch
 from ..kernels.plane_flow import plane_flow
 from ..kernels.triplet import earlier_neighbours, triplet_flow
 from ..parameters import ParameterGroup, choice, tunable
-from ..results import Packet, frozen
+from ..results import Packet, ReadOnlyArrays
 from ..stage import Context, Stage
 from .logo import LogoResult
 from .rate import RateResult
@@ -42,8 +43,29 @@ class FlowParameters(ParameterGroup):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FlowResult:
-    """The flow of the slices that ended in this tick, one row an event that has flow.
+class FlowEvents(ColumnBatch):
+    """Logo events as the flow takes them; see `LogoResult` for their columns."""
+
+    KINDS: ClassVar = ("i8", "f8", "f8", "?", "3f8", "3f8", "?", "f8", "f8")
+    t_us: NDArray[np.int64]
+    x_px: Floats
+    y_px: Floats
+    on: NDArray[np.bool_]
+    points_m: Floats
+    normals: Floats
+    of_outline: NDArray[np.bool_]
+    centre_x_px: Floats
+    centre_y_px: Floats
+
+    @classmethod
+    def of(cls, logo: LogoResult) -> FlowEvents:
+        """The logo events of one tick."""
+        return cls(*(getattr(logo.events if name in ("t_us", "on") else logo, name) for name in cls.__slots__))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlowResult(ReadOnlyArrays):
+    """The flow of the slices that ended in this tick.
 
     All positions and velocities are in the ball's frame: relative to the ball's centre at the event's own time.
 
@@ -55,20 +77,18 @@ class FlowResult:
         Highest speed looked for, 2 pi max_spin radius; NaN without a ball.
     radius_px : float
         Radius of the ball; NaN without a ball.
-    t_us : (n,) int64
-    x_px, y_px : (n,) float64
-    points_m, normals : (n, 3) float64
-        Where the event lies on the ball (camera frame), and e_r there.
+    events : FlowEvents
+        The n events that have flow by Triplet Matching.
     vx_px_s, vy_px_s : (n,) float64
-        Triplet Matching's flow.
+        That flow.
     slice_index : (n,) int64
-        Which slice (from the shot's start).
-    normal_t_us, normal_x_px, normal_y_px, normal_points_m, normal_normals : int64 array
-        The same for the m events with normal flow of a local plane; these come PLANE_REACH t_acc late, when their
-        neighbours after them are known. Of a dense logo only a part of the events is tried (PLANES_PER_MS), and
-        none that may be the outline's.
-    normal_direction, normal_speed_px_s : (m, 2) float64
-        Unit vectors across the edge, (m,) float64 speed along them.
+        Number of the slice, from the shot's start.
+    normal_events : FlowEvents
+        The m events with normal flow of a local plane; these come PLANE_REACH t_acc late, when their neighbours after
+        them are known. Of a dense logo only a part of the events is tried (PLANES_PER_MS), and none that may be the
+        outline's.
+    normal_direction, normal_speed_px_s : (m, 2) and (m,) float64
+        Unit vectors across the edge, and speed along them.
     normal_in_image : (m,) bool
         The plane was fitted in the image and the ball's motion taken off afterwards; an event can have both kinds.
         A logo that turns against the flight hardly moves in the image: few pixels then see it pass, too far apart
@@ -78,59 +98,14 @@ class FlowResult:
     t_acc_us: int | None
     speed_bound_px_s: float
     radius_px: float
-    t_us: NDArray[np.int64]
-    x_px: NDArray[np.float64]
-    y_px: NDArray[np.float64]
-    points_m: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    vx_px_s: NDArray[np.float64]
-    vy_px_s: NDArray[np.float64]
+    events: FlowEvents
+    vx_px_s: Floats
+    vy_px_s: Floats
     slice_index: NDArray[np.int64]
-    normal_t_us: NDArray[np.int64]
-    normal_x_px: NDArray[np.float64]
-    normal_y_px: NDArray[np.float64]
-    normal_points_m: NDArray[np.float64]
-    normal_normals: NDArray[np.float64]
-    normal_direction: NDArray[np.float64]
-    normal_speed_px_s: NDArray[np.float64]
+    normal_events: FlowEvents
+    normal_direction: Floats
+    normal_speed_px_s: Floats
     normal_in_image: NDArray[np.bool_]
-
-
-@dataclass(frozen=True, slots=True)
-class FlowEvents:
-    """Columns of logo events, in order of time; see FlowResult for what they hold."""
-
-    t_us: NDArray[np.int64]
-    x_px: NDArray[np.float64]
-    y_px: NDArray[np.float64]
-    on: NDArray[np.bool_]
-    points_m: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    of_outline: NDArray[np.bool_]
-    centre_x_px: NDArray[np.float64]
-    centre_y_px: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, logo: LogoResult) -> FlowEvents:
-        """The logo events of one tick."""
-        return cls(*(getattr(logo.events if name in ("t_us", "on") else logo, name) for name in cls.__slots__))
-
-    def __getitem__(self, rows: slice | NDArray[np.bool_] | NDArray[np.int64]) -> FlowEvents:
-        return FlowEvents(*(getattr(self, name)[rows] for name in self.__slots__))
-
-    @classmethod
-    def joined(cls, parts: Sequence[FlowEvents]) -> FlowEvents:
-        """Events that follow each other in time, as one; at least one part."""
-        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls.__slots__))
-
-    def between(self, start_us: float, end_us: float) -> FlowEvents:
-        """The events of [start_us, end_us)."""
-        first, last = np.searchsorted(self.t_us, [start_us, end_us])
-        return self[int(first) : int(last)]
-
-
-_NONE, _NOWHERE, _NO = np.empty(0), np.empty((0, 3)), np.empty(0, np.bool_)
-NO_EVENTS = FlowEvents(np.empty(0, np.int64), _NONE, _NONE, _NO, _NOWHERE, _NOWHERE, _NO, _NONE, _NONE)
 
 
 @dataclass(slots=True)
@@ -138,7 +113,7 @@ class FlowState:
     """Events of the shot that are still to be worked on; times are None before the first tick."""
 
     max_spin_rps: float
-    events: FlowEvents = NO_EVENTS
+    events: FlowEvents = field(default_factory=FlowEvents.empty)
     slice_start_us: int | None = None
     slice_index: int = 0
     planes_until_us: float = 0.0
@@ -151,9 +126,9 @@ def start(parameters: FlowParameters, context: Context) -> FlowState:
 
 def absent(parameters: FlowParameters, reason: str) -> FlowResult:
     """No flow, because there is no ball."""
-    nothing = np.empty(0)
-    none = (NO_EVENTS, nothing, nothing, np.empty(0, np.int64))
-    return _result(None, math.nan, math.nan, none, (NO_EVENTS, np.empty((0, 2)), nothing, np.empty(0, np.bool_)))
+    no_flow = FlowEvents.empty(), np.empty(0), np.empty(0), np.empty(0, np.int64)
+    no_normal_flow = FlowEvents.empty(), np.empty((0, 2)), np.empty(0), np.empty(0, np.bool_)
+    return FlowResult(None, math.nan, math.nan, *no_flow, *no_normal_flow)
 
 
 def step(
@@ -169,14 +144,14 @@ def step(
     """
     if state.slice_start_us is None:
         state.slice_start_us, state.planes_until_us = packet.start_us, packet.start_us
-    state.events = FlowEvents.joined([state.events, FlowEvents.of(logo)])
+    state.events = FlowEvents.concatenate([state.events, FlowEvents.of(logo)])
     t_acc_us = _t_acc_us(parameters, rate)
     bound_px_s = 2 * math.pi * state.max_spin_rps * logo.radius_px
     triplets = _ended_slices(parameters, state, packet.end_us, t_acc_us, bound_px_s)
     planes = _planes(parameters, state, ball, packet.end_us, t_acc_us, bound_px_s)
     keep_us = min(state.slice_start_us, state.planes_until_us - PLANE_REACH * t_acc_us)
     state.events = state.events.between(keep_us, packet.end_us)
-    return _result(t_acc_us, bound_px_s, logo.radius_px, triplets, planes)
+    return FlowResult(t_acc_us, bound_px_s, logo.radius_px, *triplets, *planes)
 
 
 def _t_acc_us(parameters: FlowParameters, rate: RateResult) -> int:
@@ -194,7 +169,7 @@ def _ended_slices(
 ) -> tuple[FlowEvents, Floats, Floats, NDArray[np.int64]]:
     """Events with flow of the slices that end by end_us, their flow and their slice."""
     assert state.slice_start_us is not None
-    events, vx, vy, index = [NO_EVENTS], [np.empty(0)], [np.empty(0)], [np.empty(0, np.int64)]
+    events, vx, vy, index = [FlowEvents.empty()], [np.empty(0)], [np.empty(0)], [np.empty(0, np.int64)]
     while state.slice_start_us + t_acc_us <= end_us:
         piece = state.events.between(state.slice_start_us, state.slice_start_us + t_acc_us)
         neighbours = earlier_neighbours(
@@ -211,7 +186,7 @@ def _ended_slices(
         index.append(np.full(int(has.sum()), state.slice_index, np.int64))
         state.slice_start_us += t_acc_us
         state.slice_index += 1
-    return FlowEvents.joined(events), np.concatenate(vx), np.concatenate(vy), np.concatenate(index)
+    return FlowEvents.concatenate(events), np.concatenate(vx), np.concatenate(vy), np.concatenate(index)
 
 
 def _planes(
@@ -248,38 +223,6 @@ def _planes(
         np.concatenate([directions, (along * sense[:, None])[fit]]),
         np.concatenate([speeds, (relative * sense)[fit]]),
         in_image,
-    )
-
-
-def _result(
-    t_acc_us: int | None,
-    bound_px_s: float,
-    radius_px: float,
-    triplets: tuple[FlowEvents, Floats, Floats, NDArray[np.int64]],
-    planes: tuple[FlowEvents, Floats, Floats, NDArray[np.bool_]],
-) -> FlowResult:
-    full, vx_px_s, vy_px_s, slice_index = triplets
-    normal, direction, speed_px_s, in_image = planes
-    return FlowResult(
-        t_acc_us=t_acc_us,
-        speed_bound_px_s=bound_px_s,
-        radius_px=radius_px,
-        t_us=frozen(full.t_us),
-        x_px=frozen(full.x_px),
-        y_px=frozen(full.y_px),
-        points_m=frozen(full.points_m),
-        normals=frozen(full.normals),
-        vx_px_s=frozen(vx_px_s),
-        vy_px_s=frozen(vy_px_s),
-        slice_index=frozen(slice_index),
-        normal_t_us=frozen(normal.t_us),
-        normal_x_px=frozen(normal.x_px),
-        normal_y_px=frozen(normal.y_px),
-        normal_points_m=frozen(normal.points_m),
-        normal_normals=frozen(normal.normals),
-        normal_direction=frozen(direction),
-        normal_speed_px_s=frozen(speed_px_s),
-        normal_in_image=frozen(in_image),
     )
 
 

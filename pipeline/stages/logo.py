@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..events import EventBatch
+from ..events import ColumnBatch, EventBatch
 from ..kernels.logo import logo_rows, outline_like
 from ..kernels.sphere import intersect_ball
 from ..kernels.take_events import take_events
 from ..parameters import ParameterGroup, tunable
-from ..results import Packet, frozen
+from ..results import Packet, ReadOnlyArrays
 from ..stage import Context, Stage
 from .filter import FilterResult
 from .track import BallTrack
@@ -50,7 +51,7 @@ class LogoParameters(ParameterGroup):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TurningEvents:
+class TurningEvents(ColumnBatch):
     """Events that turn with the ball: none that its outline may have made, but also some nearer to it than pad.
 
     Attributes
@@ -63,18 +64,16 @@ class TurningEvents:
         The ball's centre when the event happened.
     """
 
+    KINDS: ClassVar = ("i8", "?", "3f8", "f8", "f8")
     t_us: NDArray[np.int64]
     on: NDArray[np.bool_]
     normals: Floats
     centre_x_px: Floats
     centre_y_px: Floats
 
-    def __len__(self) -> int:
-        return self.t_us.size
-
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LogoResult:
+class LogoResult(ReadOnlyArrays):
     """The logo events of the tick, each with the ball at its own time.
 
     Attributes
@@ -128,11 +127,11 @@ def start(parameters: LogoParameters, context: Context) -> Context:
 
 def absent(parameters: LogoParameters, reason: str) -> LogoResult:
     """No logo events, because there is no ball."""
-    none, nowhere = frozen(np.empty(0)), frozen(np.empty((0, 3)))
-    no = frozen(np.empty(0, np.bool_))
-    turning = TurningEvents(frozen(np.empty(0, np.int64)), no, nowhere, none, none)
+    none, nowhere, no = np.empty(0), np.empty((0, 3)), np.empty(0, np.bool_)
     empty = (EventBatch.empty(), none, none, none, none)
-    return LogoResult(*empty, math.nan, parameters.pad_px, nowhere, nowhere, no, turning, *(math.nan,) * 3)
+    return LogoResult(
+        *empty, math.nan, parameters.pad_px, nowhere, nowhere, no, TurningEvents.empty(), *(math.nan,) * 3
+    )
 
 
 def step(
@@ -159,19 +158,17 @@ def step(
     of_outline = _of_outline(x, y, events.on, ball)
     rows, own = np.flatnonzero(inside), np.flatnonzero(~of_outline)
     return LogoResult(
-        events=EventBatch(*(frozen(column[rows]) for column in events.columns)),
-        centre_x_px=frozen(centre_x[rows]),
-        centre_y_px=frozen(centre_y[rows]),
-        x_px=frozen(x[rows]),
-        y_px=frozen(y[rows]),
+        events=events[rows],
+        centre_x_px=centre_x[rows],
+        centre_y_px=centre_y[rows],
+        x_px=x[rows],
+        y_px=y[rows],
         radius_px=radius_px,
         pad_px=pad_px,
-        points_m=frozen(points[rows]),
-        normals=frozen(normals[rows]),
-        of_outline=frozen(of_outline[rows]),
-        turning=TurningEvents(
-            *(frozen(column[own]) for column in (events.t_us, events.on, normals, centre_x, centre_y))
-        ),
+        points_m=points[rows],
+        normals=normals[rows],
+        of_outline=of_outline[rows],
+        turning=TurningEvents(events.t_us, events.on, normals, centre_x, centre_y)[own],
         position_std_px=math.sqrt(0.5 * (ball.covariance[0, 0] + ball.covariance[1, 1])),
         radius_std_px=math.sqrt(ball.covariance[4, 4]),
         velocity_std_px_s=math.sqrt(0.5 * (ball.covariance[2, 2] + ball.covariance[3, 3])),

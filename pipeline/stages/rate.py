@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..kernels.rate import autocorrelation, falling_crossings, low_passed, moving_average, shortest_period
 from ..parameters import ParameterGroup, choice, tunable
-from ..results import Packet, frozen
+from ..results import Packet, ReadOnlyArrays
 from ..stage import Context, Stage
 from .logo import LogoResult
 
@@ -36,7 +36,7 @@ class RateParameters(ParameterGroup):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RateResult:
+class RateResult(ReadOnlyArrays):
     """The event rate of the present shot so far (the last window of it).
 
     Attributes
@@ -120,9 +120,9 @@ def _without_period(
 ) -> RateResult:
     """A result without a period, with the curves as far as they go."""
     ema_hz = moving_average(rate_hz, _ema_weight(parameters))
-    nothing = frozen(np.zeros(rate_hz.size))
+    nothing = np.zeros(rate_hz.size)
     return RateResult(
-        frozen(t_us), frozen(rate_hz), frozen(ema_hz), nothing, parameters.low_pass_hz, frozen(np.empty(0)), None,
+        t_us, rate_hz, ema_hz, nothing, parameters.low_pass_hz, np.empty(0), None,
         None, reason,
     )  # fmt: skip
 
@@ -154,7 +154,7 @@ def _with_period(
     crossings_us = t_us[0] + (falling_crossings(smooth_hz) + 0.5) * parameters.bin_us
     spin_rps, spin_std_rps, reason = _spin(crossings_us, repeats, parameters, max_spin_rps)
     return RateResult(
-        frozen(t_us), frozen(rate_hz), frozen(ema_hz), frozen(smooth_hz), cutoff_hz, frozen(crossings_us), spin_rps,
+        t_us, rate_hz, ema_hz, smooth_hz, cutoff_hz, crossings_us, spin_rps,
         spin_std_rps, reason,
     )  # fmt: skip
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..events import EventBatch
 from ..kernels import eros, isolated, surfaces
 from ..parameters import ParameterGroup, choice, tunable
-from ..results import Packet, frozen
+from ..results import Packet, ReadOnlyArrays
 from ..stage import Context, Stage
 from .filter import FilterResult
 
@@ -34,7 +34,7 @@ class SurfaceParameters(ParameterGroup):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SurfaceResult:
+class SurfaceResult(ReadOnlyArrays):
     """The surface at the end of the tick.
 
     Attributes
@@ -120,7 +120,7 @@ def start(parameters: SurfaceParameters, context: Context) -> Surface:
 
 def step(parameters: SurfaceParameters, state: Surface, packet: Packet, filtered: FilterResult) -> SurfaceResult:
     """Draw the tick's filtered events and read the surface at its end."""
-    return SurfaceResult(frozen(state.update(packet, filtered.surface_events)), parameters.cleaning)
+    return SurfaceResult(state.update(packet, filtered.surface_events), parameters.cleaning)
 
 
 STAGE = Stage(

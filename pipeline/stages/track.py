@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..errors import ParameterError
 from ..events import EventBatch
 from ..parameters import ParameterGroup, choice, tunable
-from ..results import Circle, Packet, frozen
+from ..results import Circle, Packet, ReadOnlyArrays
 from ..stage import Context, Stage
 from .filter import FilterResult
 from .surface import SurfaceResult
@@ -54,7 +54,7 @@ class TrackParameters(ParameterGroup):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BallTrack:
+class BallTrack(ReadOnlyArrays):
     """One ball at the end of the tick, as a robot would have had it.
 
     Attributes
@@ -88,7 +88,7 @@ class BallTrack:
         return self.mean[0] + self.mean[2] * dt_s, self.mean[1] + self.mean[3] * dt_s
 
 
-NO_STATE, NO_COVARIANCE = frozen(np.full(5, np.nan)), frozen(np.full((5, 5), np.nan))
+NO_STATE, NO_COVARIANCE = np.full(5, np.nan), np.full((5, 5), np.nan)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -409,7 +409,7 @@ def _ball(
     measured: Circle | None = None,
 ) -> TrackResult:
     t_us = packet.end_us - parameters.latency_us
-    ball = BallTrack(shot, t_us, parameters.latency_us, frozen(mean), frozen(covariance), measured)
+    ball = BallTrack(shot, t_us, parameters.latency_us, mean, covariance, measured)
     return TrackResult(status, None, t_us, (ball,), hough)
 
 

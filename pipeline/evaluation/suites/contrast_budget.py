@@ -10,7 +10,7 @@ import numpy as np
 
 from ...chain import Chain, EventsInMemory
 from ...registry import STAGES, Parameters
-from ...results import MethodResult, SpinEstimate, frozen
+from ...results import MethodResult, SpinEstimate
 from ...simulator import Scene, SensorModel, SimulatedRecording, flight, human_shot, simulate_scene, spinner, thrown
 from ...stages.track import BallTrack
 from ..estimation import spin_errors
@@ -95,7 +95,7 @@ def _last_estimate(case: str, recording: SimulatedRecording, parameters: Paramet
         if ball is None:
             continue
         if case == CASES[1]:
-            known = SpinEstimate("normal_flow", frozen(truth.spin_rps[0].copy()), np.eye(3), None)
+            known = SpinEstimate("normal_flow", truth.spin_rps[0].copy(), np.eye(3), None)
             normal_flow = MethodResult(known)
         elif case != CASES[0]:
             late = case == CASES[2]
@@ -116,7 +116,7 @@ def _true_ball(ball: BallTrack, end_us: int, recording: SimulatedRecording, late
     )
     mean = np.array([*now[:2], *((now[:2] - before[:2]) / 5e-3), now[2]])
     covariance = np.diag([1e-4, 1e-4, 1.0, 1.0, 1e-4])
-    return replace(ball, t_us=t_us, latency_us=latency_us, mean=frozen(mean), covariance=frozen(covariance))
+    return replace(ball, t_us=t_us, latency_us=latency_us, mean=mean, covariance=covariance)
 
 
 def tables(rows: Sequence[Row]) -> list[ResultTable]:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...parameters import ParameterGroup, switch, tunable
-from ...results import MethodResult, Packet, SpinEstimate, frozen
+from ...results import MethodResult, Packet, ReadOnlyArrays, SpinEstimate
 from ...stage import Context, SpinMethod
 from ...stages.logo import LogoResult
 from ...stages.track import BallTrack
@@ -81,7 +81,7 @@ class ContrastParameters(ParameterGroup):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ContrastResult:
+class ContrastResult(ReadOnlyArrays):
     """The estimate from the present shot so far, and what it rests on.
 
     Attributes
@@ -332,7 +332,7 @@ def _result(
     answer = state.answer
     if answer is None or answer.spin_rps is None or answer.covariance_rps2 is None:
         return _nothing(SpinEstimate.refused(METHOD, state.reason or "no estimate yet", count))
-    estimate = SpinEstimate(METHOD, frozen(answer.spin_rps.copy()), frozen(answer.covariance_rps2.copy()), None, count)
+    estimate = SpinEstimate(METHOD, answer.spin_rps.copy(), answer.covariance_rps2.copy(), None, count)
     if state.reason is not None:
         # Where nothing turns, the normal flow has seen no pattern either, but noise.
         against = FLOW_METHOD if answer.contrast < parameters.min_gain else None
@@ -343,25 +343,25 @@ def _result(
     half_us = 0.5e6 * answer.span_s
     return ContrastResult(
         estimate,
-        frozen(answer.spin_rps.copy()),
-        frozen(answer.rivals_rps.copy()),
-        frozen(answer.margins.copy()),
+        answer.spin_rps.copy(),
+        answer.rivals_rps.copy(),
+        answer.margins.copy(),
         round(answer.reference_s * 1e6 - half_us),
         round(answer.reference_s * 1e6 + half_us),
         answer.reference_s * 1e6,
-        frozen(answer.offsets_px.copy()),
+        answer.offsets_px.copy(),
         answer.contrast,
         full,
-        *(frozen(column.copy()) for column in state.score_map),
+        *(column.copy() for column in state.score_map),
     )
 
 
 def _nothing(estimate: SpinEstimate) -> ContrastResult:
     """Nothing to see of a shot."""
-    curves = (frozen(column.copy()) for column in ScoreMap.empty())
-    none, no_spins = frozen(np.empty(0)), frozen(np.empty((0, 3)))
-    unknown = frozen(np.full(3, np.nan))
-    return ContrastResult(estimate, unknown, no_spins, none, 0, 0, math.nan, frozen(np.zeros(3)), 0.0, False, *curves)
+    curves = (column.copy() for column in ScoreMap.empty())
+    none, no_spins = np.empty(0), np.empty((0, 3))
+    unknown = np.full(3, np.nan)
+    return ContrastResult(estimate, unknown, no_spins, none, 0, 0, math.nan, np.zeros(3), 0.0, False, *curves)
 
 
 def is_trusted(estimates: Mapping[str, SpinEstimate]) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from operator import attrgetter
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from tests.reference.sphere import image_velocity
 from tests.spinning_ball import CAMERA, after_track, known_track, no_track, packets, spinning_ball
 
 SPIN_RPS = np.array([40.0, 5.0, -20.0])
-TRIPLETS = ("t_us", "x_px", "y_px", "points_m", "normals", "vx_px_s", "vy_px_s", "slice_index")
+TRIPLETS = ("events.t_us", "events.x_px", "events.points_m", "events.normals", "vx_px_s", "vy_px_s", "slice_index")
 FLIGHT = {"centre_m": (0.1, -0.2, 1.8), "velocity_m_s": (0.5, 6.0, -0.4)}
 
 
@@ -34,7 +35,8 @@ def flows(ticks: list, **parameters: object) -> list[FlowResult]:
 
 
 def column(results: list[FlowResult], name: str) -> np.ndarray:
-    return np.concatenate([getattr(result, name) for result in results])
+    """A column of all results, as `vx_px_s` or `normal_events.t_us`."""
+    return np.concatenate([attrgetter(name)(result) for result in results])
 
 
 @pytest.mark.parametrize("t_acc_us", [1700, 8000])
@@ -59,8 +61,8 @@ def test_slices_follow_each_other_from_the_shots_start_and_belong_to_the_tick_th
             here = flow.slice_index == number
             np.testing.assert_array_equal(flow.vx_px_s[here], vx[triplets > 0])
             np.testing.assert_array_equal(flow.vy_px_s[here], vy[triplets > 0])
-            np.testing.assert_array_equal(flow.t_us[here], t[own][triplets > 0])
-    assert column([result[2] for result in results], "t_us").size > 100
+            np.testing.assert_array_equal(flow.events.t_us[here], t[own][triplets > 0])
+    assert column([result[2] for result in results], "events.t_us").size > 100
 
 
 def test_a_slice_is_a_tenth_of_a_rotation() -> None:
@@ -75,13 +77,13 @@ def test_a_slice_is_a_tenth_of_a_rotation() -> None:
 def test_without_a_ball_there_is_no_flow() -> None:
     results = flows([(packet, no_track(packet.end_us)) for packet, _ in turning()])
     assert all(result.t_acc_us is None for result in results)
-    assert all(column(results, name).size == 0 for name in (*TRIPLETS, "normal_t_us", "normal_in_image"))
+    assert all(column(results, name).size == 0 for name in (*TRIPLETS, "normal_events.t_us", "normal_in_image"))
 
 
 @pytest.mark.parametrize("ticks", [turning, flying])
 def test_normal_flow_is_the_surfaces_velocity_across_the_edges(ticks: object) -> None:
     results = flows(ticks())
-    points, normals = column(results, "normal_points_m"), column(results, "normal_normals")
+    points, normals = column(results, "normal_events.points_m"), column(results, "normal_events.normals")
     true = image_velocity(points, normals, 2 * np.pi * SPIN_RPS, CAMERA.focal_px, 0.02)
     direction, speed = column(results, "normal_direction"), column(results, "normal_speed_px_s")
     ball = ~column(results, "normal_in_image")
@@ -99,7 +101,9 @@ def test_normal_flow_is_the_surfaces_velocity_across_the_edges(ticks: object) ->
 
 def test_triplet_flow_points_where_the_surface_moves() -> None:
     results = flows(turning())
-    true = image_velocity(column(results, "points_m"), column(results, "normals"), 2 * np.pi * SPIN_RPS, 1646.09, 0.02)
+    true = image_velocity(
+        column(results, "events.points_m"), column(results, "events.normals"), 2 * np.pi * SPIN_RPS, 1646.09, 0.02
+    )
     flow = np.stack([column(results, "vx_px_s"), column(results, "vy_px_s")], axis=1)
     cosine = np.sum(true * flow, axis=1) / np.linalg.norm(true, axis=1) / np.linalg.norm(flow, axis=1)
     assert np.median(cosine) > 0.9
@@ -110,8 +114,8 @@ def test_normal_flow_comes_when_its_neighbours_are_known_and_only_once() -> None
     ticks = turning()
     for (packet, _), result in zip(ticks, flows(ticks), strict=True):
         assert result.t_acc_us is not None
-        assert np.all(result.normal_t_us < packet.end_us - 0.6 * result.t_acc_us)
-    t = column(flows(ticks), "normal_t_us")
+        assert np.all(result.normal_events.t_us < packet.end_us - 0.6 * result.t_acc_us)
+    t = column(flows(ticks), "normal_events.t_us")
     assert np.all(np.diff(t) >= 0)
-    x, y = (column(flows(ticks), name) for name in ("normal_x_px", "normal_y_px"))
+    x, y = (column(flows(ticks), name) for name in ("normal_events.x_px", "normal_events.y_px"))
     assert len({*zip(t, x, y, strict=True)}) == t.size

@@ -20,7 +20,7 @@ from spinscope.pipeline.registry import trusted_method
 from spinscope.pipeline.results import SpinEstimate
 from spinscope.pipeline.spin.parameters import SpinParameters
 from spinscope.pipeline.spin.triplet import TripletSpin
-from spinscope.pipeline.stages.flow import FlowResult
+from spinscope.pipeline.stages.flow import FlowEvents, FlowResult
 from spinscope.pipeline.stages.rate import RateResult
 from tests.reference.sphere import image_velocity
 from tests.spinning_ball import (
@@ -146,28 +146,11 @@ def perfect_flow(seed: int, spin_rad_s: np.ndarray) -> FlowResult:
     e = e[e @ centre / np.linalg.norm(centre) < -0.4]
     points = centre + 0.02 * e
     u = image_velocity(points, e, spin_rad_s, CAMERA.focal_px, 0.02)
-    n, none = len(e), np.empty(0)
-    return FlowResult(
-        t_acc_us=2000,
-        speed_bound_px_s=1e5,
-        radius_px=17.0,
-        t_us=np.arange(n),
-        x_px=np.zeros(n),
-        y_px=np.zeros(n),
-        points_m=points,
-        normals=e,
-        vx_px_s=u[:, 0].copy(),
-        vy_px_s=u[:, 1].copy(),
-        slice_index=np.arange(n) * 5 // n,
-        normal_t_us=np.empty(0, np.int64),
-        normal_x_px=none,
-        normal_y_px=none,
-        normal_points_m=np.empty((0, 3)),
-        normal_normals=np.empty((0, 3)),
-        normal_direction=np.empty((0, 2)),
-        normal_speed_px_s=none,
-        normal_in_image=np.empty(0, np.bool_),
-    )
+    n = len(e)
+    none = np.empty(0)
+    events = FlowEvents(np.arange(n), np.zeros(n), np.zeros(n), np.ones(n, np.bool_), points, e, *np.zeros((3, n)))
+    no_normal_flow = FlowEvents.empty(), np.empty((0, 2)), none, np.empty(0, np.bool_)
+    return FlowResult(2000, 1e5, 17.0, events, u[:, 0].copy(), u[:, 1].copy(), np.arange(n) * 5 // n, *no_normal_flow)
 
 
 def triplet(flow: FlowResult, solve: str) -> np.ndarray:
@@ -186,7 +169,9 @@ def test_full_rank_finds_any_spin_exactly_and_the_paper_loses_what_lies_along_e_
     flow = perfect_flow(seed, 2 * np.pi * spin_rps)
     np.testing.assert_allclose(triplet(flow, "least_squares"), spin_rps, atol=1e-6)
     kept = [
-        np.mean([(np.eye(3) - np.outer(e, e)) @ spin_rps for e in flow.normals[flow.slice_index == number]], axis=0)
+        np.mean(
+            [(np.eye(3) - np.outer(e, e)) @ spin_rps for e in flow.events.normals[flow.slice_index == number]], axis=0
+        )
         for number in range(5)
     ]
     np.testing.assert_allclose(triplet(flow, "paper"), np.mean(kept, axis=0), atol=1e-6)
@@ -212,11 +197,11 @@ def test_the_event_rate_gives_the_magnitude_where_it_has_a_rhythm() -> None:
 
 def test_full_rank_needs_more_than_one_side() -> None:
     flow = perfect_flow(0, np.array([200.0, 100.0, 50.0]))
-    near = np.zeros(len(flow.normals), np.bool_)
-    near[np.argsort(flow.normals @ flow.normals[0])[-3:]] = True
-    columns = ("t_us", "x_px", "y_px", "points_m", "normals", "vx_px_s", "vy_px_s", "slice_index")
-    one_side = dataclasses.replace(flow, **{name: getattr(flow, name)[near] for name in columns})
-    one_side.normals[:] = flow.normals[0]
+    near = np.zeros(len(flow.events.normals), np.bool_)
+    near[np.argsort(flow.events.normals @ flow.events.normals[0])[-3:]] = True
+    columns = {name: getattr(flow, name)[near] for name in ("events", "vx_px_s", "vy_px_s", "slice_index")}
+    columns["events"] = dataclasses.replace(columns["events"], normals=np.tile(flow.events.normals[0], (3, 1)))
+    one_side = dataclasses.replace(flow, **columns)
     method = TripletSpin(SpinParameters(triplet_solve="least_squares"), CONTEXT)
     assert "one side" in (method.estimate(10_000, one_side, SILENT).reason or "")
 
