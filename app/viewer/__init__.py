@@ -28,7 +28,7 @@ def save(
     layout : which tab is in front (LAYOUTS)
     Raises RecordingError when the file cannot be written.
     """
-    from .recorded import write_rrd
+    from .rrd import write_rrd
     from .run import ViewedRun
 
     write_rrd(ViewedRun.of(result), path, layout)

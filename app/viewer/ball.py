@@ -1,4 +1,4 @@
-"""The ball in space: turning with its spin, arrows, path."""
+"""Drawing of the ball in space: its attitude, spin arrows, flight path."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from . import entities as at
+from .ball_projections import sphere
 from .rerun_api import Chunk, columns_at, once, styled
 from .run import ViewedRun, shot_starts, shown_estimate, vector_of
-from .still import sphere
 
 Floats = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ RING_RADII, RING_POINTS = 1.18, 51  # of the ring that shows which way the ball 
 
 
 def ball_chunks(run: ViewedRun) -> list[Chunk]:
-    """Everything in space but the paint on the ball."""
+    """Everything in space but the logo on the ball."""
     chunks = [_mesh(run), *_motion(run), *_arrows(run), *_ring(run), *_path(run), *_axes(run)]
     return [once(at.WORLD, rr.ViewCoordinates.RDF), *chunks]
 
@@ -49,7 +49,7 @@ def _mesh(run: ViewedRun) -> Chunk:
 
 
 def _motion(run: ViewedRun) -> list[Chunk]:
-    """Place and attitude of the ball between the ticks: carried on from the last tick, as a robot would have it."""
+    """Place and attitude of the ball between the ticks, extrapolated from the last tick as a robot would have it."""
     times, places, quaternions = [], [], []
     for index, (tick, start_us) in enumerate(zip(run.ticks, shot_starts(run), strict=True)):
         if start_us is None:
@@ -73,7 +73,7 @@ def _motion(run: ViewedRun) -> list[Chunk]:
 
 
 def _turned_by(spin_rps: Floats, seconds: Floats) -> Floats:
-    """(n, 4) the attitude after these times (n,) as quaternions x, y, z, w."""
+    """Attitude (n, 4) after these times (n,), as quaternions x, y, z, w."""
     magnitude = float(np.linalg.norm(spin_rps))
     half = np.pi * magnitude * seconds
     axis = spin_rps / magnitude if magnitude else np.array([0.0, 0.0, 1.0])
@@ -81,11 +81,11 @@ def _turned_by(spin_rps: Floats, seconds: Floats) -> Floats:
 
 
 def _arrows(run: ViewedRun) -> list[Chunk]:
-    """A thin arrow a method, out of the ball's surface along its axis, and the truth's; the shown one thick."""
+    """Arrows out of the ball's surface along the axis: thin for every method and the truth, thick for the shown one."""
     chunks: list[Chunk] = []
     for method in run.methods:
-        vectors = [vector_of(tick.estimates[method]) for tick in run.ticks]
-        chunks += _arrow(run, f"{at.SPIN_ARROWS}/{method}", vectors, at.method_colour(method), 0.025)
+        vectors = [vector_of(tick.estimates[method.name]) for tick in run.ticks]
+        chunks += _arrow(run, f"{at.SPIN_ARROWS}/{method.name}", vectors, method.colour, 0.025)
     if run.true_spins_rps is not None:
         spins = np.nan_to_num(run.true_spins_rps) * run.has_ball[:, None]
         chunks += _arrow(run, f"{at.SPIN_ARROWS}/truth", list(spins), at.TRUTH_COLOUR, 0.02)
@@ -108,7 +108,7 @@ def _arrow(run: ViewedRun, entity: str, vectors: list[Floats], colour: at.Colour
 
 
 def _ring(run: ViewedRun) -> list[Chunk]:
-    """Most of a circle around the shown axis, ending in an arrow: which way the ball turns."""
+    """Most of a circle around the shown axis, ending in an arrow that shows which way the ball turns."""
     spins = np.array([vector_of(shown_estimate(tick)[0]) for tick in run.ticks])
     magnitudes = np.linalg.norm(spins, axis=1)
     shown = run.has_ball & (magnitudes > 0)
@@ -125,9 +125,9 @@ def _ring(run: ViewedRun) -> list[Chunk]:
 
 
 def _around(axes: Floats) -> Floats:
-    """(n, RING_POINTS, 3) a line around each axis (n, 3) by the right-hand rule, its tip where the viewer looks.
+    """Lines (n, RING_POINTS, 3) around each axis (n, 3) by the right-hand rule, in radii of the ball.
 
-    In radii of the ball.
+    Their tips are on the side from which the viewer looks.
     """
     viewers = np.where(np.abs(axes @ EYE)[:, None] < 0.95, EYE, [1.0, 0.0, 0.0])
     sides = viewers - (viewers * axes).sum(axis=1, keepdims=True) * axes
@@ -138,7 +138,7 @@ def _around(axes: Floats) -> Floats:
 
 
 def _path(run: ViewedRun) -> list[Chunk]:
-    """The way flown so far, a piece a tick (the view shows all pieces up to the playhead); the truth dashed."""
+    """Flight path so far, a piece a tick (the view shows all pieces up to the playhead); the truth dashed."""
     chunks = [styled(at.PATH, rr.LineStrips3D, colors=at.PATH_COLOUR, radii=-2.0)]
     if run.fixed or not run.has_ball.any():
         return chunks
@@ -156,7 +156,7 @@ def _path(run: ViewedRun) -> list[Chunk]:
 
 
 def _axes(run: ViewedRun) -> list[Chunk]:
-    """The camera frame's directions, 0.1 m long, beside the path."""
+    """Axes of the camera frame, 0.1 m long, beside the path."""
     low, high = path_bounds_m(run)
     corner = np.array([low[0] - 0.25, (low[1] + high[1]) / 2, high[2]])
     arrows = rr.Arrows3D(

@@ -1,6 +1,8 @@
-"""Where everything stands in the viewer, and in which colour: one place for both."""
+"""Entity paths of the viewer, and the colours of what stands there."""
 
 from __future__ import annotations
+
+import colorsys
 
 Colour = tuple[int, int, int]
 
@@ -24,24 +26,22 @@ LOGO_OUTLINE = "/image/ball/outline"
 LOGO_MASK = "/image/ball/mask"
 FLOW = "/image/ball/flow"
 FLOW_WHEEL = "/image/ball/wheel"
-STILL_LOGO = "/still_logo"
+DEROTATED_LOGO = "/derotated_logo"
 UNROLLED = "/unrolled"
 GRATICULE = "/unrolled/graticule"
 # The score of contrast, over magnitudes and over directions of the axis.
 SCORE_MAGNITUDE = "/score"
 SCORE_AXES = "/score_axes"
 
-# Plots.
+# Over time.
 STATUS = "/tracker"
-QUANTITIES = ("x", "y", "vx", "vy", "radius")
-UNITS = ("px", "px", "px/s", "px/s", "px")
 PLOT = "/plots"
 RESIDUAL = "/plots/residual"
 EVENT_COUNT = "/plots/events"
 RATE = "/plots/rate"
-RHYTHM = "/plots/rhythm"
+RATE_CROSSINGS = "/plots/rate_crossings"
 SPIN_MAGNITUDE = "/plots/spin"
-SPIN_PARTS = "/plots/spin_parts"
+SPIN_COMPONENTS = "/plots/spin_components"
 AXIS_ERROR = "/plots/axis_error"
 
 # Space: the camera frame, metres.
@@ -57,9 +57,10 @@ SPIN_SHOWN = "/world/ball/shown"
 SPIN_RING = "/world/ball/ring"
 RING_TIP = "/world/ball/ring/tip"
 
-# Words.
+# Text.
 SUMMARY = "/summary"
 COACH = "/coach"
+COMPARISON = "/compare"
 
 ON: Colour = (239, 83, 80)
 OFF: Colour = (66, 145, 245)
@@ -72,13 +73,8 @@ TRUTH_COLOUR: Colour = (214, 120, 255)
 MASK_COLOUR: Colour = (130, 140, 150)
 PATH_COLOUR: Colour = (76, 217, 100)
 RING_COLOUR: Colour = (255, 213, 79)
-BACKGROUND: Colour = (16, 16, 16)
-METHOD_COLOURS: dict[str, Colour] = {
-    "triplet": (255, 167, 38),
-    "normal_flow": (38, 198, 218),
-    "contrast": (236, 64, 122),
-}
 RATE_COLOUR: Colour = (174, 213, 129)
+BACKGROUND: Colour = (16, 16, 16)
 STATUS_COLOURS: dict[str, Colour] = {
     "searching": (96, 105, 115),
     "starting": (255, 202, 40),
@@ -93,8 +89,11 @@ EVENT_CLASSES: tuple[tuple[str, Colour], ...] = (
     ("OFF", OFF),
     ("ON", ON),
 )
+HUES_DEG = {"red": 0, "orange": 33, "yellow": 50, "yellow-green": 90, "green": 125, "cyan": 187, "blue": 215}
+HUES_DEG |= {"violet": 282, "pink": 335}
 
 
-def method_colour(method: str) -> Colour:
-    """The colour of a method's estimates everywhere."""
-    return METHOD_COLOURS.get(method, (200, 200, 200))
+def colour_name(colour: Colour) -> str:
+    """Name of a colour for captions, by its hue."""
+    hue_deg = 360 * colorsys.rgb_to_hsv(*colour)[0]
+    return min(HUES_DEG, key=lambda name: abs((HUES_DEG[name] - hue_deg + 180) % 360 - 180))

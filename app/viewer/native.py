@@ -11,8 +11,8 @@ from spinscope.pipeline.errors import SpinscopeError
 
 from ..terminal import note
 from . import require_display
-from .recorded import write_rrd
 from .rerun_api import place_playhead, program, quiet_environment
+from .rrd import write_rrd
 from .run import ViewedRun
 from .web import HOST, free_ports
 

@@ -1,8 +1,10 @@
-"""The plots: the Kalman state, the event rate and its rhythm, the spin; each over time."""
+"""Plots of the tracker's state, of event rates and of the spin."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,87 +12,33 @@ from numpy.typing import NDArray
 from spinscope.pipeline.results import Circle
 
 from . import entities as at
-from .rerun_api import Chunk, band, line, points
+from .curves import Curve, Plot, Range
 from .run import ViewedRun
 
 Floats = NDArray[np.float64]
 
 
-def state_plots(run: ViewedRun) -> list[Chunk]:
-    """The Kalman state with its band, and what was measured as dots."""
-    chunks: list[Chunk] = []
-    for i, (name, unit) in enumerate(zip(at.QUANTITIES, at.UNITS, strict=True)):
-        values, variances = from_start(run.means[:, i]), from_start(run.variances[:, i])
-        entity = f"{at.PLOT}/{name}"
-        chunks += band(
-            f"{entity}/kalman", run.times_us, values, np.nan_to_num(variances), "Kalman ± 1σ", unit, at.KALMAN_COLOUR
-        )  # fmt: skip
-        if name in ("x", "y", "radius"):
-            field = f"{name}_px"
-            hough = from_start([_measured(tick.track.hough, field, tick.track.has_ball) for tick in run.ticks])
-            refined = from_start([_measured(tick.track.measured, field, True) for tick in run.ticks])
-            chunks += points(f"{entity}/hough", run.times_us, hough, f"Hough [{unit}]", at.HOUGH_COLOUR, "circle", 2.5)
-            chunks += points(f"{entity}/measured", run.times_us, refined, f"refined [{unit}]", at.MEASURED_COLOUR)
-        if run.truth is not None:
-            truth = from_start(true_state(run)[:, i])
-            chunks += line(f"{entity}/truth", run.times_us, truth, f"truth [{unit}]", at.TRUTH_COLOUR, 0.8)
-    return chunks
+@dataclass(frozen=True)
+class StateComponent:
+    """Component of the tracker's state; `circle` names the same quantity of a measured circle, where it has it."""
+
+    name: str
+    label: str
+    unit: str
+    circle: str | None = None
 
 
-def residual_plots(run: ViewedRun) -> list[Chunk]:
-    """What was measured, and the truth, less the Kalman filter's value, in its band around zero."""
-    chunks: list[Chunk] = []
-    for i, name in ((0, "x"), (1, "y"), (4, "radius")):
-        entity, mean = f"{at.RESIDUAL}/{name}", run.means[:, i]
-        zero = from_start(np.where(run.has_ball, 0.0, np.nan))
-        variances = np.nan_to_num(from_start(run.variances[:, i]))
-        chunks += band(f"{entity}/kalman", run.times_us, zero, variances, "Kalman ± 1σ", "px", at.KALMAN_COLOUR)
-        refined = [_measured(tick.track.measured, f"{name}_px", True) for tick in run.ticks] - mean
-        chunks += points(f"{entity}/measured", run.times_us, from_start(refined), "refined [px]", at.MEASURED_COLOUR)
-        if run.truth is not None:
-            truth = from_start(true_state(run)[:, i] - mean)
-            chunks += line(f"{entity}/truth", run.times_us, truth, "truth [px]", at.TRUTH_COLOUR, 1.0)
-    return chunks
-
-
-def rate_chunks(run: ViewedRun) -> list[Chunk]:
-    """Histogram of the event rate with its moving average, and the rhythm with its falling zero crossings."""
-    t_us, curves, crossings_us = _rate_curves(run)
-    zeros = np.where(np.isfinite(crossings_us), 0.0, np.nan)
-    times = np.nan_to_num(crossings_us, nan=run.start_us)
-    return [
-        *line(f"{at.RATE}/histogram", t_us, curves[:, 0], "event rate [kev/s]", at.MASK_COLOUR, 1.0, steps=True),
-        *line(f"{at.RATE}/ema", t_us, curves[:, 1], "moving average [kev/s]", at.HOUGH_COLOUR, 2.0),
-        *line(f"{at.RHYTHM}/smooth", t_us, curves[:, 2], "less mean, low-passed [kev/s]", at.RATE_COLOUR, 2.0),
-        *points(f"{at.RHYTHM}/crossings", times, zeros, "falls through zero", at.ON, "down", 5.0),
-    ]
-
-
-def spin_chunks(run: ViewedRun) -> list[Chunk]:
-    """Plots of each method's magnitude with its +-1 sigma, of the trusted vector, and of the axes' errors."""
-    chunks: list[Chunk] = []
-    for method in run.methods:
-        estimates = [tick.estimates[method] for tick in run.ticks]
-        values = from_start([_number(e.magnitude_rps) for e in estimates])
-        stds = from_start([_number(e.magnitude_std_rps) for e in estimates])
-        entity, colour = f"{at.SPIN_MAGNITUDE}/{method}", at.method_colour(method)
-        chunks += band(entity, run.times_us, values, np.nan_to_num(stds) ** 2, method, "rps", colour)
-    rhythm = from_start([_number(tick.rate.spin_rps) for tick in run.ticks])
-    chunks += line(f"{at.SPIN_MAGNITUDE}/rate", run.times_us, rhythm, "rhythm of the event rate", at.RATE_COLOUR)
-    vectors = np.full((len(run.ticks), 3), np.nan)
-    for i, tick in enumerate(run.ticks):
-        if tick.best is not None:
-            vectors[i] = tick.estimates[tick.best].vector_rps
-    for i, (axis, colour) in enumerate(zip("xyz", (at.ON, at.KALMAN_COLOUR, at.OFF), strict=True)):
-        values = from_start(vectors[:, i])
-        chunks += line(f"{at.SPIN_PARTS}/{axis}", run.times_us, values, f"{axis} [rps]", colour, 2.0)
-    if run.true_spins_rps is not None:
-        chunks += _true_spin(run, run.true_spins_rps)
-    return chunks
+STATE = (
+    StateComponent("x", "x", "px", "x_px"),
+    StateComponent("y", "y", "px", "y_px"),
+    StateComponent("vx", "Velocity x", "px/s"),
+    StateComponent("vy", "Velocity y", "px/s"),
+    StateComponent("radius", "Radius", "px", "radius_px"),
+)
 
 
 def true_state(run: ViewedRun) -> Floats:
-    """(n, 5) the truth behind the Kalman states, at the scene's time."""
+    """True Kalman states (n, 5) at the ticks' scene times; NaN where the truth does not reach."""
     assert run.truth is not None
     t_us = np.array([tick.track.t_us for tick in run.ticks])
     truth, seconds = run.truth, run.truth.t_us * 1e-6
@@ -98,28 +46,75 @@ def true_state(run: ViewedRun) -> Floats:
     return run.true_values(t_us, np.column_stack([*columns, truth.radius_px]))
 
 
-def _number(value: float | None) -> float:
-    return float("nan") if value is None else value
+def _state_curves(index: int, run: ViewedRun) -> list[Curve]:
+    """Kalman value with its band, measured circles as dots, truth."""
+    component = STATE[index]
+    means, variances, unit = run.means[:, index], run.variances[:, index], component.unit
+    curves = [_kalman(means, variances, unit)]
+    if component.circle is not None:
+        hough = _measured([tick.track.hough if tick.track.has_ball else None for tick in run.ticks], component.circle)
+        curves.append(Curve("hough", f"Hough [{unit}]", at.HOUGH_COLOUR, hough, marker="circle", width=2.5))
+        curves.append(_refined(run, component.circle))
+    if run.truth is not None:
+        truth = true_state(run)[:, index]
+        curves.append(_truth(truth, f"truth [{unit}]", is_in_range=False))
+    return curves
 
 
-def from_start(values: Sequence[float] | Floats) -> Floats:
-    """A column of ticks with the row before it, in which nothing is known."""
-    return np.concatenate([[np.nan], np.asarray(values, np.float64)])
+def _residual_curves(index: int, run: ViewedRun) -> list[Curve]:
+    """Measured circles and truth minus the Kalman value, in its band around zero."""
+    mean, zero = run.means[:, index], np.where(run.has_ball, 0.0, np.nan)
+    curves = [_kalman(zero, run.variances[:, index], "px")]
+    circle = STATE[index].circle
+    assert circle is not None
+    curves.append(_refined(run, circle, minus=mean))
+    if run.truth is not None:
+        curves.append(_truth(true_state(run)[:, index] - mean, "truth [px]", width=1.0))
+    return curves
 
 
-def _measured(circle: Circle | None, field: str, shown: bool) -> float:
-    return getattr(circle, field) if circle is not None and shown else float("nan")
+def _event_curves(run: ViewedRun) -> list[Curve]:
+    """Events per second, all and those that the filters keep."""
+    rows = zip(run.ticks, run.results("filter"), strict=True)
+    counts = [(len(t.packet.events), len(kept.surface_events), len(kept.logo_events)) for t, kept in rows]
+    rates = np.array(counts) / (np.diff(run.times_us) * 1e-6)[:, None] / 1e6
+    labels = ("all", "after the surface's filter", "after the logo's filter")
+    colours = (at.TRUTH_COLOUR, at.KALMAN_COLOUR, at.MEASURED_COLOUR)
+    columns = enumerate(zip(labels, colours, rates.T, strict=True))
+    return [Curve(str(i), label, colour, rate) for i, (label, colour, rate) in columns]
 
 
-def _rate_curves(run: ViewedRun) -> tuple[NDArray[np.int64], Floats, Floats]:
-    """(n,) times, (n, 3) histogram, moving average and rhythm in 1000 events/s, (m,) crossings in us.
+def _rate_curves(run: ViewedRun) -> list[Curve]:
+    """Histogram of the logo's event rate with its moving average."""
+    t_us, curves, _ = _rates(run)
+    histogram, average = curves[:, 0], curves[:, 1]
+    return [
+        Curve("histogram", "event rate [kev/s]", at.MASK_COLOUR, histogram, t_us=t_us, width=1.0, is_stepped=True),
+        Curve("ema", "moving average [kev/s]", at.HOUGH_COLOUR, average, t_us=t_us, width=2.0),
+    ]
 
-    Every tick tells the whole shot anew (its window's part): of each bin the latest word counts. A row of NaN
-    leads, and parts the shots.
+
+def _crossing_curves(run: ViewedRun) -> list[Curve]:
+    """The event rate less its mean, low-passed, and its falling zero crossings."""
+    t_us, curves, crossings_us = _rates(run)
+    zeros = np.where(np.isfinite(crossings_us), 0.0, np.nan)
+    times = np.nan_to_num(crossings_us, nan=run.start_us)
+    smooth = curves[:, 2]
+    return [
+        Curve("smooth", "minus mean, low-passed [kev/s]", at.RATE_COLOUR, smooth, t_us=t_us, width=2.0),
+        Curve("crossings", "falling zero crossings", at.ON, zeros, t_us=times, marker="down", width=5.0),
+    ]
+
+
+def _rates(run: ViewedRun) -> tuple[NDArray[np.int64], Floats, Floats]:
+    """(n,) times, (n, 3) histogram, moving average and low-passed rate in 1000 events/s, (m,) crossings in us.
+
+    The result of every tick covers the shot so far (its window's part): for each bin the latest result counts. A row
+    of NaN leads, and separates the shots.
     """
     times, curves, crossings = [], [], []
     covered_us = np.inf
-    for rate in (tick.rate for tick in reversed(run.ticks)):
+    for rate in reversed(run.results("rate")):
         if not rate.t_us.size or rate.t_us[0] >= covered_us:
             continue
         new = rate.t_us < covered_us
@@ -141,15 +136,107 @@ def _rate_curves(run: ViewedRun) -> tuple[NDArray[np.int64], Floats, Floats]:
     return np.concatenate(times[::-1]), np.concatenate(curves[::-1]), found if found.size else np.array([np.nan])
 
 
-def _true_spin(run: ViewedRun, spin: Floats) -> list[Chunk]:
-    magnitude = np.linalg.norm(spin, axis=1)
-    chunks = line(f"{at.SPIN_MAGNITUDE}/truth", run.times_us, from_start(magnitude), "truth", at.TRUTH_COLOUR, 0.8)
+def _magnitude_curves(run: ViewedRun) -> list[Curve]:
+    """Each method's magnitude with its band, that of the event rate, and the truth."""
+    curves = []
     for method in run.methods:
-        errors = np.full(len(run.ticks), np.nan)
-        for i, tick in enumerate(run.ticks):
-            axis = tick.estimates[method].axis
-            if axis is not None:
-                errors[i] = np.degrees(np.arccos(np.clip(axis @ spin[i] / magnitude[i], -1, 1)))
-        entity, colour = f"{at.AXIS_ERROR}/{method}", at.method_colour(method)
-        chunks += line(entity, run.times_us, from_start(errors), f"{method} [°]", colour)
-    return chunks
+        estimates = [tick.estimates[method.name] for tick in run.ticks]
+        stds = _numbers([estimate.magnitude_std_rps for estimate in estimates])
+        values = _numbers([estimate.magnitude_rps for estimate in estimates])
+        curves.append(Curve(method.name, method.label, method.colour, values, variances=stds**2, unit="rps"))
+    if rates := run.results("rate"):
+        values = _numbers([rate.spin_rps for rate in rates])
+        curves.append(Curve("rate", "event rate's zero crossings", at.RATE_COLOUR, values))
+    if run.true_spins_rps is not None:
+        curves.append(_truth(np.linalg.norm(run.true_spins_rps, axis=1), "truth"))
+    return curves
+
+
+def _magnitude_range(run: ViewedRun) -> Range:
+    """From zero to beyond all but the highest magnitudes, and the truth."""
+    curves = {curve.name: np.asarray(curve.values) for curve in _magnitude_curves(run)}
+    truth = curves.pop("truth", np.empty(0))
+    known = np.concatenate([np.empty(0), *curves.values()])
+    known = known[np.isfinite(known)]
+    top = 1.2 * float(np.quantile(known, 0.95)) if known.size else 100.0
+    return 0.0, max(top, 1.2 * float(np.nan_to_num(truth).max(initial=0.0)))
+
+
+def _component_curves(run: ViewedRun) -> list[Curve]:
+    """x, y and z of the trusted estimate."""
+    vectors = np.full((len(run.ticks), 3), np.nan)
+    for row, tick in zip(vectors, run.ticks, strict=True):
+        if tick.best is not None:
+            row[:] = tick.estimates[tick.best].vector_rps
+    axes = zip("xyz", (at.ON, at.KALMAN_COLOUR, at.OFF), vectors.T, strict=True)
+    return [Curve(x, f"{x} [rps]", colour, values, width=2.0) for x, colour, values in axes]
+
+
+def _axis_error_curves(run: ViewedRun) -> list[Curve]:
+    """Angle between each method's axis and the true one."""
+    if run.true_spins_rps is None:
+        return []
+    true_axes = run.true_spins_rps / np.linalg.norm(run.true_spins_rps, axis=1, keepdims=True)
+    curves = []
+    for method in run.methods:
+        axes = [tick.estimates[method.name].axis for tick in run.ticks]
+        cosines = np.array(
+            [np.nan if axis is None else axis @ true for axis, true in zip(axes, true_axes, strict=True)]
+        )
+        errors_deg = np.degrees(np.arccos(np.clip(cosines, -1, 1)))
+        curves.append(Curve(method.name, f"{method.label} [°]", method.colour, errors_deg))
+    return curves
+
+
+def _kalman(values: Floats, variances: Floats, unit: str) -> Curve:
+    return Curve("kalman", "Kalman ± 1σ", at.KALMAN_COLOUR, values, variances=variances, unit=unit)
+
+
+def _refined(run: ViewedRun, circle: str, minus: Floats | float = 0.0) -> Curve:
+    values = _measured([tick.track.measured for tick in run.ticks], circle) - minus
+    return Curve("measured", "refined [px]", at.MEASURED_COLOUR, values, marker="circle", width=3.0)
+
+
+def _truth(values: Floats, label: str, width: float = 0.8, is_in_range: bool = True) -> Curve:
+    return Curve("truth", label, at.TRUTH_COLOUR, values, width=width, is_in_range=is_in_range)
+
+
+def _measured(circles: Sequence[Circle | None], name: str) -> Floats:
+    return np.array([np.nan if circle is None else getattr(circle, name) for circle in circles])
+
+
+def _numbers(values: Sequence[float | None]) -> Floats:
+    return np.array([np.nan if value is None else value for value in values])
+
+
+STATE_PLOTS = tuple(
+    Plot(entity=f"{at.PLOT}/{c.name}", title=f"{c.label} [{c.unit}]", curves=partial(_state_curves, i))
+    for i, c in enumerate(STATE)
+)
+RESIDUAL_PLOTS = tuple(
+    Plot(entity=f"{at.RESIDUAL}/{c.name}", title=f"{c.name} minus Kalman [px]", curves=partial(_residual_curves, i))
+    for i, c in enumerate(STATE)
+    if c.circle is not None
+)
+EVENT_PLOT = Plot(entity=at.EVENT_COUNT, title="Event rate [Mev/s]", curves=_event_curves, legend="top", with_zero=True)
+RATE_PLOT = Plot(entity=at.RATE, title="Logo event rate [kev/s]", curves=_rate_curves, legend="top", with_zero=True)
+CROSSING_PLOT = Plot(
+    entity=at.RATE_CROSSINGS, title="Zero crossings of the rate", curves=_crossing_curves, legend="top"
+)
+MAGNITUDE_PLOT = Plot(
+    entity=at.SPIN_MAGNITUDE,
+    title="Spin [rps] ± 1σ",
+    curves=_magnitude_curves,
+    legend="bottom",
+    y_range=_magnitude_range,
+)
+COMPONENT_PLOT = Plot(
+    entity=at.SPIN_COMPONENTS,
+    title="Trusted spin [rps]",
+    curves=_component_curves,
+    legend="top",
+    with_zero=True,
+)
+AXIS_ERROR_PLOT = Plot(
+    entity=at.AXIS_ERROR, title="Axis error [°]", curves=_axis_error_curves, legend="top", y_range=lambda _: (0.0, 40.0)
+)

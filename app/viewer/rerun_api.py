@@ -11,7 +11,7 @@ import uuid
 from collections.abc import Hashable, Iterable, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -79,50 +79,6 @@ def once(entity: str, *archetypes: rr.AsComponents) -> Chunk:
 def styled(entity: str, archetype: Any, **look: Hashable) -> Chunk:
     """The look of an entity whatever the run: fields of an archetype, one value each. Made once, as it takes 0.2 ms."""
     return once(entity, archetype.from_fields(**{name: [value] for name, value in look.items()}))
-
-
-def line(
-    entity: str,
-    t_us: NDArray[Any],
-    values: NDArray[np.float64],
-    name: str,
-    colour: Colour,
-    width: float = 1.5,
-    steps: bool = False,
-) -> list[Chunk]:
-    """A line in a plot; NaN makes a gap."""
-    mode = "StepAfter" if steps else "Linear"
-    look = {"names": name, "colors": colour, "widths": width, "interpolation_mode": mode, "aggregation_policy": "Off"}
-    return [columns_at(entity, t_us, rr.Scalars.columns(scalars=values)), styled(entity, rr.SeriesLines, **look)]
-
-
-def points(
-    entity: str,
-    t_us: NDArray[Any],
-    values: NDArray[np.float64],
-    name: str,
-    colour: Colour,
-    marker: Literal["circle", "down"] = "circle",
-    size: float = 3.0,
-) -> list[Chunk]:
-    """Dots in a plot; NaN leaves one out."""
-    look = {"names": name, "colors": colour, "markers": marker, "marker_sizes": size}
-    return [columns_at(entity, t_us, rr.Scalars.columns(scalars=values)), styled(entity, rr.SeriesPoints, **look)]
-
-
-def band(
-    entity: str,
-    t_us: NDArray[Any],
-    values: NDArray[np.float64],
-    variances: NDArray[np.float64],
-    name: str,
-    unit: str,
-    colour: Colour,
-) -> list[Chunk]:
-    """A line in a plot with a translucent band of +-1 sigma; NaN makes a gap."""
-    look = {"names": name, "units": unit, "colors": colour, "widths": 1.5, "aggregation_policy": "Off"}
-    columns = rr.Measurements.columns(values=values, variances=variances)
-    return [columns_at(entity, t_us, columns), styled(entity, rr.Measurements, **look)]
 
 
 def bars(

@@ -1,19 +1,21 @@
-"""One run of the chain, as the viewer takes it."""
+"""A run of the chain as the viewer takes it: columns over all ticks."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spinscope.pipeline.camera import Camera
 from spinscope.pipeline.chain import Tick
+from spinscope.pipeline.registry import methods
 from spinscope.pipeline.results import SpinEstimate, Truth
 from spinscope.pipeline.shots import Shot
+from spinscope.pipeline.stage import SpinMethod
 
 if TYPE_CHECKING:
     from spinscope.pipeline.session import Result
@@ -24,12 +26,28 @@ Times = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class ViewedRun:
-    """Everything that is shown: a recording's ticks and shots, with the setting they were made in.
+    """A recording's ticks and shots with the camera and ball behind them.
 
-    name : the recording's name, for people
-    ticks : in order of time, without gaps; shots : found in them; no_shot_reason : why none was
-    fixed : the ball stays in place (ball spinner)
-    warnings : what people should know about the recording
+    Attributes
+    ----------
+    name : str
+        Name of the recording, for people.
+    ticks : sequence of Tick
+        In order of time, without gaps; at least one.
+    shots : sequence of Shot
+        Found in the ticks.
+    no_shot_reason : str, optional
+        Why no shot was found; None when one was.
+    camera : Camera
+        The camera on this sensor.
+    ball_radius_m : float
+        Radius of the ball, m.
+    fixed : bool
+        Whether the ball stays in place (ball spinner).
+    truth : Truth, optional
+        The simulator's truth.
+    warnings : sequence of str
+        Notices about the recording, for people.
     """
 
     name: str
@@ -44,7 +62,7 @@ class ViewedRun:
 
     @classmethod
     def of(cls, result: Result) -> ViewedRun:
-        """The run of a session."""
+        """The run behind a result."""
         session = result.session
         return cls(
             name=session.recording.path.name,
@@ -60,7 +78,7 @@ class ViewedRun:
 
     @cached_property
     def start_us(self) -> int:
-        """Start of the first tick: before it nothing is known, and every view says so."""
+        """Start of the first tick; before it nothing is known, and every view says so."""
         return self.ticks[0].packet.start_us
 
     @cached_property
@@ -70,51 +88,60 @@ class ViewedRun:
 
     @cached_property
     def ends_us(self) -> Times:
-        """(n,) end of every tick: when its results are known, and where they stand on the timeline."""
+        """End (n,) of every tick, us, where its results stand on the timeline."""
         return np.array([tick.packet.end_us for tick in self.ticks], np.int64)
 
     @cached_property
     def times_us(self) -> Times:
-        """(n + 1,) the start, then the end of every tick."""
+        """Start, then the end of every tick (n + 1,), us."""
         return np.concatenate([[self.start_us], self.ends_us])
 
     @cached_property
     def first_sight_us(self) -> int:
-        """When the first track starts. The first tick's end if there is none."""
+        """Time at which the first track starts; the first tick's end if there is none."""
         found = [tick.packet.end_us for tick in self.ticks if tick.track.has_ball]
         return found[0] if found else self.ticks[0].packet.end_us
 
     @cached_property
     def opening_us(self) -> int:
-        """When a spin is first trusted: where the viewer waits for the user. Where none is, at the first sight."""
+        """Time at which the viewer opens: a spin is first trusted, or the track starts where none is."""
         return next((tick.packet.end_us for tick in self.ticks if tick.best is not None), self.first_sight_us)
 
     @cached_property
     def true_spins_rps(self) -> Floats | None:
-        """(n, 3) the true spin at the time of every tick's state; NaN where there is none, None without truth."""
+        """True spin (n, 3) at the time of every tick's state, rps; NaN where there is none, None without truth."""
         if self.truth is None:
             return None
         return self.true_values(np.array([tick.track.t_us for tick in self.ticks]), self.truth.spin_rps)
 
     @cached_property
     def has_ball(self) -> NDArray[np.bool_]:
-        """(n,) whether there is a ball at the end of each tick."""
+        """Whether there is a ball at the end of each tick (n,)."""
         return np.array([tick.track.has_ball for tick in self.ticks], np.bool_)
 
     @cached_property
     def means(self) -> Floats:
-        """(n, 5) Kalman states, NaN without a ball."""
+        """Kalman states (n, 5), NaN without a ball."""
         return np.array([tick.track.mean for tick in self.ticks]).reshape(-1, 5)
 
     @cached_property
     def variances(self) -> Floats:
-        """(n, 5) their variances, NaN without a ball."""
+        """Variances (n, 5) of the Kalman states, NaN without a ball."""
         return np.array([np.diag(tick.track.covariance) for tick in self.ticks]).reshape(-1, 5)
 
     @cached_property
-    def methods(self) -> list[str]:
-        """The names of the methods that estimate the spin."""
-        return list(self.ticks[0].estimates)
+    def stages(self) -> tuple[str, ...]:
+        """Names of the stages that were run."""
+        return tuple(self.ticks[0].results)
+
+    @cached_property
+    def methods(self) -> tuple[SpinMethod, ...]:
+        """The spin methods that were run."""
+        return tuple(method for method in methods() if method.name in self.stages)
+
+    def results(self, stage: str) -> list[Any]:
+        """A stage's result of every tick; empty where the stage was not run."""
+        return [tick.results[stage] for tick in self.ticks] if stage in self.stages else []
 
     @cached_property
     def largest_radius_px(self) -> float:
@@ -123,18 +150,18 @@ class ViewedRun:
 
     @cached_property
     def fast_flow_px_s(self) -> float | None:
-        """A speed that one in fifty of the flow's events exceed: full colour in its picture. None without flow."""
-        flows = [np.hypot(tick.flow.vx_px_s, tick.flow.vy_px_s) for tick in self.ticks]
+        """Speed that one in fifty of the flow's events exceed, full colour in its picture; None without flow."""
+        flows = [np.hypot(flow.vx_px_s, flow.vy_px_s) for flow in self.results("flow")]
         speeds = np.concatenate([np.empty(0), *flows])
         return float(np.quantile(speeds, 0.98)) if speeds.size else None
 
     def centre_m(self, mean: Floats) -> Floats:
-        """(n, 3) centres of the ball, camera frame, from Kalman states (n, 5) or (5,)."""
+        """Centres of the ball (n, 3), camera frame, from Kalman states (n, 5) or (5,)."""
         states = np.atleast_2d(mean)
         return self.camera.ball_centre_m(states[:, 0], states[:, 1], states[:, 4], self.ball_radius_m)
 
     def true_values(self, t_us: Floats, values: Floats) -> Floats:
-        """A column (m,) or (m, k) of the truth at times (n,); NaN more than a sample outside what the truth covers."""
+        """Column (m,) or (m, k) of the truth at times (n,); NaN more than a sample outside what the truth covers."""
         assert self.truth is not None
         known_us = self.truth.t_us
         spare_us = known_us[1] - known_us[0] if known_us.size > 1 else 0
@@ -145,7 +172,7 @@ class ViewedRun:
 
 
 def shown_estimate(tick: Tick) -> tuple[SpinEstimate | None, bool]:
-    """The estimate that turns the ball in the viewer, and whether it is trusted.
+    """Estimate that turns the ball in the viewer, and whether it is trusted.
 
     Where no method is trusted the last one that answers is shown all the same, for the eye to judge.
     """
@@ -156,12 +183,12 @@ def shown_estimate(tick: Tick) -> tuple[SpinEstimate | None, bool]:
 
 
 def vector_of(estimate: SpinEstimate | None) -> Floats:
-    """(3,) its spin in rps; zeros where there is none."""
+    """Spin (3,) of an estimate, rps; zeros where there is none."""
     return np.zeros(3) if estimate is None or estimate.vector_rps is None else estimate.vector_rps
 
 
 def shot_starts(run: ViewedRun) -> Iterator[int | None]:
-    """For each tick the start of the shot it belongs to: the moment of the body frame; None without a ball."""
+    """Start of the shot to which each tick belongs, the moment of the body frame; None without a ball."""
     shot, start_us = None, None
     for tick in run.ticks:
         if not tick.track.has_ball:

@@ -1,6 +1,6 @@
-"""Contrast's score as it searched: over magnitudes along the best axis, and over directions of the axis.
+"""Drawing of contrast's score: over magnitudes along the best axis, and over directions of the axis.
 
-A single sharp top is a safe answer; another top nearly as high is a rival, marked where the search found it. Both
+A single sharp maximum is a safe answer; another nearly as high is a rival, marked where the search found it. Both
 pictures are of the last full estimate.
 """
 
@@ -13,6 +13,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from spinscope.pipeline.spin import contrast
 from spinscope.pipeline.spin.contrast.stage import ContrastResult
 
 from . import entities as at
@@ -26,13 +27,13 @@ Floats = NDArray[np.float64]
 COARSE, COARSE_GAP, CELL_PX = 32, 3, 6
 COARSE_WIDTH = 2 * COARSE + COARSE_GAP
 DISC_RADIUS_PX, GAP_PX = COARSE * CELL_PX // 2, COARSE_GAP * CELL_PX
-# How far a scored direction shines: half the distance of the hundred scored directions from each other.
+# Reach of a scored direction: half the distance of the hundred scored directions from each other.
 REACH_RAD = 0.18
 BRIGHTEST = 150  # grey value of the highest score: the marks on it must stand out
 # Of every mark: its colour, its length on the curve (of the highest score, below zero unless it is the curve's own
-# top) and its radius on the map, in pixels of the screen.
+# maximum) and its radius on the map, in pixels of the screen.
 MARKS: dict[str, tuple[at.Colour, float, float]] = {
-    "best": (at.METHOD_COLOURS["contrast"], 1.0, 6.0),
+    "best": (contrast.STAGE.colour, 1.0, 6.0),
     "rivals": (at.HOUGH_COLOUR, -0.16, 4.0),
     "truth": (at.TRUTH_COLOUR, -0.08, 3.0),
 }
@@ -41,8 +42,7 @@ MARK_WIDTH = 0.008  # of the curve's span
 
 def score_chunks(run: ViewedRun) -> list[Chunk]:
     """Both pictures at every tick; empty where contrast has no best spin."""
-    found = [tick.get("contrast") for tick in run.ticks]
-    results = [result if result is not None and result.magnitudes_rps.size else None for result in found]
+    results = [result if result.magnitudes_rps.size else None for result in run.results("contrast")]
     spins = {
         "best": [np.empty((0, 3)) if result is None else result.best_rps[None] for result in results],
         "rivals": [np.empty((0, 3)) if result is None else result.rivals_rps for result in results],
@@ -56,7 +56,7 @@ def score_chunks(run: ViewedRun) -> list[Chunk]:
 def _over_magnitude(
     run: ViewedRun, results: list[ContrastResult | None], spins: dict[str, list[Floats]]
 ) -> list[Chunk]:
-    """Bars over rps: the score and the marks; those below zero may have other axes."""
+    """Bars over magnitude in rps, of the score and of the marks; those below zero may have other axes."""
     curves = [(np.empty(0), np.empty(0)) if r is None else (r.magnitudes_rps, r.magnitude_scores) for r in results]
     widths = [float(x[1] - x[0]) if x.size > 1 else 1.0 for x, _ in curves]
     chunks = bars(f"{at.SCORE_MAGNITUDE}/score", run.times_us, [_NONE, *curves], [1.0, *widths], at.MASK_COLOUR)
@@ -103,7 +103,7 @@ def _over_axes(run: ViewedRun, results: list[ContrastResult | None], spins: dict
 
 
 def _on_map(spins_rps: Floats) -> NDArray[np.float32]:
-    """(n, 2) where the axes of spins (n, 3) lie on the map."""
+    """Places (n, 2) of the axes of spins (n, 3) on the map, px."""
     axes = spins_rps / np.linalg.norm(spins_rps, axis=1)[:, None]
     right = np.where(axes[:, 2] < 0, 0, 2 * DISC_RADIUS_PX + GAP_PX)
     x, y = DISC_RADIUS_PX * (1 + axes[:, 0]) + right, DISC_RADIUS_PX * (1 + axes[:, 1])
@@ -111,7 +111,7 @@ def _on_map(spins_rps: Floats) -> NDArray[np.float32]:
 
 
 def _heat(directions: Floats, scores: Floats) -> NDArray[np.uint8]:
-    """(COARSE, COARSE_WIDTH, 3) at every axis the mean of the scores around it, dark = none, light = the highest."""
+    """Picture (COARSE, COARSE_WIDTH, 3) of the mean score around every axis, dark = none, light = the highest."""
     weights = np.exp((_axes() @ directions.astype(np.float32).T - 1) / np.float32(REACH_RAD**2))
     mean = (weights @ scores.astype(np.float32)) / weights.sum(axis=-1)
     values = np.zeros((COARSE, COARSE_WIDTH), np.uint8)
@@ -122,7 +122,7 @@ def _heat(directions: Floats, scores: Floats) -> NDArray[np.uint8]:
 
 @cache
 def _frame(heat: str) -> list[Chunk]:
-    """What lies around the two discs, over the coarse picture, and the size of that."""
+    """Surroundings of the two discs, laid over the coarse picture, and the scale of that."""
     shape = 2 * DISC_RADIUS_PX, 4 * DISC_RADIUS_PX + GAP_PX
     hidden = np.full(shape, 255, np.uint8)
     for x in (DISC_RADIUS_PX, shape[1] - DISC_RADIUS_PX):
@@ -135,7 +135,7 @@ def _frame(heat: str) -> list[Chunk]:
 
 @cache
 def _axes() -> NDArray[np.float32]:
-    """(2, COARSE, COARSE, 3) the axes behind the pixels of the coarse picture's discs; the rim's beyond it."""
+    """Axes (2, COARSE, COARSE, 3) behind the pixels of the coarse picture's discs; beyond the rim those of the rim."""
     side = (np.arange(COARSE) + 0.5) / COARSE * 2 - 1
     x, y = np.meshgrid(side, side)
     z = np.sqrt(np.clip(1 - x**2 - y**2, 0, None))

@@ -1,4 +1,4 @@
-"""The run in words: Markdown that follows the playhead, and a card of big numbers for the coach."""
+"""Text of a run: a summary in Markdown that follows the playhead, and a card of big numbers for the coach."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from .rerun_api import Chunk, columns_at, once, styled
 from .run import ViewedRun, shown_estimate
 
 Vector = NDArray[np.float64]
-Block = tuple[str, str]  # big letters, small print
+Block = tuple[str, str]  # a line in big letters, one in small ones
 Card = tuple[Block, Block, Block]
 
 CARD_PX, BLOCK_PX = 640, 213
 BIG_PX, SMALL_PX = 108, 32
 TEXT, FAINT = 240, 150  # grey values
-# Kalman velocity needs a moment to settle; a flight's direction is told from this speed on.
-SLOWEST_M_S = 0.2
+# The Kalman filter's velocity needs a moment to settle: no direction of flight is named below this speed.
+MIN_SPEED_M_S = 0.2
 
 
 def summary_chunks(run: ViewedRun) -> list[Chunk]:
-    """The summary and the card at the start and at the end of every tick."""
+    """Summary and card at the start and at the end of every tick."""
     texts, cards = [_opening(run)], [(("-", "spin"), ("-", "speed"), ("No ball yet", run.no_shot_reason or ""))]
     finals = {shot.end_us: shot for shot in run.shots}
     result: list[str] = []
@@ -41,16 +41,18 @@ def summary_chunks(run: ViewedRun) -> list[Chunk]:
         shot = finals.get(tick.packet.end_us)
         if shot is not None and not run.fixed and shot.t_us.size > 1:
             velocity = shot.velocity_m_s(run.camera, run.ball_radius_m)
-        now = _Now(run, tick, velocity, true_rps)
+        state = _TickState(run, tick, velocity, true_rps)
         if shot is not None:
             milliseconds = (shot.end_us - shot.start_us) / 1000
-            result = now.told(f"shot {list(finals).index(shot.end_us) + 1} of {len(run.shots)}, {milliseconds:.0f} ms")
+            result = state.lines(
+                f"shot {list(finals).index(shot.end_us) + 1} of {len(run.shots)}, {milliseconds:.0f} ms"
+            )
         if not tick.track.has_ball:
             text = _without_ball(run, tick, result)
         else:
-            text = result if shot is not None else now.told("so far")
+            text = result if shot is not None else state.lines("so far")
         texts.append("\n".join(text))
-        cards.append(now.card() if tick.track.has_ball else cards[-1])
+        cards.append(state.card() if tick.track.has_ball else cards[-1])
     return [
         columns_at(at.SUMMARY, run.times_us, rr.TextDocument.columns(text=texts)),
         styled(at.SUMMARY, rr.TextDocument, media_type="text/markdown"),
@@ -59,10 +61,15 @@ def summary_chunks(run: ViewedRun) -> list[Chunk]:
 
 
 @dataclass(frozen=True)
-class _Now:
-    """What is known at the end of a tick.
+class _TickState:
+    """State of the run at the end of a tick.
 
-    velocity_m_s : (3,) camera frame, None for a ball in place; true_rps : (3,) None where there is no truth
+    Attributes
+    ----------
+    velocity_m_s : (3,) float64, optional
+        Camera frame; None for a ball in place.
+    true_rps : (3,) float64, optional
+        True spin; None where there is none.
     """
 
     run: ViewedRun
@@ -72,60 +79,62 @@ class _Now:
 
     @cached_property
     def answer(self) -> tuple[SpinEstimate, Kind, bool] | None:
-        """The estimate shown, what kind of spin it is, and whether it is trusted; None where no method answers."""
+        """Estimate shown, its kind of spin, and whether it is trusted; None where no method answers."""
         estimate, trusted = shown_estimate(self.tick)
         if estimate is None or estimate.vector_rps is None:
             return None
         return estimate, kind_of_spin(estimate.vector_rps, self.velocity_m_s, self.run.camera.up), trusted
 
-    def told(self, said: str) -> list[str]:
-        """The whole summary."""
-        return [*self._headline(said), *self._table(), *_evidence(self.run, self.tick)]
+    def lines(self, span: str) -> list[str]:
+        """The whole summary of a span of time."""
+        return [*self._headline(span), *self._table(), *_evidence(self.run, self.tick)]
 
-    def _headline(self, said: str) -> list[str]:
-        """The answer in a heading, or that there is none yet and why."""
+    def _headline(self, span: str) -> list[str]:
+        """Heading with the answer, or that there is none yet."""
         speed = speed_words(self.velocity_m_s)
         if self.answer is None:
-            return ["## Spin not known", "", f"{_sentence(speed)}; {said}.", ""]
+            return ["## Spin not known", "", f"{_sentence(speed)}; {span}.", ""]
         estimate, kind, trusted = self.answer
         magnitude_rps = estimate.magnitude_rps or 0.0
         doubt = "" if trusted else " (no method is trusted)"
         return [
             f"## {magnitude_rps:.1f} rps · {kind.name}{doubt}",
             "",
-            f"{_sentence(kind.sentence)}. **{rpm(magnitude_rps):.0f} rpm**, {speed}; {said}.",
+            f"{_sentence(kind.sentence)}. **{rpm(magnitude_rps):.0f} rpm**, {speed}; {span}.",
             "",
         ]
 
     def _table(self) -> list[str]:
-        """Every method's answer or refusal, and the truth where there is one."""
+        """Table of every method's answer or refusal, and of the truth where there is one."""
         lines = ["| method | spin [rps] | axis (x, y, z) |", "|---|---|---|"]
-        for method, estimate in self.tick.estimates.items():
-            name = f"**{method} ✔**" if self.tick.best == method else method
+        for method in self.run.methods:
+            estimate = self.tick.estimates[method.name]
+            name = f"**{method.label} ✔**" if self.tick.best == method.name else method.label
             lines.append(f"| {name} | {_magnitude(estimate)} | {axis_words(estimate)} |")
         return [*lines, *self._truth_rows(), ""]
 
     def _truth_rows(self) -> list[str]:
-        """The truth as the table's last row, and how far from it every answer is."""
+        """Last row of the table with the truth, and below it the errors of every answer."""
         if self.true_rps is None:
             return []
         truth = SpinEstimate("truth", self.true_rps, None, None)
         lines = [f"| truth | {_magnitude(truth)} | {axis_words(truth)} |", ""]
-        for method, estimate in self.tick.estimates.items():
+        for method in self.run.methods:
+            estimate = self.tick.estimates[method.name]
             if estimate.axis is not None and truth.axis is not None:
                 angle = math.degrees(math.acos(min(max(float(estimate.axis @ truth.axis), -1.0), 1.0)))
                 off = abs((estimate.magnitude_rps or 0) - (truth.magnitude_rps or 0))
-                lines += [f"{method} is {off:.1f} rps and {angle:.1f}° from the truth.", ""]
+                lines += [f"{method.label}: magnitude {off:.1f} rps and axis {angle:.1f}° from the truth.", ""]
         return lines
 
     def card(self) -> Card:
-        """Spin, speed and kind, each in big letters with its small print."""
+        """Spin, speed and kind, each in big letters with a line in small ones."""
         velocity = self.velocity_m_s
         speed = None if velocity is None else float(np.linalg.norm(velocity))
         big = "In place" if self.run.fixed else "-" if speed is None else f"{km_h(speed):.0f} km/h"
         speed_lines = big, "" if speed is None else f"{speed:.1f} m/s"
         if self.answer is None or not self.answer[2]:
-            return ("-", ""), speed_lines, ("Spin not known", "yet, or too little to trust")
+            return ("-", ""), speed_lines, ("Spin not known", "no estimate is trusted yet")
         estimate, kind, _ = self.answer
         magnitude, std = estimate.magnitude_rps or 0.0, estimate.magnitude_std_rps
         margin = "" if std is None else f" ± {rpm(std):.0f}"
@@ -137,16 +146,16 @@ class _Now:
 
 
 def _true_spins(run: ViewedRun) -> list[Vector | None]:
-    """The true spin at every tick; None where the ball does not spin or is not there."""
+    """True spin at every tick; None where the ball does not spin or is not there."""
     if run.true_spins_rps is None:
         return [None] * len(run.ticks)
     return [spin if np.isfinite(spin).all() and spin.any() else None for spin in run.true_spins_rps]
 
 
 def _velocity_m_s(run: ViewedRun, tick: Tick) -> Vector | None:
-    """The ball's velocity across the line of sight at the end of the tick; None for a ball in place or without one.
+    """Velocity of the ball across the line of sight at the end of the tick; None for a ball in place or without one.
 
-    The way towards the camera is left to the whole shot: in one tick the radius does not tell it.
+    The component along the line of sight needs the whole shot: in one tick the radius does not tell it.
     """
     if run.fixed or not tick.track.has_ball:
         return None
@@ -155,11 +164,11 @@ def _velocity_m_s(run: ViewedRun, tick: Tick) -> Vector | None:
     ahead[:2] += tick.track.mean[2:4] * step_s
     here, there = run.centre_m(np.stack([tick.track.mean, ahead]))
     velocity: Vector = (there - here) / step_s
-    return velocity if np.linalg.norm(velocity) >= SLOWEST_M_S else None
+    return velocity if np.linalg.norm(velocity) >= MIN_SPEED_M_S else None
 
 
 def _opening(run: ViewedRun) -> str:
-    """What is said before anything is known."""
+    """Text before anything is known."""
     lines = ["## No ball yet", ""]
     if run.no_shot_reason:
         reason = run.no_shot_reason.removeprefix("no ball: ")
@@ -168,7 +177,7 @@ def _opening(run: ViewedRun) -> str:
 
 
 def _origin(run: ViewedRun) -> list[str]:
-    """What the run is of, and what people should know about it."""
+    """Recording and span of the run, and its warnings."""
     span = f"{run.start_us:,} to {run.end_us:,} us"
     return [
         f"`{run.name}`, {span}; the timeline is the file's own time.",
@@ -178,7 +187,7 @@ def _origin(run: ViewedRun) -> list[str]:
 
 
 def _without_ball(run: ViewedRun, tick: Tick, result: list[str]) -> list[str]:
-    """The last shot's result while no ball is there, or that there was none yet."""
+    """Lines of the last shot's result while no ball is there, or that there was none yet."""
     if result:
         return [*result, "", "---", f"Now: {tick.track.reason or 'no ball'}"]
     return [_opening(run), "", f"Tracker: {tick.track.status}, {tick.track.reason or 'no ball'}"]
@@ -196,40 +205,39 @@ def _magnitude(estimate: SpinEstimate) -> str:
 
 
 def _evidence(run: ViewedRun, tick: Tick) -> list[str]:
-    """What the answer stands on: the tracker, the logo, the rhythm."""
-    rate, flow = tick.rate, tick.flow
-    if rate.spin_rps is None:
-        rhythm = f"no rhythm in the event rate: {rate.reason}"
-    else:
-        rhythm = f"rhythm of the event rate {rate.spin_rps:.1f} ± {rate.spin_std_rps or 0:.1f} rps"
-    slices = "" if flow.t_acc_us is None else f", flow in slices of {flow.t_acc_us} us"
+    """Results of the stages behind the answer, of those that were run."""
     mean, deviation = tick.track.mean, np.sqrt(np.diag(tick.track.covariance))
-    return [
+    lines = [
         f"Tracker {tick.track.status}: centre ({mean[0]:.1f}, {mean[1]:.1f}) ± {deviation[:2].max():.1f} px, "
-        f"radius {mean[4]:.1f} ± {deviation[4]:.1f} px; {len(tick.logo.events)} logo events in this tick.",
-        "",
-        f"{_sentence(rhythm)}{slices}.",
-        "",
-        *_contrast_words(tick),
-        *_origin(run),
+        f"radius {mean[4]:.1f} ± {deviation[4]:.1f} px."
     ]
+    if (logo := tick.get("logo")) is not None:
+        lines.append(f"{len(logo.events)} logo events in this tick.")
+    if (rate := tick.get("rate")) is not None:
+        std = f" ± {rate.spin_std_rps:.1f}" if rate.spin_std_rps is not None else ""
+        found = f"none: {rate.reason}" if rate.spin_rps is None else f"{rate.spin_rps:.1f}{std} rps"
+        lines.append(f"Spin from the event rate's zero crossings: {found}.")
+    if (flow := tick.get("flow")) is not None and flow.t_acc_us is not None:
+        lines.append(f"Flow from slices of {flow.t_acc_us} us.")
+    lines += _contrast_lines(tick)
+    return [*(part for line in lines for part in (line, "")), *_origin(run)]
 
 
-def _contrast_words(tick: Tick) -> list[str]:
-    """How sharp the logo is, over which time, and how near the next best spin comes."""
+def _contrast_lines(tick: Tick) -> list[str]:
+    """Sharpness of the derotated logo, over which time, and the nearest rival."""
     result = tick.get("contrast")
     if result is None or not np.isfinite(result.best_rps).all():
         return []
     stretch = f"from {result.start_us / 1000:.1f} to {result.end_us / 1000:.1f} ms"
-    rivals = "no rival"
-    if result.rival_sigmas.size:
-        count = result.rival_sigmas.size
-        rivals = f"{count} rival{'s' if count > 1 else ''}, {result.rival_sigmas.min():.1f} σ behind"
-    return [f"Contrast {result.contrast:.2f} an event over chance, {stretch}; {rivals}.", ""]
+    rivals = "no other spin comes near"
+    if count := result.rival_sigmas.size:
+        others = "1 other spin comes" if count == 1 else f"{count} other spins come"
+        rivals = f"{others} near, {result.rival_sigmas.min():.1f} σ below"
+    return [f"Contrast of the derotated logo {result.contrast:.2f} (0 = random), events {stretch}; {rivals}."]
 
 
 def _card_chunks(run: ViewedRun, cards: list[Card]) -> list[Chunk]:
-    """The card's blocks, one below the other, each where its words change."""
+    """Blocks of the card, one below the other, each at the times at which its text changes."""
     chunks = []
     for number, column in enumerate(zip(*cards, strict=True)):
         entity = f"{at.COACH}/{number}"
@@ -263,6 +271,6 @@ def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
 
 
 def _fitting(draw: ImageDraw.ImageDraw, text: str, size: int) -> int:
-    """The size in which the text fits on the card, this one at most."""
+    """Size in which the text fits on the card, this one at most."""
     width = draw.textlength(text, font=_font(size))
     return min(size, int(size * (CARD_PX - 60) / max(width, 1)))

@@ -24,8 +24,8 @@ from pathlib import Path
 from spinscope.pipeline.errors import SpinscopeError
 
 from ..terminal import note
-from .recorded import write_rrd
 from .rerun_api import VERSION, playhead_request, program, quiet_environment
+from .rrd import write_rrd
 from .run import ViewedRun
 
 HOST = "127.0.0.1"

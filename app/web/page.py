@@ -11,8 +11,10 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
+from spinscope.app.viewer.comparison import compared, note_with_a, note_without_a
+from spinscope.app.viewer.drawing_cache import DrawingCache
+from spinscope.app.viewer.rrd import rrd_bytes
 from spinscope.app.viewer.run import ViewedRun
-from spinscope.app.viewer.tuning import Drawings, compared, note_with_a, note_without_a, rrd_bytes
 from spinscope.pipeline.chain import Tick
 from spinscope.pipeline.registry import STAGES, Parameters, quick_stages
 from spinscope.pipeline.session import Result
@@ -85,7 +87,7 @@ class _Report:
 class Page:
     """A page's side on the server. Its thread runs the chain; the newest wish wins, between two ticks."""
 
-    def __init__(self, bench: Bench, drawings: Drawings) -> None:
+    def __init__(self, bench: Bench, drawings: DrawingCache) -> None:
         self.id = secrets.token_urlsafe(12)
         self.bench = bench
         self.outbox = Outbox()

@@ -16,8 +16,9 @@ from fastapi.staticfiles import StaticFiles
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException as StarletteHTTPException
 
+from spinscope.app.viewer.rrd import layout_bytes
 from spinscope.app.viewer.run import ViewedRun
-from spinscope.app.viewer.tuning import layout_bytes, tab_names
+from spinscope.app.viewer.views import views
 from spinscope.pipeline.errors import SpinscopeError
 from spinscope.pipeline.registry import STAGES
 
@@ -163,7 +164,7 @@ def _opening(workshop: Workshop, page: Page, version: str) -> dict[str, Any]:
         "sections": sections(),
         "stages": list(STAGES.names),
         "presets": presets.built_in(opened),
-        "tabs": tab_names(),
+        "tabs": [view.label for view in views(compare=True)],
         "biases": state_of(bench.session.recording),
     }
 

@@ -8,7 +8,7 @@ from collections import OrderedDict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from spinscope.app.viewer.tuning import Drawings
+from spinscope.app.viewer.drawing_cache import DrawingCache
 from spinscope.pipeline.errors import ParameterError, RecordingError
 from spinscope.pipeline.recordings import readable_suffixes
 from spinscope.pipeline.session import Choices
@@ -31,7 +31,7 @@ class Workshop:
     def __init__(self, path: Path, choices: Choices) -> None:
         self.path = path.absolute()
         self.folder = self.path.parent
-        self.drawings = Drawings()
+        self.drawings = DrawingCache()
         self._choices = choices
         self._benches: OrderedDict[Path, Bench] = OrderedDict()
         self._finders: dict[Path, ShotFinder] = {}

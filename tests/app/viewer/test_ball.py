@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from spinscope.app.viewer import entities
-from spinscope.app.viewer.recorded import write_rrd
+from spinscope.app.viewer.ball_projections import TEXTURE_PX
+from spinscope.app.viewer.rrd import write_rrd
 from spinscope.app.viewer.run import ViewedRun, shown_estimate
-from spinscope.app.viewer.still import TEXTURE_PX
 from tests.app.viewer.reading import Rows, read_back
 from tests.reference.rotation import turned
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from spinscope.app.viewer import entities
-from spinscope.app.viewer.recorded import write_rrd
+from spinscope.app.viewer.rrd import write_rrd
 from spinscope.app.viewer.run import ViewedRun
 from spinscope.app.viewer.score import CELL_PX, DISC_RADIUS_PX, GAP_PX
 from spinscope.pipeline.chain import Tick
@@ -92,8 +92,5 @@ def test_nothing_is_claimed_without_contrast(flight: ViewedRun, tmp_path: Path) 
     ticks = [with_results(tick, contrast=None) for tick in flight.ticks]
     write_rrd(dataclasses.replace(flight, ticks=ticks, truth=None), tmp_path / "run.rrd", "spin")
     logged = read_back(tmp_path / "run.rrd")
-    assert f"{entities.SPIN_MAGNITUDE}/contrast" not in logged
-    assert f"{entities.SCORE_MAGNITUDE}/truth" not in logged
-    last = flight.ticks[-3].packet.end_us
-    assert not numbers(logged[f"{entities.SCORE_MAGNITUDE}/score"], "values", last).any()
-    assert not logged[f"{entities.SCORE_AXES}/best"].at("positions", last)
+    for entity in (f"{entities.SPIN_MAGNITUDE}/contrast", entities.SCORE_MAGNITUDE, entities.SCORE_AXES):
+        assert not [path for path in logged if path.startswith(entity)]

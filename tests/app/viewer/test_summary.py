@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from spinscope.app.viewer import entities
-from spinscope.app.viewer.recorded import write_rrd
+from spinscope.app.viewer.rrd import write_rrd
 from spinscope.app.viewer.run import ViewedRun
+from spinscope.pipeline.registry import STAGES
 from spinscope.pipeline.results import MethodResult
 from spinscope.pipeline.spin_terms import kind_of_spin
 from tests.app.viewer.conftest import with_results
@@ -53,8 +54,8 @@ def test_the_shots_end_tells_the_shot(flight: ViewedRun, logged: dict[str, Rows]
     for words in (f"{60 * best.magnitude_rps:.0f} rpm", f"{speed:.1f} m/s", f"{3.6 * speed:.0f} km/h", "shot 1 of 1"):
         assert words in text
     for method in shot.estimates:
-        assert method in text
-    assert f"{shot.best} ✔" in text
+        assert STAGES[method].label in text
+    assert f"{STAGES[shot.best].label} ✔" in text
     assert "from the truth" in text
 
 

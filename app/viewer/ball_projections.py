@@ -1,8 +1,7 @@
-"""The logo with the spin taken out: events gathered on the ball's surface, turned back to one moment.
+"""Projections of the ball's surface: directions behind the pixels of its texture, of two discs, and of a map.
 
-A logo that stands still and sharp is the visual proof of a right spin; a wrong one smears it.
-
-The body frame is the camera frame at the shot's start, turning with the ball from then on.
+In these pictures the logo is derotated: sharp where the spin is right, smeared where it is wrong. The body frame is the
+camera frame at the shot's start, turning with the ball from then on.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-# As fine as the cells in which the events are counted: finer pictures show no more.
+# As fine as the cells in which the events are counted.
 TEXTURE_PX = (144, 72)  # 2.5 degrees a texel
 DISC_PX = 96
 MAP_PX = (180, 90)  # 2 degrees a pixel
@@ -22,7 +21,7 @@ GAP_PX = 10
 
 
 def texture_directions() -> Floats:
-    """(height, width, 3) unit vectors in the body frame behind the texels of the ball's texture.
+    """Unit vectors (height, width, 3) in the body frame behind the texels of the ball's texture.
 
     The middle of the texture is the point that faced the camera, right and down are the image's.
     """
@@ -33,14 +32,14 @@ def texture_directions() -> Floats:
 
 
 def sphere(longitude: Floats, latitude: Floats) -> Floats:
-    """(..., 3) unit vectors: longitude to the right and latitude down, from the direction to the camera."""
+    """Unit vectors (..., 3) of longitudes to the right and latitudes down, radians from the direction to the camera."""
     longitude, latitude = np.broadcast_arrays(longitude, latitude)
     across = np.cos(latitude)
     return np.stack([across * np.sin(longitude), np.sin(latitude), -across * np.cos(longitude)], axis=-1)
 
 
 def map_directions() -> Floats:
-    """(height, width, 3) unit vectors behind the pixels of the unrolled map, in the map's frame.
+    """Unit vectors (height, width, 3) behind the pixels of the unrolled map, in the map's frame.
 
     Longitude runs from left to right in the sense of the spin, latitude from +90 degrees, where the axis pierces the
     ball, down to -90.
@@ -54,7 +53,7 @@ def map_directions() -> Floats:
 
 
 def map_frame(spin_rps: Floats, middle: Floats) -> Floats:
-    """(3, 3) rows: the map's longitudes 0 and 90 degrees, and its pole, in the frame of the spin.
+    """Rows (3, 3): the map's longitudes 0 and 90 degrees, and its pole, in the frame of the spin.
 
     The direction `middle` has longitude 0. Without a spin the pole is the image's up.
     """
@@ -68,7 +67,7 @@ def map_frame(spin_rps: Floats, middle: Floats) -> Floats:
 
 
 def disc_directions(middle: Floats) -> Floats:
-    """(n, 3) unit vectors behind the pixels of two discs, those of `disc_mask` in its order.
+    """Unit vectors (n, 3) behind the pixels of two discs, those of `disc_mask` in its order.
 
     The left disc is the half of the ball around `middle` as seen from outside, the right one the other half, as if
     turned about the vertical. Up is the image's up, as far as it can be.
@@ -84,7 +83,7 @@ def disc_directions(middle: Floats) -> Floats:
 
 @cache
 def disc_mask() -> NDArray[np.bool_]:
-    """(height, width) which pixels of the picture lie on one of the two discs."""
+    """Pixels of the picture (height, width) that lie on one of the two discs."""
     side = _disc_side()
     on_disc = side[None, :] ** 2 + side[:, None] ** 2 < 1
     return np.hstack([on_disc, np.zeros((DISC_PX, GAP_PX), np.bool_), on_disc])
@@ -92,7 +91,7 @@ def disc_mask() -> NDArray[np.bool_]:
 
 @cache
 def _discs() -> Floats:
-    """(n, 3) what lies behind the pixels of the discs: right, down and out of the left one."""
+    """Components right, down and out of the left disc (n, 3) behind the pixels of both."""
     x, y = np.meshgrid(_disc_side(), _disc_side())
     z = np.sqrt(np.clip(1 - x**2 - y**2, 0, None))
     front = np.stack([x, y, z], axis=-1)
@@ -102,5 +101,5 @@ def _discs() -> Floats:
 
 
 def _disc_side() -> Floats:
-    """The middles of a disc's pixels along one side, in radii."""
+    """Centres of a disc's pixels along one side, in radii."""
     return (np.arange(DISC_PX) + 0.5) / DISC_PX * 2.1 - 1.05

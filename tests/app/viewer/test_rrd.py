@@ -12,11 +12,12 @@ import cv2
 import numpy as np
 import pytest
 
-from spinscope.app.viewer import LAYOUTS, entities
-from spinscope.app.viewer.layouts import NAMES
-from spinscope.app.viewer.recorded import write_rrd
+from spinscope.app.viewer import entities
+from spinscope.app.viewer.plots import STATE
 from spinscope.app.viewer.rerun_api import program, quiet_environment
+from spinscope.app.viewer.rrd import write_rrd
 from spinscope.app.viewer.run import ViewedRun
+from spinscope.app.viewer.views import VIEWS, View, views
 from spinscope.pipeline.errors import RecordingError
 from tests.app.viewer.reading import Rows, read_back
 
@@ -28,7 +29,7 @@ EVERYWHERE = {
     *(
         entities.FLOW,
         entities.FLOW_WHEEL,
-        entities.STILL_LOGO,
+        entities.DEROTATED_LOGO,
         entities.STATUS,
         entities.SUMMARY,
         f"{entities.COACH}/0",
@@ -73,7 +74,7 @@ def test_everything_begins_at_the_start_and_no_time_comes_twice(any_run: tuple[V
         for component, t_us in rows.t_us.items():
             assert np.all(np.diff(t_us) > 0), (path, component)
             assert t_us[-1] <= run.end_us
-            if path != f"{entities.RHYTHM}/crossings":
+            if path != f"{entities.RATE_CROSSINGS}/crossings":
                 assert t_us[0] == run.start_us, (path, component)
 
 
@@ -150,14 +151,14 @@ def test_the_state_lane_changes_when_the_tracker_does(flight: ViewedRun, logged:
 
 
 def test_the_plots_carry_values_and_variances(flight: ViewedRun, logged: Logged) -> None:
-    for i, name in enumerate(entities.QUANTITIES):
-        rows = logged[f"{entities.PLOT}/{name}/kalman"]
+    for i, component in enumerate(STATE):
+        rows = logged[f"{entities.PLOT}/{component.name}/kalman"]
         for tick in flight.ticks:
             (value,), (variance,) = (rows.at(c, tick.packet.end_us) for c in ("values", "variances"))
             np.testing.assert_allclose(value, tick.track.mean[i])
             if tick.track.has_ball:
                 assert variance == pytest.approx(tick.track.covariance[i, i])
-        assert rows.static["units"] == [entities.UNITS[i]]
+        assert rows.static["units"] == [component.unit]
 
 
 def test_the_event_rate_is_the_last_ticks(flight: ViewedRun, logged: Logged) -> None:
@@ -165,7 +166,7 @@ def test_the_event_rate_is_the_last_ticks(flight: ViewedRun, logged: Logged) -> 
     rows = logged[f"{entities.RATE}/histogram"]
     shown = [rows.at("scalars", int(t))[0] for t in rate.t_us]
     np.testing.assert_allclose(shown, rate.rate_hz / 1e3)
-    crossings = logged[f"{entities.RHYTHM}/crossings"]
+    crossings = logged[f"{entities.RATE_CROSSINGS}/crossings"]
     np.testing.assert_allclose(crossings.t_us["scalars"], rate.crossings_us, atol=1e-3)
 
 
@@ -181,16 +182,17 @@ def test_without_truth_nothing_claims_to_be_true(flight: ViewedRun, tmp_path: Pa
     assert not [path for path in read_back(tmp_path / "untold.rrd") if "tru" in path]
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
-def test_the_blueprint_has_all_tabs_paused_in_slow_motion(no_ball: ViewedRun, tmp_path: Path, layout: str) -> None:
-    write_rrd(no_ball, tmp_path / "run.rrd", layout)
+@pytest.mark.parametrize("view", views(), ids=lambda view: view.name)
+def test_the_blueprint_has_all_tabs_paused_in_slow_motion(no_ball: ViewedRun, tmp_path: Path, view: View) -> None:
+    write_rrd(no_ball, tmp_path / "run.rrd", view.name)
     logged = read_back(tmp_path / "run.rrd", blueprint=True)
     containers = {path: rows.static for path, rows in logged.items() if path.startswith("/container/")}
     names = {static["display_name"][0]: path for path, static in containers.items() if "display_name" in static}
-    assert {NAMES[name] for name in LAYOUTS} <= set(names)
+    assert {tab.label for tab in VIEWS if not tab.compares} <= set(names)
+    assert "Compare" not in names
     root = logged["/viewport"].static["root_container"][0]
     front = logged[f"/container/{uuid.UUID(bytes=bytes(root))}"].static["active_tab"][0]
-    assert front.strip("/") == names[NAMES[layout]].strip("/")
+    assert front.strip("/") == names[view.label].strip("/")
     time_panel = logged["/time_panel"].static
     assert time_panel["playback_speed"] == [0.01]
     assert time_panel["timeline"] == ["t"]
@@ -206,7 +208,7 @@ def test_a_failed_write_leaves_the_old_file_and_no_litter(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("spinscope.app.viewer.recorded.file_with", full)
+    monkeypatch.setattr("spinscope.app.viewer.rrd.file_with", full)
     with pytest.raises(RecordingError, match=r"No space left on device.*free space"):
         write_rrd(flight, path, "all")
     assert [file.name for file in tmp_path.iterdir()] == ["run.rrd"]
@@ -219,5 +221,5 @@ def test_a_folder_that_is_not_there_is_named(no_ball: ViewedRun, tmp_path: Path)
 
 
 def test_the_viewer_is_loaded_only_when_it_is_needed() -> None:
-    code = "import sys, app.viewer, app.cli; sys.exit('rerun' in sys.modules)"
+    code = "import sys, spinscope.app.viewer, spinscope.app.cli; sys.exit('rerun' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

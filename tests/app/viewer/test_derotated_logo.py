@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from spinscope.app.viewer import entities, painting
-from spinscope.app.viewer.recorded import write_rrd
+from spinscope.app.viewer import derotated_logo, entities
+from spinscope.app.viewer.ball_projections import MAP_PX, map_directions, map_frame
+from spinscope.app.viewer.rrd import write_rrd
 from spinscope.app.viewer.run import ViewedRun
-from spinscope.app.viewer.still import MAP_PX, map_directions, map_frame
 from tests.app.viewer.conftest import with_results
 from tests.app.viewer.reading import read_back
 from tests.reference.rotation import turned
@@ -77,17 +77,17 @@ def test_the_map_is_sharp_when_the_spin_is_right(flight: ViewedRun, tmp_path: Pa
     assert middle > 0.9, "the logo is in the middle of the map"
 
 
-def test_a_long_run_is_painted_less_often_and_at_its_shots_end_all_the_same(
+def test_a_long_run_has_fewer_pictures_and_one_at_its_shots_end_all_the_same(
     flight: ViewedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def painted_us() -> np.ndarray:
+    def pictured_us() -> np.ndarray:
         write_rrd(flight, tmp_path / "run.rrd", "spin")
         return read_back(tmp_path / "run.rrd")[entities.UNROLLED].t_us["buffer"]
 
-    every = painted_us()
+    every = pictured_us()
     assert len(every) >= flight.has_ball.sum()
-    monkeypatch.setattr(painting, "PICTURES_MOST", 5)
-    few = painted_us()
+    monkeypatch.setattr(derotated_logo, "MAX_PICTURES", 5)
+    few = pictured_us()
     assert 4 <= len(few) <= 5 + 2
     assert few[0] == flight.start_us
     assert few[-1] == every[-1] == flight.shots[0].end_us

@@ -1,4 +1,4 @@
-"""What each stage's column of results looks like: one function a stage, from a run to chunks.
+"""Drawings in the image and in the ball's frame: events, surface, circles, logo, flow; one function a stage.
 
 Every result stands at the end of its tick, when it was known; the state it describes is older by the pixels'
 latency (65 us or so). A first row at the start of the run says that nothing is known yet, so that no view is empty
@@ -7,19 +7,20 @@ wherever the playhead stands.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.kernels.hsv import hsv_image, hsv_wheel
 from spinscope.pipeline.results import Circle
 
 from . import entities as at
-from .plots import from_start, rate_chunks, residual_plots, spin_chunks, state_plots, true_state
+from .plots import true_state
 from .png import png
-from .rerun_api import Chunk, columns_at, line, once, states, styled
+from .rerun_api import Chunk, columns_at, once, states, styled
 from .run import ViewedRun
 
 Floats = NDArray[np.float64]
@@ -32,40 +33,20 @@ DASHES = 12
 def filter_chunks(run: ViewedRun) -> list[Chunk]:
     """Raw events in the colours of their polarity, dimmed where the surface's filter took them out."""
     total = sum(len(tick.packet.events) for tick in run.ticks)
-    keep_every = max(1, -(-total // EVENTS_SHOWN))
-    positions, classes, lengths = [np.empty((0, 2), np.float32)], [np.empty(0, np.uint16)], [0]
+    chosen = slice(None, None, max(1, -(-total // EVENTS_SHOWN)))
+    positions, classes = [], []
     for tick in run.ticks:
-        events, kept = tick.packet.events, tick.filter.surface_events
-        chosen = slice(None, None, keep_every)
-        x, y = events.x_px[chosen].astype(np.float32), events.y_px[chosen].astype(np.float32)
-        is_kept = np.isin(_keys(events, tick.packet.start_us)[chosen], _keys(kept, tick.packet.start_us))
-        positions.append(np.stack([x, y], axis=1))
+        events, kept, start_us = tick.packet.events, tick.filter.surface_events, tick.packet.start_us
+        is_kept = np.isin(_keys(events, start_us)[chosen], _keys(kept, start_us))
+        positions.append(np.stack([events.x_px[chosen], events.y_px[chosen]], axis=1))
         classes.append(2 * is_kept.astype(np.uint16) + events.on[chosen])
-        lengths.append(x.size)
-    counts = np.array(
-        [[len(t.packet.events), len(t.filter.surface_events), len(t.filter.logo_events)] for t in run.ticks]
-    )
-    seconds = np.diff(run.times_us) * 1e-6
-    names = ("all", "after the surface's filter", "after the logo's filter")
-    colours = (at.TRUTH_COLOUR, at.KALMAN_COLOUR, at.MEASURED_COLOUR)
-    rates = [
-        line(f"{at.EVENT_COUNT}/{i}", run.times_us, from_start(counts[:, i] / seconds / 1e6), name, colour)
-        for i, (name, colour) in enumerate(zip(names, colours, strict=True))
-    ]  # fmt: skip
-    context = [rr.AnnotationInfo(i, name, colour) for i, (name, colour) in enumerate(at.EVENT_CLASSES)]
-    columns = rr.Points2D.columns(positions=np.concatenate(positions), class_ids=np.concatenate(classes))
     width, height = run.camera.width_px, run.camera.height_px
     frame = rr.Boxes2D(mins=[[-0.5, -0.5]], sizes=[[width, height]], colors=[at.MASK_COLOUR], radii=[-0.5])
-    return [
-        once(at.FRAME, frame),
-        once(at.EVENTS, rr.AnnotationContext(context), rr.Points2D.from_fields(radii=[-1.0], show_labels=False)),
-        columns_at(at.EVENTS, run.times_us, columns, lengths),
-        *(chunk for rate in rates for chunk in rate),
-    ]
+    return [once(at.FRAME, frame), *_events(run, at.EVENTS, positions, classes, radius_ui=1.0)]
 
 
 def surface_chunks(run: ViewedRun) -> list[Chunk]:
-    """The surface as it was searched, whole, in its own pixels."""
+    """The whole surface in its own pixels, as the tracker searched it."""
     blank = np.zeros((run.camera.height_px, run.camera.width_px), np.uint8)
     blobs = [png(blank), *(png(tick.surface.values) for tick in run.ticks)]
     # Pixels are named by their centres: the image's corner lies half a pixel up and left of pixel (0, 0).
@@ -78,7 +59,7 @@ def surface_chunks(run: ViewedRun) -> list[Chunk]:
 
 
 def track_chunks(run: ViewedRun) -> list[Chunk]:
-    """Circles on the image, the ball's place for what moves with it, plots of the state, the tracker's status."""
+    """Circles in the image, the place of what moves with the ball, and the tracker's status."""
     tracks = [tick.track for tick in run.ticks]
     kalman = [
         Circle(mean[0], mean[1], mean[4], 1.0) if ball else None
@@ -91,8 +72,6 @@ def track_chunks(run: ViewedRun) -> list[Chunk]:
         *_circles(run, at.KALMAN, kalman, at.KALMAN_COLOUR, 1.6),
         _ball_place(run),
         *states(at.STATUS, run.times_us, statuses, at.STATUS_COLOURS),
-        *state_plots(run),
-        *residual_plots(run),
     ]
     if run.truth is not None:
         chunks += _true_circle(run)
@@ -100,30 +79,22 @@ def track_chunks(run: ViewedRun) -> list[Chunk]:
 
 
 def logo_chunks(run: ViewedRun) -> list[Chunk]:
-    """The logo's events around the ball's centre at their own time, with the outline and the mask's edge."""
+    """Logo events around the ball's centre at their own time, with the outline and the edge of the mask."""
     logos = [tick.logo for tick in run.ticks]
     positions = [np.stack([logo.x_px, logo.y_px], axis=1) for logo in logos]
     classes = [2 + logo.events.on.astype(np.uint16) for logo in logos]
-    columns = rr.Points2D.columns(
-        positions=np.concatenate([np.empty((0, 2)), *positions]).astype(np.float32),
-        class_ids=np.concatenate([np.empty(0, np.uint16), *classes]),
-    )
-    context = [rr.AnnotationInfo(i, name, colour) for i, (name, colour) in enumerate(at.EVENT_CLASSES)]
-    lengths = [0, *(len(logo.events) for logo in logos)]
-    radii = [logo.radius_px for logo in logos]
     arm = 0.05 * run.largest_radius_px
     cross = rr.LineStrips2D([[[-arm, 0], [arm, 0]], [[0, -arm], [0, arm]]], colors=[at.MASK_COLOUR], radii=[-0.7])
     return [
         once(at.BALL_CENTRE, cross),
-        once(at.LOGO, rr.AnnotationContext(context), rr.Points2D.from_fields(radii=[-2.0], show_labels=False)),
-        columns_at(at.LOGO, run.times_us, columns, lengths),
-        *_rings(run, at.LOGO_OUTLINE, radii, at.KALMAN_COLOUR),
+        *_events(run, at.LOGO, positions, classes, radius_ui=2.0),
+        *_rings(run, at.LOGO_OUTLINE, [logo.radius_px for logo in logos], at.KALMAN_COLOUR),
         *_rings(run, at.LOGO_MASK, [logo.radius_px - logo.pad_px for logo in logos], at.MASK_COLOUR),
     ]
 
 
 def flow_chunks(run: ViewedRun) -> list[Chunk]:
-    """Triplet Matching's flow in the ball's frame, hue = direction, saturation = speed; and the wheel of colours."""
+    """Flow of Triplet Matching in the ball's frame, hue = direction, saturation = speed; and the wheel of colours."""
     half_px, bound_px_s = int(np.ceil(1.1 * run.largest_radius_px)), run.fast_flow_px_s or 1.0
     pictures = [
         hsv_image(
@@ -147,22 +118,31 @@ def flow_chunks(run: ViewedRun) -> list[Chunk]:
     ]
 
 
-STAGES: tuple[Callable[[ViewedRun], list[Chunk]], ...] = (
-    filter_chunks,
-    surface_chunks,
-    track_chunks,
-    logo_chunks,
-    rate_chunks,
-    flow_chunks,
-    spin_chunks,
-)
-
-
-def _keys(events: object, start_us: int) -> NDArray[np.int64]:
+def _keys(events: EventBatch, start_us: int) -> NDArray[np.int64]:
     """One number an event by which two events of a tick are the same."""
     t, x, y, on = (getattr(events, name).astype(np.int64) for name in ("t_us", "x_px", "y_px", "on"))
     keys: NDArray[np.int64] = (((t - start_us) << 33) | (x << 17) | (y << 1)) | on
     return keys
+
+
+def _events(
+    run: ViewedRun,
+    entity: str,
+    positions: Sequence[NDArray[np.generic]],
+    classes: Sequence[NDArray[np.uint16]],
+    radius_ui: float,
+) -> list[Chunk]:
+    """Events of every tick as points in the colours of their classes."""
+    columns = rr.Points2D.columns(
+        positions=np.concatenate([np.empty((0, 2)), *positions]).astype(np.float32),
+        class_ids=np.concatenate([np.empty(0, np.uint16), *classes]),
+    )
+    context = [rr.AnnotationInfo(i, name, colour) for i, (name, colour) in enumerate(at.EVENT_CLASSES)]
+    style = rr.Points2D.from_fields(radii=[-radius_ui], show_labels=False)
+    return [
+        once(entity, rr.AnnotationContext(context), style),
+        columns_at(entity, run.times_us, columns, [0, *map(len, classes)]),
+    ]
 
 
 def _circles(
@@ -188,7 +168,7 @@ def _rings(run: ViewedRun, entity: str, radii_px: Sequence[float], colour: at.Co
 
 
 def _ball_place(run: ViewedRun) -> Chunk:
-    """The ball's centre, from which views in the ball's frame look; the nearest known one while there is no ball."""
+    """Origin of the views in the ball's frame: its centre, or the nearest known one while there is no ball."""
     known = np.flatnonzero(run.has_ball)
     places = np.full((len(run.ticks) + 1, 2), (run.camera.width_px / 2, run.camera.height_px / 2))
     if known.size:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from spinscope.app.viewer.still import disc_directions, disc_mask, texture_directions
+from spinscope.app.viewer.ball_projections import disc_directions, disc_mask, texture_directions
 
 
 def test_the_textures_middle_faces_the_camera_with_the_images_right_and_down() -> None:

@@ -1,0 +1,161 @@
+"""Panes of the viewer: single pictures, spaces and texts, of which the views are put together."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+
+from . import entities as at
+from .ball import EYE, path_bounds_m
+from .run import ViewedRun
+from .summary import CARD_PX
+
+Floats = NDArray[np.float64]
+
+CIRCLES = (at.HOUGH, at.MEASURED, at.KALMAN, at.TRUE_CIRCLE)
+
+
+def picture(origin: str, name: str, contents: list[str] | None = None, bounds: Floats | None = None) -> rrb.View:
+    """A picture; `bounds` ((2, 2), rows x and y from and to, px) are what is seen of it."""
+    return rrb.Spatial2DView(
+        origin=origin,
+        contents=contents or "$origin/**",
+        name=name,
+        background=at.BACKGROUND,
+        visual_bounds=None if bounds is None else rrb.VisualBounds2D(x_range=bounds[0], y_range=bounds[1]),
+    )
+
+
+def text(origin: str, name: str) -> rrb.View:
+    """A text in Markdown."""
+    return rrb.TextDocumentView(origin=origin, name=name)
+
+
+def events(run: ViewedRun) -> rrb.View:
+    """Raw events in the whole image."""
+    return picture(at.IMAGE, "Events: ON red, OFF blue", [at.FRAME, at.EVENTS], _image_bounds(run))
+
+
+def surface(run: ViewedRun, name: str = "Surface: Hough yellow, Kalman green") -> rrb.View:
+    """The surface with the circles in the whole image."""
+    return picture(at.IMAGE, name, [at.FRAME, at.SURFACE, *CIRCLES], _image_bounds(run))
+
+
+def close_up(run: ViewedRun, name: str = "Surface around the ball", prefix: str = "") -> rrb.View:
+    """The surface with the circles around the ball, moving along with it."""
+    contents = [prefix + path for path in (at.SURFACE, *CIRCLES)]
+    return picture(prefix + at.BALL_PLACE, name, contents, _square(2.4 * run.largest_radius_px))
+
+
+def logo_events(run: ViewedRun) -> rrb.View:
+    """Events of the logo in the ball's frame."""
+    contents = [at.BALL_CENTRE, at.LOGO, at.LOGO_OUTLINE, at.LOGO_MASK]
+    return picture(at.BALL_PLACE, "Logo events, ball's frame", contents, _square(1.25 * run.largest_radius_px))
+
+
+def flow(run: ViewedRun) -> rrb.View:
+    """Flow in the ball's frame, beside the wheel of its colours."""
+    speed = "" if run.fast_flow_px_s is None else f": full colour = {run.fast_flow_px_s:,.0f} px/s"
+    bounds = run.largest_radius_px * np.array([[-1.2, 2.3], [-1.2, 1.2]])
+    return picture(at.BALL_PLACE, f"Flow{speed}", [at.FLOW, at.LOGO_OUTLINE, at.FLOW_WHEEL], bounds)
+
+
+def derotated_logo(name: str = "Derotated logo: sharp if spin is right", prefix: str = "") -> rrb.View:
+    """The logo with the spin taken out, both halves of the ball."""
+    return picture(prefix + at.DEROTATED_LOGO, name)
+
+
+def unrolled_logo() -> rrb.View:
+    """The same on a map around the axis."""
+    return picture(at.UNROLLED, "Logo unrolled about the axis, grid 90°")
+
+
+def score_over_magnitude() -> rrb.View:
+    """Score of contrast over magnitudes along the best axis."""
+    corner = rrb.PlotLegend(corner="LeftTop")  # the maximum is in the middle
+    return rrb.BarChartView(origin=at.SCORE_MAGNITUDE, name="Contrast over spin [rps]", plot_legend=corner)
+
+
+def score_over_axes() -> rrb.View:
+    """Score of contrast over directions of the axis."""
+    return picture(at.SCORE_AXES, "Contrast over axes: towards camera, away")
+
+
+def status() -> rrb.View:
+    """Lane of the tracker's status."""
+    return rrb.StateTimelineView(
+        origin=at.STATUS, name="State of the tracker", time_view=rrb.TimeAxis(link="LinkToGlobal")
+    )
+
+
+def card() -> rrb.View:
+    """Card of the shot for the coach."""
+    return picture(at.COACH, "Shot", bounds=np.array([[0, CARD_PX], [0, CARD_PX]]))
+
+
+def ball(run: ViewedRun, name: str = "Ball with derotated logo", *, methods: bool = True) -> rrb.View:
+    """The ball from close by, from above the line of sight, moving along with it; with every method's arrow or not."""
+    arrows = [at.SPIN_SHOWN, *([f"{at.SPIN_ARROWS}/**"] if methods else [])]
+    return _space(
+        at.BALL,
+        name,
+        [at.BALL, at.MESH, f"{at.SPIN_RING}/**", *arrows, at.PATH],
+        _tilted(np.zeros(3), 5.5 * run.ball_radius_m),
+        rrb.LineGrid3D(visible=False),
+    )
+
+
+def flight(run: ViewedRun, name: str = "Flight path, grid 0.1 m", hidden: tuple[str, ...] = ()) -> rrb.View:
+    """The flight from above, tilted: right is the image's right, near is the image's lower edge."""
+    low, high = path_bounds_m(run)
+    middle, size_m = (low + high) / 2, max(float(np.linalg.norm(high - low)), 0.3)
+    up = np.array(run.camera.up)
+    below = min(float(low @ up), float(high @ up)) - 2 * run.ball_radius_m
+    plane = rr.components.Plane3D(tuple(up), below)
+    return _space(
+        at.WORLD,
+        name,
+        [f"{at.WORLD}/**", *(f"- {path}" for path in (f"{at.SPIN_ARROWS}/**", *hidden))],
+        _tilted(middle, 1.2 * size_m),
+        rrb.LineGrid3D(visible=True, spacing=0.1, plane=plane, stroke_width=1.0),
+    )
+
+
+def _space(
+    origin: str, name: str, contents: list[str], eye: rrb.EyeControls3D, grid: rrb.LineGrid3D
+) -> rrb.Spatial3DView:
+    """A space in which the path stays up to the playhead."""
+    so_far = rrb.VisibleTimeRanges(
+        timeline=at.TIMELINE,
+        start=rrb.TimeRangeBoundary.infinite(),
+        end=rrb.TimeRangeBoundary.cursor_relative(),
+    )
+    return rrb.Spatial3DView(
+        origin=origin,
+        contents=contents,
+        name=name,
+        background=at.BACKGROUND,
+        line_grid=grid,
+        eye_controls=eye,
+        overrides={at.PATH: so_far},
+    )
+
+
+def _tilted(target: Floats, distance_m: float) -> rrb.EyeControls3D:
+    """Eye that looks at the target as the camera does, tilted towards the image's lower edge."""
+    return rrb.EyeControls3D(
+        kind=rrb.Eye3DKind.Orbital,
+        position=target + distance_m * EYE,
+        look_target=target,
+        eye_up=(0.0, EYE[2], -EYE[1]),
+    )
+
+
+def _image_bounds(run: ViewedRun) -> Floats:
+    return np.array([[-0.5, run.camera.width_px - 0.5], [-0.5, run.camera.height_px - 0.5]])
+
+
+def _square(half_px: float) -> Floats:
+    return np.array([[-half_px, half_px], [-half_px, half_px]])

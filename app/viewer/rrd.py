@@ -1,0 +1,52 @@
+"""A run as an .rrd file, and its parts as bytes for the page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from rerun.chunk import ChunkStore
+
+from spinscope.pipeline.files import atomic_file
+
+from . import entities as at
+from .drawers import run_chunks
+from .rerun_api import Chunk, file_with
+from .run import ViewedRun
+from .views import VIEWS, blueprint
+
+
+def write_rrd(run: ViewedRun, path: Path, layout: str) -> None:
+    """Write the run and its views, whole or not at all; raises RecordingError when that fails."""
+    made = run_chunks(run)
+    with atomic_file(path, ".rrd file") as part:
+        part.touch()  # Rerun's own message for a path that cannot be written is no help
+        file_with(made, blueprint(run, layout), part, run.name)
+
+
+def rrd_bytes(chunks: Sequence[Chunk], recording_id: str) -> bytes:
+    """The chunks as one recording of this id, without a blueprint."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "run.rrd"
+        ChunkStore.from_chunks(list(chunks)).write_rrd(path, application_id=at.APPLICATION, recording_id=recording_id)
+        return path.read_bytes()
+
+
+def layout_bytes(run: ViewedRun, tab: str, *, compare: bool = True) -> bytes:
+    """Blueprint of the page's viewer.
+
+    Parameters
+    ----------
+    run : ViewedRun
+        The run, for ranges and sizes.
+    tab : str
+        Label of the view in front; the first one when there is none of that label.
+    compare : bool
+        Whether there are the views of two runs.
+    """
+    layout = next((view.name for view in VIEWS if view.label == tab), "")
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "page.rbl"
+        blueprint(run, layout, compare=compare, is_lasting=True).save(at.APPLICATION, path)
+        return path.read_bytes()
