@@ -176,13 +176,11 @@ def _axis_error_curves(run: ViewedRun) -> list[Curve]:
     """Angle between each method's axis and the true one."""
     if run.true_spins_rps is None:
         return []
-    true_axes = run.true_spins_rps / np.linalg.norm(run.true_spins_rps, axis=1, keepdims=True)
     curves = []
     for method in run.methods:
         axes = [tick.estimates[method.name].axis for tick in run.ticks]
-        cosines = np.array(
-            [np.nan if axis is None else axis @ true for axis, true in zip(axes, true_axes, strict=True)]
-        )
+        pairs = zip(axes, run.true_spins_rps, strict=True)
+        cosines = [np.nan if axis is None else axis @ spin / np.linalg.norm(spin) for axis, spin in pairs]
         errors_deg = np.degrees(np.arccos(np.clip(cosines, -1, 1)))
         curves.append(Curve(method.name, f"{method.label} [°]", method.colour, errors_deg))
     return curves
