@@ -1,12 +1,10 @@
-"""What the command line shows while it works and when it is done: progress, tables, one-line notes."""
+"""Output of the command line to people: one-line notes, progress, the notice of compilation."""
 
 from __future__ import annotations
 
 import sys
 import time
-from pathlib import Path
 from types import TracebackType
-from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -15,7 +13,7 @@ PATIENCE_S = 1.0  # work that ends sooner shows no bar
 
 
 def note(text: str) -> None:
-    """One line on standard error."""
+    """Print one line on standard error."""
     print(text, file=sys.stderr, flush=True)
 
 
@@ -68,35 +66,3 @@ def announce_compilation() -> None:
             pass
 
     event.register("numba:compile", Announce())  # type: ignore[no-untyped-call]
-
-
-def print_reports(reports: list[dict[str, Any]]) -> None:
-    """The reports of `analyze` for people: a heading for every shot and a row for every method under it."""
-    for report in reports:
-        name = Path(report["recording"]["path"]).name
-        if "error" in report:
-            print(f"{name}: error: {report['error']}")
-        elif not report["shots"]:
-            print(f"{name}: {report['no_shot_reason']}")
-        for number, shot in enumerate(report.get("shots", [])):
-            speed = "" if shot["speed_m_s"] is None else f", {shot['speed_m_s']:.2f} m/s"
-            print(
-                f"{name}, shot {number + 1} of {len(report['shots'])}: {shot['start_us'] / 1000:.1f} to "
-                f"{shot['end_us'] / 1000:.1f} ms{speed}, {shot['logo_events']} logo events"
-            )
-            print(f"    {'method':<12} {'spin [rps]':>18}   {'axis x, y, z':<24}  {'+- [deg]':>8}")
-            for method, estimate in shot["spin"].items():
-                print(f"  {'*' if method == shot['best'] else ' '} {method:<12} {_row(estimate)}")
-    print("* = trusted; +- is 1 sigma; axis in the camera frame: x right, y down, z into the scene")
-    for report in reports:
-        for warning in report.get("warnings", []):
-            note(f"warning: {Path(report['recording']['path']).name}: {warning}")
-
-
-def _row(estimate: dict[str, Any]) -> str:
-    if estimate["status"] != "ok":
-        return f"refused: {estimate['reason']}"
-    std, axis_std = estimate["magnitude_std_rps"], estimate["axis_std_deg"]
-    spin = f"{estimate['magnitude_rps']:.2f}" + ("" if std is None else f" +- {std:.2f}")
-    axis = ", ".join(f"{value:+.3f}" for value in estimate["axis"])
-    return f"{spin:>18}   {axis:<24}  " + ("" if axis_std is None else f"{axis_std:>8.1f}")

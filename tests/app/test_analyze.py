@@ -12,8 +12,11 @@ import h5py
 import jsonschema
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from spinscope.app.cli import cli
 from spinscope.pipeline.session import Choices, Session
+from spinscope.pipeline.stages.logo import LogoParameters
 
 SCHEMA = json.loads((Path(__file__).parent / "analyze.schema.json").read_text(encoding="utf-8"))
 FLIGHTS = (
@@ -176,3 +179,14 @@ def test_wrong_input_is_one_clear_line_and_status_2(samples: Path, arguments: li
     assert done.stderr.count("\n") == 1, done.stderr
     assert says in done.stderr
     assert done.stdout == ""
+
+
+def test_a_former_name_of_a_parameter_is_taken_with_a_notice(samples: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(LogoParameters, "renamed", {"margin_px": "pad_px"})
+    arguments = [str(samples / "spinner_ball5_back_no_logo.h5"), "--set", "logo.margin_px=3"]
+    done = CliRunner().invoke(cli, ["analyze", *arguments])
+    assert done.exit_code == 0, done.output
+    assert "warning: spinner_ball5_back_no_logo.h5: logo.margin_px is now called logo.pad_px" in done.stderr
+    report = json.loads(CliRunner().invoke(cli, ["analyze", *arguments, "--json", "-"]).stdout)
+    assert report["parameters"]["logo"]["pad_px"] == 3.0
+    assert report["warnings"] == ["logo.margin_px is now called logo.pad_px"]

@@ -2,15 +2,34 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
+import click
 from rich.console import Console
 from rich.table import Table
 
 from spinscope.pipeline.recordings import RecordingInfo, open_recording, summary
 from spinscope.pipeline.session import Progress
 
+from ..terminal import ProgressBar
+from .options import RECORDING, sensor_option, write_text
+
 SHOWN = 60  # characters of an attribute; a simulation's scene is a page long
+
+
+@click.command()
+@click.argument("recording", type=RECORDING)
+@sensor_option
+@click.option("--json", "output", type=click.Path(), help="Write JSON to this file, - for standard output.")
+def info(recording: Path, sensor: tuple[int, int] | None, output: str | None) -> None:
+    """Say what a recording holds: format, sensor, events, duration, rates, hot pixels, triggers, damage."""
+    with ProgressBar() as bar:
+        found = information(recording, sensor, bar)
+    if output:
+        write_text(output, json.dumps(found.as_dict(), allow_nan=False) + "\n")
+    else:
+        print_information(found)
 
 
 def information(path: Path, sensor_px: tuple[int, int] | None, on_progress: Progress) -> RecordingInfo:

@@ -1,0 +1,157 @@
+"""Options and types of values that several commands share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from spinscope.pipeline.files import atomic_file
+from spinscope.pipeline.session import Choices
+
+RECORDING = click.Path(path_type=Path)
+
+
+class SensorSize(click.ParamType[tuple[int, int]]):
+    """WIDTHxHEIGHT in pixels."""
+
+    name = "WxH"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        width, _, height = str(value).lower().partition("x")
+        if not (width.isdecimal() and height.isdecimal() and 1 <= int(width) <= 65536 and 1 <= int(height) <= 65536):
+            self.fail(f"{value!r} is not a sensor size: write WIDTHxHEIGHT in pixels, like 1280x720", param, ctx)
+        return int(width), int(height)
+
+
+class FixedBall(click.ParamType[tuple[float, float, float] | str]):
+    """`auto`, or three numbers (the command line's are joined by commas before click sees them)."""
+
+    name = "X_PX Y_PX RADIUS_PX | auto"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float, float] | str:
+        if value == "auto":
+            return "auto"
+        try:
+            x, y, radius = (float(number) for number in str(value).split(","))
+        except ValueError:
+            self.fail(f"{value!r} is neither `auto` nor three numbers X_PX Y_PX RADIUS_PX", param, ctx)
+        return x, y, radius
+
+
+class RegisteredName(click.ParamType[str]):
+    """Name of an entry of a registry, read when the command is called.
+
+    Parameters
+    ----------
+    names : callable
+        `names() -> sequence of str`: the names that are allowed.
+    """
+
+    name = "name"
+
+    def __init__(self, names: Callable[[], Sequence[str]]) -> None:
+        self._names = names
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        return click.Choice(self._names()).convert(value, param, ctx)
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str | None:
+        return click.Choice(self._names()).get_metavar(param, ctx)
+
+
+class ListingCommand(click.Command):
+    """Command whose help ends with a list of entries, read when the help is shown.
+
+    Parameters
+    ----------
+    title : str
+        Heading of the list.
+    entries : callable
+        `entries() -> dict`: explanation of each entry by its name.
+    """
+
+    def __init__(self, *args: Any, title: str, entries: Callable[[], dict[str, str]], **rest: Any) -> None:
+        super().__init__(*args, **rest)
+        self._title, self._entries = title, entries
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section(self._title):
+            formatter.write_dl(list(self._entries().items()))
+
+
+sensor_option = click.option(
+    "--sensor", type=SensorSize(), help="Size of the sensor in pixels, where the file does not say it."
+)
+
+
+def session_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of a session to a command, which gets them as one `choices`."""
+    options = (
+        click.option(
+            "--preset",
+            metavar="NAME|FILE.toml",
+            help="Settings to start from: default, paper, or a TOML file.",
+        ),
+        click.option(
+            "--set",
+            "assignments",
+            multiple=True,
+            metavar="STAGE.FIELD=VALUE",
+            help="Change one setting; repeatable, like --set logo.pad_px=3.",
+        ),
+        click.option(
+            "--window",
+            type=int,
+            nargs=2,
+            metavar="START_US END_US",
+            help="Use only the events of [START, END), file time in us.",
+        ),
+        click.option(
+            "--fixed-ball",
+            type=FixedBall(),
+            help="The ball stays in place (ball spinner): its circle, or auto to find it.",
+        ),
+        sensor_option,
+    )
+
+    def with_choices(
+        preset: str | None,
+        assignments: tuple[str, ...],
+        window: tuple[int, int] | None,
+        fixed_ball: tuple[float, float, float] | str | None,
+        sensor: tuple[int, int] | None,
+        **rest: Any,
+    ) -> None:
+        if window and window[0] >= window[1]:
+            raise click.UsageError(f"--window {window[0]} {window[1]} is empty: START_US must be below END_US")
+        command(choices=Choices(preset, assignments, window, fixed_ball, sensor), **rest)
+
+    with_choices.__name__, with_choices.__doc__ = command.__name__, command.__doc__
+    decorated: Callable[..., None] = with_choices
+    for option in reversed(options):
+        decorated = option(decorated)
+    return decorated
+
+
+def write_text(output: str, text: str) -> None:
+    """Write text to a file, which appears whole or not at all, or to standard output for "-"."""
+    if output == "-":
+        click.echo(text, nl=False)
+    else:
+        with atomic_file(output, "JSON") as part:
+            part.write_text(text, encoding="utf-8")
+
+
+def join_fixed_ball(arguments: list[str]) -> list[str]:
+    """Join the values of `--fixed-ball X Y RADIUS` by commas: click wants a fixed number, and `auto` is one."""
+    if "--fixed-ball" not in arguments:
+        return arguments
+    at = arguments.index("--fixed-ball") + 1
+    if arguments[at : at + 1] == ["auto"] or "," in "".join(arguments[at : at + 1]):
+        return arguments
+    return [*arguments[:at], ",".join(arguments[at : at + 3]), *arguments[at + 3 :]]

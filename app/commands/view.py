@@ -1,0 +1,56 @@
+"""`spinscope view`: every stage of a recording in the viewer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from spinscope.pipeline.session import Choices, Session
+
+from ..terminal import ProgressBar, note
+from .options import RECORDING, ListingCommand, RegisteredName, session_options
+
+
+def _layouts() -> dict[str, str]:
+    """Names of the tabs and what they show."""
+    from ..viewer.views import views
+
+    return {view.name: view.help for view in views()}
+
+
+@click.command(cls=ListingCommand, title="Layouts", entries=_layouts)
+@click.argument("recording", type=RECORDING)
+@click.option(
+    "--save",
+    type=click.Path(path_type=Path),
+    metavar="FILE.rrd",
+    help="Write an .rrd file instead of opening the viewer.",
+)
+@click.option("--native", is_flag=True, help="Open Rerun's own window instead of the browser.")
+@click.option(
+    "--layout",
+    type=RegisteredName(lambda: tuple(_layouts())),
+    default="all",
+    show_default=True,
+    help="Which tab is in front.",
+)
+@session_options
+def view(recording: Path, save: Path | None, native: bool, layout: str, choices: Choices) -> None:
+    """Show every stage of a recording in the viewer."""
+    from .. import viewer
+
+    if native and not save:
+        viewer.require_display()
+    with ProgressBar() as bar:
+        session = Session.open(recording, choices, bar)
+        session = session.clip_for_viewing(bar)
+        result = session.estimate_keeping_ticks(bar)
+        for warning in session.warnings:
+            note(f"warning: {warning}")
+        if save:
+            viewer.save(result, save, layout=layout)
+    if save:
+        note(f"saved {save} ({save.stat().st_size / 1e6:.1f} MB): `uv run rerun {save}` opens it")
+    else:
+        viewer.show(result, layout=layout, native=native)
