@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -52,7 +52,7 @@ class Curve:
     name: str
     label: str
     colour: Colour
-    values: Sequence[float] | Floats
+    values: Floats
     variances: Floats | None = None
     unit: str = ""
     t_us: NDArray[np.int64] | Floats | None = None
@@ -80,15 +80,8 @@ class Curve:
             style = styled(entity, rr.SeriesLines, names=self.label, colors=self.colour, **look)
         return [columns_at(entity, t_us, rr.Scalars.columns(scalars=values)), style]
 
-    @property
-    def extent(self) -> Floats:
-        """Values that the plot's axis must reach over."""
-        values = np.asarray(self.values, np.float64)
-        deviations = [np.sqrt(self.variances)] if self.variances is not None else []
-        return np.concatenate([values, *(values + d for d in deviations), *(values - d for d in deviations)])
 
-
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Plot:
     """Curves over one span of time with an axis of their own.
 
@@ -136,8 +129,11 @@ class Plot:
 
     def _range(self, run: ViewedRun) -> Range | None:
         """Range of the curves with a tenth to spare on either side; None where they have no values."""
-        extents = [curve.extent for curve in self.curves(run) if curve.is_in_range]
-        values = np.concatenate([np.zeros(int(self.with_zero)), *extents])
+        values = np.zeros(int(self.with_zero))
+        for curve in self.curves(run):
+            if curve.is_in_range:
+                deviations = 0.0 if curve.variances is None else np.sqrt(curve.variances)
+                values = np.concatenate([values, curve.values - deviations, curve.values + deviations])
         known = values[np.isfinite(values)]
         if not known.size:
             return None
@@ -146,6 +142,6 @@ class Plot:
         return low - spare, high + spare
 
 
-def _from_start(values: Sequence[float] | Floats) -> Floats:
+def _from_start(values: Floats) -> Floats:
     """A column of ticks with a row before it, in which nothing is known."""
-    return np.concatenate([[np.nan], np.asarray(values, np.float64)])
+    return np.concatenate([[np.nan], values])

@@ -53,7 +53,7 @@ for _drawer in (
     Drawer(name="logo", stage="logo", draw=image.logo_chunks),
     Drawer(name="rate", stage="rate", plots=(plots.RATE_PLOT, plots.CROSSING_PLOT)),
     Drawer(name="flow", stage="flow", draw=image.flow_chunks),
-    Drawer(name="score", stage="contrast", draw=score_chunks),
+    Drawer(name="score", draw=score_chunks),
     Drawer(name="spin", plots=(plots.MAGNITUDE_PLOT, plots.COMPONENT_PLOT, plots.AXIS_ERROR_PLOT)),
     Drawer(name="ball", draw=ball_chunks),
     Drawer(name="derotated_logo", draw=derotated_logo_chunks),

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from . import entities as at
 from .ball import EYE, path_bounds_m
 from .run import ViewedRun
-from .summary import CARD_PX
 
 Floats = NDArray[np.float64]
 
@@ -67,20 +66,10 @@ def derotated_logo(name: str = "Derotated logo: sharp if spin is right", prefix:
     return picture(prefix + at.DEROTATED_LOGO, name)
 
 
-def unrolled_logo() -> rrb.View:
-    """The same on a map around the axis."""
-    return picture(at.UNROLLED, "Logo unrolled about the axis, grid 90°")
-
-
 def score_over_magnitude() -> rrb.View:
     """Score of contrast over magnitudes along the best axis."""
     corner = rrb.PlotLegend(corner="LeftTop")  # the maximum is in the middle
     return rrb.BarChartView(origin=at.SCORE_MAGNITUDE, name="Contrast over spin [rps]", plot_legend=corner)
-
-
-def score_over_axes() -> rrb.View:
-    """Score of contrast over directions of the axis."""
-    return picture(at.SCORE_AXES, "Contrast over axes: towards camera, away")
 
 
 def status() -> rrb.View:
@@ -88,11 +77,6 @@ def status() -> rrb.View:
     return rrb.StateTimelineView(
         origin=at.STATUS, name="State of the tracker", time_view=rrb.TimeAxis(link="LinkToGlobal")
     )
-
-
-def card() -> rrb.View:
-    """Card of the shot for the coach."""
-    return picture(at.COACH, "Shot", bounds=np.array([[0, CARD_PX], [0, CARD_PX]]))
 
 
 def ball(run: ViewedRun, name: str = "Ball with derotated logo", *, methods: bool = True) -> rrb.View:

@@ -46,30 +46,21 @@ def true_state(run: ViewedRun) -> Floats:
     return run.true_values(t_us, np.column_stack([*columns, truth.radius_px]))
 
 
-def _state_curves(index: int, run: ViewedRun) -> list[Curve]:
-    """Kalman value with its band, measured circles as dots, truth."""
+def _state_curves(index: int, is_residual: bool, run: ViewedRun) -> list[Curve]:
+    """Kalman value with its band, measured circles as dots, and truth; as residuals each minus the Kalman value."""
     component = STATE[index]
-    means, variances, unit = run.means[:, index], run.variances[:, index], component.unit
-    curves = [_kalman(means, variances, unit)]
-    if component.circle is not None:
-        hough = _measured([tick.track.hough if tick.track.has_ball else None for tick in run.ticks], component.circle)
+    unit, means, variances = component.unit, run.means[:, index], run.variances[:, index]
+    offset = means if is_residual else np.zeros(len(means))
+    curves = [Curve("kalman", "Kalman ± 1σ", at.KALMAN_COLOUR, means - offset, variances=variances, unit=unit)]
+    tracks = [tick.track for tick in run.ticks]
+    if component.circle is not None and not is_residual:
+        hough = _measured([track.hough if track.has_ball else None for track in tracks], component.circle)
         curves.append(Curve("hough", f"Hough [{unit}]", at.HOUGH_COLOUR, hough, marker="circle", width=2.5))
-        curves.append(_refined(run, component.circle))
+    if component.circle is not None:
+        refined = _measured([track.measured for track in tracks], component.circle) - offset
+        curves.append(Curve("measured", f"refined [{unit}]", at.MEASURED_COLOUR, refined, marker="circle", width=3.0))
     if run.truth is not None:
-        truth = true_state(run)[:, index]
-        curves.append(_truth(truth, f"truth [{unit}]", is_in_range=False))
-    return curves
-
-
-def _residual_curves(index: int, run: ViewedRun) -> list[Curve]:
-    """Measured circles and truth minus the Kalman value, in its band around zero."""
-    mean, zero = run.means[:, index], np.where(run.has_ball, 0.0, np.nan)
-    curves = [_kalman(zero, run.variances[:, index], "px")]
-    circle = STATE[index].circle
-    assert circle is not None
-    curves.append(_refined(run, circle, minus=mean))
-    if run.truth is not None:
-        curves.append(_truth(true_state(run)[:, index] - mean, "truth [px]", width=1.0))
+        curves.append(_truth(true_state(run)[:, index] - offset, f"truth [{unit}]", is_in_range=is_residual))
     return curves
 
 
@@ -148,13 +139,13 @@ def _magnitude_curves(run: ViewedRun) -> list[Curve]:
         values = _numbers([rate.spin_rps for rate in rates])
         curves.append(Curve("rate", "event rate's zero crossings", at.RATE_COLOUR, values))
     if run.true_spins_rps is not None:
-        curves.append(_truth(np.linalg.norm(run.true_spins_rps, axis=1), "truth"))
+        curves.append(_truth(np.linalg.norm(run.true_spins_rps, axis=1)))
     return curves
 
 
 def _magnitude_range(run: ViewedRun) -> Range:
     """From zero to beyond all but the highest magnitudes, and the truth."""
-    curves = {curve.name: np.asarray(curve.values) for curve in _magnitude_curves(run)}
+    curves = {curve.name: curve.values for curve in _magnitude_curves(run)}
     truth = curves.pop("truth", np.empty(0))
     known = np.concatenate([np.empty(0), *curves.values()])
     known = known[np.isfinite(known)]
@@ -186,17 +177,8 @@ def _axis_error_curves(run: ViewedRun) -> list[Curve]:
     return curves
 
 
-def _kalman(values: Floats, variances: Floats, unit: str) -> Curve:
-    return Curve("kalman", "Kalman ± 1σ", at.KALMAN_COLOUR, values, variances=variances, unit=unit)
-
-
-def _refined(run: ViewedRun, circle: str, minus: Floats | float = 0.0) -> Curve:
-    values = _measured([tick.track.measured for tick in run.ticks], circle) - minus
-    return Curve("measured", "refined [px]", at.MEASURED_COLOUR, values, marker="circle", width=3.0)
-
-
-def _truth(values: Floats, label: str, width: float = 0.8, is_in_range: bool = True) -> Curve:
-    return Curve("truth", label, at.TRUTH_COLOUR, values, width=width, is_in_range=is_in_range)
+def _truth(values: Floats, label: str = "truth", is_in_range: bool = True) -> Curve:
+    return Curve("truth", label, at.TRUTH_COLOUR, values, width=0.8, is_in_range=is_in_range)
 
 
 def _measured(circles: Sequence[Circle | None], name: str) -> Floats:
@@ -208,33 +190,16 @@ def _numbers(values: Sequence[float | None]) -> Floats:
 
 
 STATE_PLOTS = tuple(
-    Plot(entity=f"{at.PLOT}/{c.name}", title=f"{c.label} [{c.unit}]", curves=partial(_state_curves, i))
-    for i, c in enumerate(STATE)
+    Plot(f"{at.PLOT}/{c.name}", f"{c.label} [{c.unit}]", partial(_state_curves, i, False)) for i, c in enumerate(STATE)
 )
 RESIDUAL_PLOTS = tuple(
-    Plot(entity=f"{at.RESIDUAL}/{c.name}", title=f"{c.name} minus Kalman [px]", curves=partial(_residual_curves, i))
+    Plot(f"{at.RESIDUAL}/{c.name}", f"{c.name} minus Kalman [px]", partial(_state_curves, i, True))
     for i, c in enumerate(STATE)
     if c.circle is not None
 )
-EVENT_PLOT = Plot(entity=at.EVENT_COUNT, title="Event rate [Mev/s]", curves=_event_curves, legend="top", with_zero=True)
-RATE_PLOT = Plot(entity=at.RATE, title="Logo event rate [kev/s]", curves=_rate_curves, legend="top", with_zero=True)
-CROSSING_PLOT = Plot(
-    entity=at.RATE_CROSSINGS, title="Zero crossings of the rate", curves=_crossing_curves, legend="top"
-)
-MAGNITUDE_PLOT = Plot(
-    entity=at.SPIN_MAGNITUDE,
-    title="Spin [rps] ± 1σ",
-    curves=_magnitude_curves,
-    legend="bottom",
-    y_range=_magnitude_range,
-)
-COMPONENT_PLOT = Plot(
-    entity=at.SPIN_COMPONENTS,
-    title="Trusted spin [rps]",
-    curves=_component_curves,
-    legend="top",
-    with_zero=True,
-)
-AXIS_ERROR_PLOT = Plot(
-    entity=at.AXIS_ERROR, title="Axis error [°]", curves=_axis_error_curves, legend="top", y_range=lambda _: (0.0, 40.0)
-)
+EVENT_PLOT = Plot(at.EVENT_COUNT, "Event rate [Mev/s]", _event_curves, "top", with_zero=True)
+RATE_PLOT = Plot(at.RATE, "Logo event rate [kev/s]", _rate_curves, "top", with_zero=True)
+CROSSING_PLOT = Plot(at.RATE_CROSSINGS, "Zero crossings of the rate", _crossing_curves, "top")
+MAGNITUDE_PLOT = Plot(at.SPIN_MAGNITUDE, "Spin [rps] ± 1σ", _magnitude_curves, "bottom", _magnitude_range)
+COMPONENT_PLOT = Plot(at.SPIN_COMPONENTS, "Trusted spin [rps]", _component_curves, "top", with_zero=True)
+AXIS_ERROR_PLOT = Plot(at.AXIS_ERROR, "Axis error [°]", _axis_error_curves, "top", lambda _: (0.0, 40.0))

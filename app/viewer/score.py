@@ -6,6 +6,7 @@ pictures are of the last full estimate.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 
 import cv2
@@ -19,7 +20,7 @@ from spinscope.pipeline.spin.contrast.stage import ContrastResult
 from . import entities as at
 from .png import png
 from .rerun_api import Chunk, bars, columns_at, once, styled
-from .run import ViewedRun
+from .run import ViewedRun, vector_of
 
 Floats = NDArray[np.float64]
 
@@ -30,51 +31,79 @@ DISC_RADIUS_PX, GAP_PX = COARSE * CELL_PX // 2, COARSE_GAP * CELL_PX
 # Reach of a scored direction: half the distance of the hundred scored directions from each other.
 REACH_RAD = 0.18
 BRIGHTEST = 150  # grey value of the highest score: the marks on it must stand out
-# Of every mark: its colour, its length on the curve (of the highest score, below zero unless it is the curve's own
-# maximum) and its radius on the map, in pixels of the screen.
-MARKS: dict[str, tuple[at.Colour, float, float]] = {
-    "best": (contrast.STAGE.colour, 1.0, 6.0),
-    "rivals": (at.HOUGH_COLOUR, -0.16, 4.0),
-    "truth": (at.TRUTH_COLOUR, -0.08, 3.0),
-}
 MARK_WIDTH = 0.008  # of the curve's span
-
-
-def score_chunks(run: ViewedRun) -> list[Chunk]:
-    """Both pictures at every tick; empty where contrast has no best spin."""
-    results = [result if result.magnitudes_rps.size else None for result in run.results("contrast")]
-    spins = {
-        "best": [np.empty((0, 3)) if result is None else result.best_rps[None] for result in results],
-        "rivals": [np.empty((0, 3)) if result is None else result.rivals_rps for result in results],
-    }
-    if run.true_spins_rps is not None:
-        known = np.isfinite(run.true_spins_rps).all(axis=1) & np.array([result is not None for result in results])
-        spins["truth"] = [spin[None][: int(shown)] for spin, shown in zip(run.true_spins_rps, known, strict=True)]
-    return [*_over_magnitude(run, results, spins), *_over_axes(run, results, spins)]
-
-
-def _over_magnitude(
-    run: ViewedRun, results: list[ContrastResult | None], spins: dict[str, list[Floats]]
-) -> list[Chunk]:
-    """Bars over magnitude in rps, of the score and of the marks; those below zero may have other axes."""
-    curves = [(np.empty(0), np.empty(0)) if r is None else (r.magnitudes_rps, r.magnitude_scores) for r in results]
-    widths = [float(x[1] - x[0]) if x.size > 1 else 1.0 for x, _ in curves]
-    chunks = bars(f"{at.SCORE_MAGNITUDE}/score", run.times_us, [_NONE, *curves], [1.0, *widths], at.MASK_COLOUR)
-    for name, column in spins.items():
-        colour, length, _ = MARKS[name]
-        marks, mark_widths = [_NONE], [1.0]
-        for (x, y), rows in zip(curves, column, strict=True):
-            magnitudes = np.linalg.norm(rows, axis=1)
-            marks.append((magnitudes, np.full(magnitudes.size, length * y.max(initial=0.0))))
-            mark_widths.append(MARK_WIDTH * float(x.max(initial=1.0)))
-        chunks += bars(f"{at.SCORE_MAGNITUDE}/{name}", run.times_us, marks, mark_widths, colour)
-    return chunks
-
-
 _NONE: tuple[Floats, Floats] = (np.empty(0), np.empty(0))
 
 
-def _over_axes(run: ViewedRun, results: list[ContrastResult | None], spins: dict[str, list[Floats]]) -> list[Chunk]:
+@dataclass(frozen=True)
+class _Marks:
+    """Spins marked on both pictures.
+
+    Attributes
+    ----------
+    name : str
+        Last part of the entity path, as the legend shows it.
+    colour : (int, int, int)
+        Red, green and blue, 0..255.
+    height : float
+        On the curve, of the highest score; below zero unless it is the curve's own maximum: the axis may be another.
+    radius_ui : float
+        On the map, in points of the screen.
+    spins_rps : list of (k, 3) float64
+        Spins at every tick.
+    """
+
+    name: str
+    colour: at.Colour
+    height: float
+    radius_ui: float
+    spins_rps: list[Floats]
+
+
+def score_chunks(run: ViewedRun) -> list[Chunk]:
+    """Both pictures at every tick, with the answers of all methods; empty where contrast has no best spin."""
+    results = [result if result.magnitudes_rps.size else None for result in run.results("contrast")]
+    if not results:
+        return []
+    none = np.empty((0, 3))
+    best = [none if result is None else result.best_rps[None] for result in results]
+    rivals = [none if result is None else result.rivals_rps for result in results]
+    marks = [
+        _Marks("best", contrast.STAGE.colour, 1.0, 6.0, best),
+        _Marks("rivals", at.HOUGH_COLOUR, -0.16, 4.0, rivals),
+    ]
+    for method in run.methods:
+        if method is not contrast.STAGE:
+            answers = [vector_of(tick.estimates[method.name]) for tick in run.ticks]
+            marks.append(_Marks(method.name, method.colour, -0.12, 3.5, _known(answers, results)))
+    if run.true_spins_rps is not None:
+        truths = _known(list(run.true_spins_rps), results)
+        marks.append(_Marks("truth", at.TRUTH_COLOUR, -0.08, 3.0, truths))
+    return [*_over_magnitude(run, results, marks), *_over_axes(run, results, marks)]
+
+
+def _known(spins_rps: list[Floats], results: list[ContrastResult | None]) -> list[Floats]:
+    """Rows (0 or 1, 3) of the spins that have an axis, where there is a score."""
+    rows = zip(spins_rps, results, strict=True)
+    return [spin[None][: int(result is not None and np.isfinite(spin).all() and spin.any())] for spin, result in rows]
+
+
+def _over_magnitude(run: ViewedRun, results: list[ContrastResult | None], marks: list[_Marks]) -> list[Chunk]:
+    """Bars over magnitude in rps, of the score and of the marks."""
+    curves = [_NONE if r is None else (r.magnitudes_rps, r.magnitude_scores) for r in results]
+    widths = [float(x[1] - x[0]) if x.size > 1 else 1.0 for x, _ in curves]
+    chunks = bars(f"{at.SCORE_MAGNITUDE}/score", run.times_us, [_NONE, *curves], [1.0, *widths], at.MASK_COLOUR)
+    mark_widths = [1.0, *(MARK_WIDTH * float(x.max(initial=1.0)) for x, _ in curves)]
+    for mark in marks:
+        rows = [_NONE]
+        for (_, y), spins in zip(curves, mark.spins_rps, strict=True):
+            magnitudes = np.linalg.norm(spins, axis=1)
+            rows.append((magnitudes, np.full(magnitudes.size, mark.height * y.max(initial=0.0))))
+        chunks += bars(f"{at.SCORE_MAGNITUDE}/{mark.name}", run.times_us, rows, mark_widths, mark.colour)
+    return chunks
+
+
+def _over_axes(run: ViewedRun, results: list[ContrastResult | None], marks: list[_Marks]) -> list[Chunk]:
     """Two discs of axis directions: those towards the camera and those away from it, x right and y down in both."""
     times, pictures = [run.start_us], [np.full((COARSE, COARSE_WIDTH, 3), at.BACKGROUND, np.uint8)]
     last: Floats | None = None
@@ -93,12 +122,11 @@ def _over_axes(run: ViewedRun, results: list[ContrastResult | None], spins: dict
         styled(heat, rr.Image, magnification_filter="linear", draw_order=-20.0),
         *_frame(heat),
     ]
-    for name, column in spins.items():
-        columns = rr.Points2D.columns(positions=_on_map(np.concatenate(column)))
-        colour, _, radius = MARKS[name]
-        entity, look = f"{at.SCORE_AXES}/{name}", {"colors": colour, "radii": -radius, "draw_order": 40.0 - radius}
-        lengths = [0, *map(len, column)]
-        chunks += [styled(entity, rr.Points2D, **look), columns_at(entity, run.times_us, columns, lengths)]
+    for mark in marks:
+        columns = rr.Points2D.columns(positions=_on_map(np.concatenate(mark.spins_rps)))
+        entity, order = f"{at.SCORE_AXES}/{mark.name}", 40.0 - mark.radius_ui
+        chunks.append(styled(entity, rr.Points2D, colors=mark.colour, radii=-mark.radius_ui, draw_order=order))
+        chunks.append(columns_at(entity, run.times_us, columns, [0, *map(len, mark.spins_rps)]))
     return chunks
 
 

@@ -208,7 +208,7 @@ def _evidence(run: ViewedRun, tick: Tick) -> list[str]:
     """Results of the stages behind the answer, of those that were run."""
     mean, deviation = tick.track.mean, np.sqrt(np.diag(tick.track.covariance))
     lines = [
-        f"Tracker {tick.track.status}: centre ({mean[0]:.1f}, {mean[1]:.1f}) ± {deviation[:2].max():.1f} px, "
+        f"Tracker: {tick.track.status}; centre ({mean[0]:.1f}, {mean[1]:.1f}) ± {deviation[:2].max():.1f} px, "
         f"radius {mean[4]:.1f} ± {deviation[4]:.1f} px."
     ]
     if (logo := tick.get("logo")) is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
 import rerun.blueprint as rrb
 
 from spinscope.pipeline.extensions import Registry
@@ -13,6 +14,7 @@ from . import entities as at
 from . import panes, plots
 from .comparison import comparison
 from .run import ViewedRun
+from .summary import CARD_PX
 
 SLOW_MOTION = 0.01  # a flight of 100 ms plays for 10 s
 
@@ -135,9 +137,11 @@ def _logo(run: ViewedRun) -> rrb.Container:
 
 def _spin(run: ViewedRun) -> rrb.Container:
     shown = [plots.MAGNITUDE_PLOT, plots.COMPONENT_PLOT, *([] if run.truth is None else [plots.AXIS_ERROR_PLOT])]
+    unrolled = panes.picture(at.UNROLLED, "Logo unrolled about the axis, grid 90°")
+    score = panes.picture(at.SCORE_AXES, "Contrast over axes: towards camera, away")
     return rrb.Horizontal(
-        rrb.Vertical(panes.ball(run), panes.unrolled_logo(), row_shares=[3, 2]),
-        rrb.Vertical(panes.score_over_magnitude(), panes.score_over_axes(), row_shares=[4, 3]),
+        rrb.Vertical(panes.ball(run), unrolled, row_shares=[3, 2]),
+        rrb.Vertical(panes.score_over_magnitude(), score, row_shares=[4, 3]),
         rrb.Vertical(*(plot.view(run) for plot in shown)),
         panes.text(at.SUMMARY, "Summary"),
         column_shares=[4, 4, 3, 4],
@@ -145,10 +149,11 @@ def _spin(run: ViewedRun) -> rrb.Container:
 
 
 def _coach(run: ViewedRun) -> rrb.Container:
+    card = panes.picture(at.COACH, "Shot", bounds=np.array([[0, CARD_PX], [0, CARD_PX]]))
     flight = panes.flight(run, "Flight", (at.AXES, at.TRUE_PATH, at.SPIN_SHOWN))
     return rrb.Horizontal(
         panes.ball(run, "Ball and spin", methods=False),
-        rrb.Vertical(panes.card(), flight, row_shares=[3, 2]),
+        rrb.Vertical(card, flight, row_shares=[3, 2]),
         column_shares=[3, 2],
     )
 

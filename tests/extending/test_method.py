@@ -88,7 +88,7 @@ def test_its_rule_may_leave_the_answer_to_another(samples: Path) -> None:
 
 
 @pytest.mark.usefixtures("toy")
-def test_it_has_its_curve_its_arrow_and_its_row(samples: Path, tmp_path: Path) -> None:
+def test_it_has_its_curve_its_arrow_its_mark_on_the_score_and_its_row(samples: Path, tmp_path: Path) -> None:
     result = estimate(samples / "flight_fast_top.h5")
     viewer.save(result, tmp_path / "run.rrd")
     logged = read_back(tmp_path / "run.rrd")
@@ -99,6 +99,8 @@ def test_it_has_its_curve_its_arrow_and_its_row(samples: Path, tmp_path: Path) -
         assert curve.static["colors"] == [0x0A141EFF]
     assert logged[f"{entities.SPIN_MAGNITUDE}/toy"].at("values", end_us) == [25.0]
     assert logged[f"{entities.SPIN_ARROWS}/toy"].static["colors"] == [0x0A141EFF]
+    (places,) = logged[f"{entities.SCORE_MAGNITUDE}/toy"].at("abscissa", end_us)
+    assert places["buffer"] == [25.0]
     (text,) = logged[entities.SUMMARY].at("text", end_us)
     assert text.startswith("## 25.0 rps")
     assert "| **Toy method ✔** | 25.0 ± 1.0 |" in text

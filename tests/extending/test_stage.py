@@ -63,10 +63,10 @@ TOY = Stage(
 
 
 def toy_curves(run: ViewedRun) -> list[Curve]:
-    return [Curve("count", "events", (255, 255, 255), [result.count for result in run.results("toy")])]
+    return [Curve("count", "events", (255, 255, 255), np.array([result.count for result in run.results("toy")]))]
 
 
-TOY_PLOT = Plot(entity="/plots/toy", title="Toy", curves=toy_curves)
+TOY_PLOT = Plot("/plots/toy", "Toy", toy_curves)
 
 
 @pytest.fixture

@@ -70,6 +70,14 @@ def test_best_and_rivals_stand_at_their_magnitudes(rivalled: ViewedRun, logged: 
     assert (numbers(rivals, "values", tick.packet.end_us) < 0).all(), "below the curve: their axes are others"
 
 
+def test_the_other_methods_answers_are_marked(rivalled: ViewedRun, logged: dict[str, Rows]) -> None:
+    tick = rivalled.ticks[-3]
+    for method in ("triplet", "normal_flow"):
+        magnitude_rps = tick.estimates[method].magnitude_rps
+        marks = logged[f"{entities.SCORE_MAGNITUDE}/{method}"]
+        np.testing.assert_allclose(numbers(marks, "abscissa", tick.packet.end_us), [magnitude_rps])
+
+
 def test_axes_lie_on_the_disc_of_their_side(rivalled: ViewedRun, logged: dict[str, Rows]) -> None:
     tick = rivalled.ticks[-3]
     places = np.array(logged[f"{entities.SCORE_AXES}/rivals"].at("positions", tick.packet.end_us))
