@@ -18,7 +18,7 @@ def note(text: str) -> None:
 
 
 class ProgressBar:
-    """A bar on standard error of a terminal for work that takes longer than a second; calls take (share 0..1, what)."""
+    """Bar on standard error of a terminal for work that takes longer than a second; calls take (share 0..1, what)."""
 
     def __init__(self) -> None:
         self._begin = time.perf_counter()
@@ -51,7 +51,7 @@ class ProgressBar:
 
 
 def announce_compilation() -> None:
-    """Say once, in one line, when kernels are being compiled rather than loaded from the cache."""
+    """Print one line, once, when kernels are compiled rather than loaded from the cache."""
     from numba.core import event
 
     class Announce(event.Listener):

@@ -15,18 +15,23 @@ from spinscope.pipeline.errors import SpinscopeError
 if TYPE_CHECKING:
     from spinscope.pipeline.session import Result
 
-LAYOUTS = ("all", "tracker", "logo", "spin", "coach")
 
+def save(result: Result, path: Path, layout: str = "all") -> None:
+    """Write a result as an .rrd file with all views in it; the file appears whole or not at all.
 
-def save(
-    result: Result,
-    path: Path,
-    layout: str = "all",
-) -> None:
-    """Write the run as an .rrd file with its layouts in it; the file appears whole or not at all.
+    Parameters
+    ----------
+    result : Result
+        The result.
+    path : Path
+        File to write.
+    layout : str
+        Name of the view in front.
 
-    layout : which tab is in front (LAYOUTS)
-    Raises RecordingError when the file cannot be written.
+    Raises
+    ------
+    RecordingError
+        When the file cannot be written.
     """
     from .rrd import write_rrd
     from .run import ViewedRun
@@ -35,7 +40,7 @@ def save(
 
 
 def require_display() -> None:
-    """Raise SpinscopeError where Rerun's own window cannot open: to be asked before the work is done."""
+    """Raise SpinscopeError where Rerun's own window cannot open; called before the work is done."""
     linux = sys.platform.startswith("linux")
     if linux and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise SpinscopeError(

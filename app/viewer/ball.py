@@ -108,7 +108,7 @@ def _arrow(run: ViewedRun, entity: str, vectors: list[Floats], colour: at.Colour
 
 
 def _ring(run: ViewedRun) -> list[Chunk]:
-    """Most of a circle around the shown axis, ending in an arrow that shows which way the ball turns."""
+    """Ring around the shown axis with a gap, ending in an arrow that shows which way the ball turns."""
     spins = np.array([vector_of(shown_estimate(tick)[0]) for tick in run.ticks])
     magnitudes = np.linalg.norm(spins, axis=1)
     shown = run.has_ball & (magnitudes > 0)

@@ -1,4 +1,4 @@
-"""The viewer in Rerun's own window."""
+"""Viewer in Rerun's own window."""
 
 from __future__ import annotations
 
@@ -22,8 +22,19 @@ START_S = 30.0  # patience until the window has read the recording
 def show_native(run: ViewedRun, layout: str, *, window: tuple[str, ...] = ()) -> None:
     """Show the run in a window and wait until it is closed or Ctrl-C is pressed.
 
-    window : more arguments for Rerun's program
-    Raises SpinscopeError where no window can open.
+    Parameters
+    ----------
+    run : ViewedRun
+        The run.
+    layout : str
+        Name of the view in front.
+    window : tuple of str
+        More arguments for Rerun's program.
+
+    Raises
+    ------
+    SpinscopeError
+        Where no window can open.
     """
     if not window:
         require_display()
@@ -57,7 +68,7 @@ def show_native(run: ViewedRun, layout: str, *, window: tuple[str, ...] = ()) ->
 
 
 def _place_playhead(run: ViewedRun, port: int, process: subprocess.Popen[bytes]) -> None:
-    """Put the playhead where the track starts, as soon as the window has read the recording; give up quietly."""
+    """Put the playhead where the run opens, as soon as the window has read the recording; give up quietly."""
     deadline = time.monotonic() + START_S
     while process.poll() is None and time.monotonic() < deadline:
         if place_playhead(HOST, port, run.opening_us):

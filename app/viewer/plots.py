@@ -98,10 +98,19 @@ def _crossing_curves(run: ViewedRun) -> list[Curve]:
 
 
 def _rates(run: ViewedRun) -> tuple[NDArray[np.int64], Floats, Floats]:
-    """(n,) times, (n, 3) histogram, moving average and low-passed rate in 1000 events/s, (m,) crossings in us.
+    """Event rate of the whole run, put together from the ticks' results.
 
     The result of every tick covers the shot so far (its window's part): for each bin the latest result counts. A row
     of NaN leads, and separates the shots.
+
+    Returns
+    -------
+    t_us : (n,) int64
+        Starts of the bins.
+    rates : (n, 3) float64
+        Histogram, moving average and low-passed rate, 1000 events/s.
+    crossings_us : (m,) float64
+        Falling zero crossings; a single NaN where there are none.
     """
     times, curves, crossings = [], [], []
     covered_us = np.inf

@@ -1,4 +1,4 @@
-"""Pictures as PNG."""
+"""Encoding of pictures as PNG."""
 
 from __future__ import annotations
 
@@ -13,6 +13,6 @@ ORDERS = {3: [2, 1, 0], 4: [2, 1, 0, 3]}  # OpenCV has red last
 
 
 def png(image: NDArray[np.uint8]) -> bytes:
-    """A grey (height, width), RGB (height, width, 3) or RGBA image as PNG; five times as fast as Pillow's."""
+    """PNG of a grey (height, width), RGB (height, width, 3) or RGBA image; five times as fast as Pillow's."""
     ordered = image if image.ndim == 2 else image[..., ORDERS[image.shape[2]]]
     return bytes(cv2.imencode(".png", ordered, QUICK)[1])

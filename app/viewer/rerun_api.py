@@ -26,7 +26,7 @@ VERSION: str = rr.__version__
 
 
 class _NoPandas:
-    """A finder of modules that says there is no pandas."""
+    """Finder of modules that finds no pandas."""
 
     @staticmethod
     def find_spec(name: str, path: object = None, target: object = None) -> None:
@@ -51,7 +51,7 @@ _leave_pandas_out()
 
 
 def time_column(t_us: NDArray[np.int64] | NDArray[np.float64]) -> rr.TimeColumn:
-    """File time on the timeline, to the nanosecond: the viewer shows it as seconds, 105 000 us as 0.105 000 s."""
+    """Times on the timeline, file time to the nanosecond; the viewer shows them as seconds, 105 000 us as 0.105 s."""
     nanoseconds = np.round(np.asarray(t_us) * 1000).astype(np.int64)
     return rr.TimeColumn(TIMELINE, duration=nanoseconds.astype("timedelta64[ns]"))
 
@@ -62,14 +62,14 @@ def columns_at(
     columns: Any,
     lengths: Sequence[int] | NDArray[np.int64] | None = None,
 ) -> Chunk:
-    """One row a time; with `lengths`, that many instances a row (0 = nothing to be seen from then on)."""
+    """Rows of an entity, one a time; with `lengths`, that many instances a row (0 = nothing is shown from then on)."""
     if lengths is not None:
         columns = columns.partition(np.asarray(lengths))
     return Chunk.from_columns(entity, indexes=[time_column(t_us)], columns=columns)
 
 
 def once(entity: str, *archetypes: rr.AsComponents) -> Chunk:
-    """What does not change with time."""
+    """Static values of an entity."""
     batches = [batch for archetype in archetypes for batch in archetype.as_component_batches()]
     columns = [batch.partition([len(batch.as_arrow_array())]) for batch in batches]
     return Chunk.from_columns(entity, indexes=[], columns=columns)
@@ -77,7 +77,7 @@ def once(entity: str, *archetypes: rr.AsComponents) -> Chunk:
 
 @lru_cache(512)
 def styled(entity: str, archetype: Any, **look: Hashable) -> Chunk:
-    """The look of an entity whatever the run: fields of an archetype, one value each. Made once, as it takes 0.2 ms."""
+    """Look of an entity whatever the run: fields of an archetype, one value each. Made once, as it takes 0.2 ms."""
     return once(entity, archetype.from_fields(**{name: [value] for name, value in look.items()}))
 
 
@@ -111,13 +111,13 @@ def bars(
 
 @lru_cache
 def _bar(colour: Colour) -> list[rr.DescribedComponentBatch]:
-    """A single bar, with every component of a row of bars."""
+    """Single bar, with every component of a row of bars."""
     one = np.zeros(1)
     return list(rr.BarChart(one, abscissa=one, widths=one, color=colour).as_component_batches())
 
 
 def _tensors(rows: Sequence[NDArray[np.float64]]) -> pa.Array:
-    """Each row as a tensor of one dimension. Rerun's own batches hold one tensor, and making one takes 0.3 ms."""
+    """Tensors of one dimension, one a row. Rerun's own batches hold one tensor, and making one takes 0.3 ms."""
     whole = rr.components.TensorDataBatch._ARROW_DATATYPE
     shape, names, buffer = whole.fields
     kinds = list(buffer.type)
@@ -134,7 +134,7 @@ def _tensors(rows: Sequence[NDArray[np.float64]]) -> pa.Array:
 
 
 class _Arrow:
-    """An Arrow array as one of Rerun's batches."""
+    """Arrow array as one of Rerun's batches."""
 
     def __init__(self, array: pa.Array) -> None:
         self._array = array
@@ -144,7 +144,7 @@ class _Arrow:
 
 
 def states(entity: str, t_us: NDArray[Any], names: Sequence[str], colours: dict[str, Colour]) -> list[Chunk]:
-    """A lane of states over time: a row where the state changes."""
+    """Lane of states over time, with a row where the state changes."""
     changed = [i for i, name in enumerate(names) if i == 0 or name != names[i - 1]]
     style = rr.StateConfiguration(
         values=list(colours), labels=list(colours), colors=[(*colour, 255) for colour in colours.values()]
@@ -154,7 +154,7 @@ def states(entity: str, t_us: NDArray[Any], names: Sequence[str], colours: dict[
 
 
 def file_with(chunks: Iterable[Chunk], blueprint: rrb.Blueprint, path: Path, name: str) -> None:
-    """Write an .rrd with the layouts in it, which become the active ones when it is opened.
+    """Write an .rrd file with a blueprint in it, which becomes the active one when the file is opened.
 
     Each recording stream leaves a few idle threads behind: fine for a file a run, not for one a slider's move.
     """
@@ -219,9 +219,9 @@ def program() -> str:
 
 
 def quiet_environment() -> dict[str, str]:
-    """The environment for Rerun's own program: no usage data sent, without touching the user's settings of Rerun.
+    """Environment for Rerun's own program in which it sends no usage data; the user's settings of Rerun stay untouched.
 
-    Rerun sends none on a build server, which it knows by CI; RERUN_APP_ONLY skips its welcome.
+    Rerun sends none on a build server, which it recognises by CI; RERUN_APP_ONLY skips its welcome.
     """
     environment = {**os.environ, "CI": "true", "RERUN_APP_ONLY": "true", "RUST_LOG": "error"}
     environment.pop("FORCE_RERUN_ANALYTICS", None)

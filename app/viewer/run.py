@@ -116,7 +116,7 @@ class ViewedRun:
 
     @cached_property
     def has_ball(self) -> NDArray[np.bool_]:
-        """Whether there is a ball at the end of each tick (n,)."""
+        """Flags (n,) of the ticks at whose end there is a ball."""
         return np.array([tick.track.has_ball for tick in self.ticks], np.bool_)
 
     @cached_property
