@@ -1,0 +1,31 @@
+"""The committed picture shows the imports as they are."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+SCRIPT = Path(__file__).parents[2] / "docs" / "architecture.py"
+
+
+def test_picture_is_up_to_date() -> None:
+    digest = runpy.run_path(str(SCRIPT))["digest"]()
+    assert digest in SCRIPT.with_suffix(".svg").read_text(encoding="utf-8"), "run: uv run python docs/architecture.py"
+
+
+def test_picture_changes_with_the_imports(monkeypatch: pytest.MonkeyPatch) -> None:
+    import grimp
+
+    names = runpy.run_path(str(SCRIPT))
+    before, graph = names["digest"](), grimp.build_graph("spinscope")
+    graph.add_import(importer="spinscope.pipeline.simulator.scene", imported="spinscope.pipeline.kernels.eros")
+    monkeypatch.setattr(grimp, "build_graph", lambda _: graph)
+    assert names["digest"]() != before
+    assert names["draw"]().axes
+
+
+def test_imports_that_others_imply_are_not_drawn() -> None:
+    reduced = runpy.run_path(str(SCRIPT))["_reduced"]
+    assert reduced({("a", "b"), ("b", "c"), ("a", "c")}) == {("a", "b"), ("b", "c")}
