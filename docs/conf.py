@@ -14,7 +14,7 @@ from spinscope.pipeline.registry import STAGES, Parameters
 from spinscope.pipeline.stage import SpinMethod
 
 project = "Spinscope"
-author = "the Spinscope contributors"
+author = "the Spinscope developers"
 version = release = version_of("spinscope")
 
 extensions = ["sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode", "myst_parser"]

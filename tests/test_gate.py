@@ -43,7 +43,7 @@ def test_the_layer_check_would_notice_a_forbidden_import(tmp_path: Path) -> None
 
 def test_nothing_but_the_design_card_stands_at_the_top() -> None:
     allowed = {"app", "pipeline", "sample_recordings", "tests", "docs", "pyproject.toml", "README.md"}
-    allowed |= {"CHANGELOG.md", "CONTRIBUTING.md", "LICENSE"}
+    allowed |= {"CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE"}
     tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False).stdout
     tops = {line.split("/")[0] for line in tracked.splitlines() if not line.startswith(".")}
     assert tops <= allowed
