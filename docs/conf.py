@@ -17,7 +17,7 @@ project = "Spinscope"
 author = "the Spinscope developers"
 version = release = version_of("spinscope")
 
-extensions = ["sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode", "myst_parser"]
+extensions = ["sphinx.ext.autodoc", "sphinx.ext.viewcode", "numpydoc", "myst_parser"]
 exclude_patterns = ["_build", "examples"]
 default_role = "code"
 myst_enable_extensions = ["colon_fence", "deflist"]
@@ -26,8 +26,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the sections of the docstrings say dtype, shape and unit
 autodoc_preserve_defaults = True
 maximum_signature_line_length = 90
-napoleon_google_docstring = False
-napoleon_use_rtype = False
+numpydoc_show_class_members = False  # autodoc lists them
 
 html_theme = "furo"
 html_title = f"Spinscope {release}"
@@ -42,7 +41,7 @@ def public_names() -> Iterator[str]:
     classes = [name for name, _ in names if name not in functions and name not in errors]
     for heading, group, directive, option in (
         ("Functions", functions, "autofunction", ""),
-        ("Classes", classes, "autoclass", "   :members:\n"),
+        ("Classes", classes, "autoclass", "   :members:\n   :inherited-members:\n"),
         ("Errors", errors, "autoexception", "   :show-inheritance:\n"),
     ):
         yield f"## {heading}\n\n```{{eval-rst}}"
