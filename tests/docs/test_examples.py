@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import runpy
 import sys
 from pathlib import Path
@@ -10,7 +11,11 @@ from pathlib import Path
 import matplotlib
 import pytest
 
-EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
+import spinscope
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "docs" / "examples"
+SAMPLE = ROOT / "sample_recordings" / "flight_fast_top.h5"
 
 
 @pytest.fixture(autouse=True)
@@ -20,8 +25,7 @@ def _no_windows() -> None:
 
 def test_script(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     figure = tmp_path / "track.png"
-    sample = EXAMPLES.parents[1] / "sample_recordings" / "flight_fast_top.h5"
-    monkeypatch.setattr(sys, "argv", ["estimate.py", str(sample), str(figure)])
+    monkeypatch.setattr(sys, "argv", ["estimate.py", str(SAMPLE), str(figure)])
     runpy.run_path(str(EXAMPLES / "estimate.py"), run_name="__main__")
     assert figure.read_bytes().startswith(b"\x89PNG")
     printed = capsys.readouterr().out
@@ -47,3 +51,16 @@ def test_notebook(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 def test_notebook_is_committed_without_outputs() -> None:
     cells = json.loads((EXAMPLES / "notebook.ipynb").read_text(encoding="utf-8"))["cells"]
     assert all(not cell["outputs"] and cell["execution_count"] is None for cell in cells if cell["cell_type"] == "code")
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/getting_started.md"])
+def test_python_on_pages(page: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Blocks run in the root of a checkout; the columns of one's own events are a sample's."""
+    monkeypatch.chdir(ROOT)
+    events = spinscope.open_recording(SAMPLE).read()
+    namespace: dict[str, object] = {name: getattr(events, name) for name in ("t_us", "x_px", "y_px", "on")}
+    blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / page).read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+    assert blocks
+    for block in blocks:
+        exec(compile(block, page, "exec"), namespace)
+    assert "contrast" in capsys.readouterr().out
