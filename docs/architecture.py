@@ -50,7 +50,7 @@ class Box:
 
 def boxes_and_arrows() -> tuple[dict[str, Box], set[tuple[str, str]]]:
     """Boxes by key, and (importer, imported) pairs of keys, without those that others imply."""
-    graph = grimp.build_graph(ROOT)
+    graph = grimp.build_graph(ROOT, cache_dir=None)  # a cache goes by times of change: wrong after a checkout
     home: dict[str, str] = {}  # module of the second level -> key of its box
     for folder in ("app", "pipeline"):
         children = graph.find_children(f"{ROOT}.{folder}")

@@ -19,9 +19,9 @@ def test_picture_changes_with_the_imports(monkeypatch: pytest.MonkeyPatch) -> No
     import grimp
 
     names = runpy.run_path(str(SCRIPT))
-    before, graph = names["digest"](), grimp.build_graph("spinscope")
-    graph.add_import(importer="spinscope.pipeline.simulator.scene", imported="spinscope.pipeline.kernels.eros")
-    monkeypatch.setattr(grimp, "build_graph", lambda _: graph)
+    before, graph = names["digest"](), grimp.build_graph("spinscope", cache_dir=None)
+    graph.add_import(importer="spinscope.pipeline.recordings.sensor", imported="spinscope.pipeline.simulator.scene")
+    monkeypatch.setattr(grimp, "build_graph", lambda *_, **__: graph)
     assert names["digest"]() != before
     assert names["draw"]().axes
 
