@@ -98,7 +98,7 @@ def main() -> None:
 
     # Look at one stage's results tick by tick: here the optical flow of the logo's events.
     for tick in list(result.session.ticks(targets=("flow",)))[:8]:
-        ball = tick.track.reason or f"{tick.flow.t_us.size} events with flow"
+        ball = tick.track.reason or f"{len(tick.flow.events.t_us)} events with flow"
         print(f"  tick {tick.packet.index}, up to {tick.packet.end_us} us: {ball}")
 
     # Events of your own come in as columns, with the size of the sensor.
