@@ -243,10 +243,16 @@ class Chain:
         """Fresh state of a stage; raises ParameterError where values do not go together."""
         return stage.start(parameters.group(stage.group), self.context(parameters, stage))
 
-    def check(self, parameters: Parameters) -> None:
-        """Raise ParameterError where values do not go together."""
+    def check(self, parameters: Parameters, max_frame_bytes: int | None = None) -> None:
+        """Raise ParameterError where values do not go together, or one full frame for each tick takes more bytes."""
         for stage in STAGES:
             self.start(parameters, stage)
+        ticks = self.tick_count(parameters)
+        if max_frame_bytes is not None and ticks * self.source.width_px * self.source.height_px > max_frame_bytes:
+            raise ParameterError(
+                f"track.tick_us = {parameters.track.tick_us} makes {ticks} frames of this clip, more than fit in "
+                "memory: choose a longer tick or a shorter clip"
+            )
 
     def run(
         self,

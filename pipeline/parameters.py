@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
@@ -71,6 +72,8 @@ class Tunable:
         return number
 
     def _number(self, name: str, value: Any) -> float:
+        if isinstance(value, int) and abs(value) > sys.float_info.max:
+            raise ParameterError(f"{name} is too large a number: {self.allowed}")
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
             raise ParameterError(f"{name} = {value!r} is not a number: {self.allowed}")
         low = -math.inf if self.low is None else self.low

@@ -21,7 +21,7 @@ from .options import RECORDING, session_options
 @click.option("--no-browser", is_flag=True, help="Only print the address.")
 @session_options
 def tune(recording: Path, port: int | None, no_browser: bool, choices: Choices) -> None:
-    """Open a page with sliders beside the viewer: turn a knob, see the same instant change."""
+    """Open a page with a slider for every parameter beside the viewer."""
     from ..web import serve
 
     serve(recording, choices, port, open_browser=not no_browser)

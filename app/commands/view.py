@@ -38,9 +38,14 @@ def _layouts() -> dict[str, str]:
 @session_options
 def view(recording: Path, save: Path | None, native: bool, layout: str, choices: Choices) -> None:
     """Show every stage of a recording in the viewer."""
+    if not (save or native):
+        from ..web import serve
+
+        serve(recording, choices, tools=False, layout=layout)
+        return
     from .. import viewer
 
-    if native and not save:
+    if not save:
         viewer.require_display()
     with ProgressBar() as bar:
         session = Session.open(recording, choices, bar)
@@ -53,4 +58,4 @@ def view(recording: Path, save: Path | None, native: bool, layout: str, choices:
     if save:
         note(f"saved {save} ({save.stat().st_size / 1e6:.1f} MB): `uv run rerun {save}` opens it")
     else:
-        viewer.show(result, layout=layout, native=native)
+        viewer.show_window(result, layout)

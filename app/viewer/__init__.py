@@ -1,6 +1,6 @@
-"""The viewer: every stage of a run on one timeline, in a file, in the browser or in Rerun's own window.
+"""Viewer: every stage of a run on one timeline, in a file, in Rerun's own window, or in the web application.
 
-Nothing here loads Rerun before `save` or `show` is called: the other commands must not wait for it.
+Nothing here loads Rerun before `save` or `show_window` is called: the other commands must not wait for it.
 """
 
 from __future__ import annotations
@@ -49,24 +49,9 @@ def require_display() -> None:
         )
 
 
-def show(
-    result: Result,
-    layout: str = "all",
-    *,
-    native: bool = False,
-) -> None:
-    """Show the run until Ctrl-C: in the browser, or in Rerun's own window until that is closed.
-
-    Raises SpinscopeError when there is no display for the window, or no free port for the browser.
-    """
+def show_window(result: Result, layout: str = "all") -> None:
+    """Show the run in Rerun's own window until that is closed; raises SpinscopeError where no window can open."""
+    from .native import show_native
     from .run import ViewedRun
 
-    run = ViewedRun.of(result)
-    if native:
-        from .native import show_native
-
-        show_native(run, layout)
-    else:
-        from .web import show_web
-
-        show_web(run, layout)
+    show_native(ViewedRun.of(result), layout)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import subprocess
 import tempfile
 import time
@@ -14,8 +15,8 @@ from . import require_display
 from .rerun_api import place_playhead, program, quiet_environment
 from .rrd import write_rrd
 from .run import ViewedRun
-from .web import HOST, free_ports
 
+HOST = "127.0.0.1"
 START_S = 30.0  # patience until the window has read the recording
 
 
@@ -41,7 +42,8 @@ def show_native(run: ViewedRun, layout: str, *, window: tuple[str, ...] = ()) ->
     with tempfile.TemporaryDirectory(prefix="spinscope-") as folder:
         path = Path(folder) / "recording.rrd"
         write_rrd(run, path, layout)
-        (port,) = free_ports(1)
+        with socket.create_server((HOST, 0)) as free:
+            port = free.getsockname()[1]
         command = [program(), "--bind", HOST, "--port", str(port), "--hide-welcome-screen", *window, str(path)]
         process = subprocess.Popen(
             command,

@@ -1,4 +1,4 @@
-"""The embedded viewer's script and WebAssembly, from the rerun-notebook wheel, without importing it."""
+"""Scripts that the page takes from installed wheels, without importing these: Rerun's viewer and plotly.js."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ EXPORT = "\nexport { WebViewer };\n"
 
 
 def viewer_version() -> str:
-    """The version of the viewer; raises SpinscopeError when script and SDK are of different versions."""
+    """Version of the viewer; raises SpinscopeError when script and SDK are of different versions."""
     try:
         sdk, script = version("rerun-sdk"), version("rerun-notebook")
     except PackageNotFoundError as error:
@@ -25,14 +25,14 @@ def viewer_version() -> str:
 
 
 def viewer_wasm() -> Path:
-    """The viewer's WebAssembly."""
-    return _folder() / "re_viewer_bg.wasm"
+    """Path of the viewer's WebAssembly."""
+    return _folder("rerun_notebook") / "static" / "re_viewer_bg.wasm"
 
 
 def viewer_script() -> str:
-    """The viewer's script with its class made available; raises SpinscopeError when the class is not in it."""
+    """Script of the viewer with its class exported; raises SpinscopeError when the class is not in it."""
     try:
-        script = (_folder() / "widget.js").read_text(encoding="utf-8")
+        script = (_folder("rerun_notebook") / "static" / "widget.js").read_text(encoding="utf-8")
     except OSError as error:
         raise SpinscopeError(f"the viewer's script cannot be read ({error.strerror}): run `uv sync`") from None
     if CLASS not in script:
@@ -40,8 +40,13 @@ def viewer_script() -> str:
     return script + EXPORT
 
 
-def _folder() -> Path:
-    found = importlib.util.find_spec("rerun_notebook")
+def chart_script() -> Path:
+    """Path of plotly.js."""
+    return _folder("plotly") / "package_data" / "plotly.min.js"
+
+
+def _folder(package: str) -> Path:
+    found = importlib.util.find_spec(package)
     if found is None or not found.submodule_search_locations:
-        raise SpinscopeError("rerun-notebook is not installed: run `uv sync`")
-    return Path(found.submodule_search_locations[0]) / "static"
+        raise SpinscopeError(f"{package} is not installed: run `uv sync`")
+    return Path(found.submodule_search_locations[0])

@@ -1,10 +1,12 @@
-"""Results to take away: .rrd, JSON as `spinscope analyze` writes it, CSV, and a picture of the events."""
+"""Exports of a result: .rrd, JSON as `spinscope analyze` writes it, CSV; and a picture of the events."""
 
 from __future__ import annotations
 
 import csv
 import io
 import json
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -17,15 +19,15 @@ from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.session import Result
 
 
-def as_json(finished: Result) -> str:
-    """What `spinscope analyze --json` writes for the clip with these settings, on one line."""
-    return json.dumps(finished.to_dict(), allow_nan=False) + "\n"
+def as_json(result: Result) -> str:
+    """JSON on one line, as `spinscope analyze --json` writes it for the clip with these settings."""
+    return json.dumps(result.to_dict(), allow_nan=False) + "\n"
 
 
-def spins_csv(finished: Result) -> str:
-    """One row a shot and method."""
+def spins_csv(result: Result) -> str:
+    """CSV with a row for each shot and method."""
     rows = []
-    for number, shot in enumerate(finished.to_dict()["shots"]):
+    for number, shot in enumerate(result.to_dict()["shots"]):
         own = {"shot": number + 1, **{key: shot[key] for key in ("start_us", "end_us", "speed_m_s", "logo_events")}}
         for method, estimate in shot["spin"].items():
             x, y, z = estimate["vector_rps"] or (None, None, None)
@@ -47,26 +49,26 @@ def spins_csv(finished: Result) -> str:
     return _csv(rows)
 
 
-def track_csv(finished: Result) -> str:
-    """One row a shot and tick."""
+def track_csv(result: Result) -> str:
+    """CSV with a row for each shot and tick."""
     rows = []
-    for number, shot in enumerate(finished.to_dict()["shots"]):
+    for number, shot in enumerate(result.to_dict()["shots"]):
         track = shot["track"]
         for index in range(len(track["t_us"])):
             rows.append({"shot": number + 1, **{name: column[index] for name, column in track.items()}})
     return _csv(rows)
 
 
-def as_rrd(finished: Result) -> bytes:
-    """The run with its layouts, as `spinscope view --save` writes it."""
+def as_rrd(result: Result) -> bytes:
+    """Run with its layouts as .rrd, as `spinscope view --save` writes it."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "run.rrd"
-        save(finished, path)
+        save(result, path)
         return path.read_bytes()
 
 
-def picture_of(events: EventBatch, width_px: int, height_px: int) -> bytes:
-    """PNG of how often each pixel fired, the logarithm as brightness: where a ball in place is to be seen."""
+def event_picture(events: EventBatch, width_px: int, height_px: int) -> bytes:
+    """PNG of the number of events of each pixel, the logarithm as brightness: where a ball in place is to be seen."""
     counts = np.zeros((height_px, width_px))
     np.add.at(counts, (events.y_px, events.x_px), 1)
     bright = np.log1p(counts)
@@ -82,3 +84,21 @@ def _csv(rows: list[dict[str, Any]]) -> str:
         writer.writeheader()
         writer.writerows(rows)
     return text.getvalue()
+
+
+@dataclass(frozen=True, slots=True)
+class Export:
+    """A kind of file that a result is saved as."""
+
+    label: str
+    make: Callable[[Result], str | bytes]
+    media_type: str
+    suffix: str
+
+
+EXPORTS = {
+    "run.rrd": Export("Recording with layout (.rrd)", as_rrd, "application/octet-stream", "rrd"),
+    "results.json": Export("Results (JSON)", as_json, "application/json", "json"),
+    "spins.csv": Export("Spin of every method (CSV)", spins_csv, "text/csv", "spins.csv"),
+    "track.csv": Export("Track (CSV)", track_csv, "text/csv", "track.csv"),
+}

@@ -1,66 +1,75 @@
-"""Longer work for a page beside its run: a tuning curve, a search, a new simulation; each can be cancelled."""
+"""Jobs of a client session beside its runs: sweeps, optimization, re-simulation; each can be cancelled."""
 
 from __future__ import annotations
 
 import threading
 import traceback
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 from spinscope.pipeline.errors import SpinscopeError
 
-from .outbox import Outbox
+from .message_queue import MessageQueue
+from .schemas import BiasesMessage, BiasSweepMessage, OptimizationMessage, SweepMessage
+
+STAGE_PACKAGES = ("spinscope.pipeline.stages.", "spinscope.pipeline.spin.")
+JobMessageType = type[SweepMessage] | type[OptimizationMessage] | type[BiasesMessage] | type[BiasSweepMessage]
 
 
 class Cancelled(Exception):  # no error: somebody changed their mind
-    """The work is not wanted any more."""
+    """The job is not wanted any more."""
 
 
 class Job:
-    """One piece of work in a thread of its own, which tells the page of it in messages of its kind.
+    """One job in a thread of its own, which reports its progress in messages of one type.
 
-    Every message has a state: running, done, cancelled or failed (with the error).
+    Parameters
+    ----------
+    message : type
+        Type of the messages.
+    work : callable
+        Does the work with the job's `report` and `check` and returns the final content.
     """
 
-    def __init__(self, kind: str, outbox: Outbox, work: Callable[[Job], dict[str, Any]]) -> None:
-        self._kind, self._outbox, self._work = kind, outbox, work
+    def __init__(self, message: JobMessageType, queue: MessageQueue, work: Callable[[Job], Any]) -> None:
+        self._message, self._queue, self._work = message, queue, work
         self._cancelled = threading.Event()
-        self._thread = threading.Thread(target=self._run, name=kind, daemon=True)
+        self._thread = threading.Thread(target=self._run, name=message.__name__, daemon=True)
         self._thread.start()
 
-    def tell(self, **content: Any) -> None:
-        """Report how far it is."""
-        self._outbox.put(self._kind, state="running", **content)
+    def report(self, content: Any) -> None:
+        """Report progress."""
+        self._put("running", content)
 
     def check(self) -> None:
-        """Called between two pieces of work: raises Cancelled when nobody wants the rest."""
+        """Raise Cancelled when the rest is not wanted; called between two pieces of work."""
         if self._cancelled.is_set():
             raise Cancelled
 
     def cancel(self, wait_s: float = 0.0) -> None:
-        """Stop the work soon, and wait for that at most so long."""
+        """Cancel the job, and wait at most so long for its end."""
         self._cancelled.set()
         if wait_s:
             self._thread.join(wait_s)
 
     def _run(self) -> None:
-        content: dict[str, Any] = {}
         try:
-            content = self._work(self)
-            state = "done"
+            self._put("done", self._work(self))
         except Cancelled:
-            state = "cancelled"
+            self._put("cancelled")
         except Exception as error:  # noqa: BLE001  # whatever happens, the page is told
-            state, content = "failed", {"error": fault(error)}
-        self._outbox.put(self._kind, state=state, **content)
+            self._put("failed", error=error_text(error))
+
+    def _put(
+        self, state: Literal["running", "done", "cancelled", "failed"], content: Any = None, error: str | None = None
+    ) -> None:
+        self._queue.put(self._message(state=state, content=content, error=error))
 
 
-def fault(error: Exception) -> str:
+def error_text(error: Exception) -> str:
     """One line for people: our own message, or which stage failed and how."""
     if isinstance(error, SpinscopeError):
         return str(error)
-    places = [str(frame.f_globals.get("__name__")) for frame, _ in traceback.walk_tb(error.__traceback__)]
-    stage = next(
-        (place.rsplit(".", 1)[1] for place in places if place.startswith("spinscope.pipeline.stages.")), "the tuner"
-    )
-    return f"{stage} failed: {type(error).__name__}: {' '.join(str(error).split())[:300]}"
+    modules = [str(frame.f_globals.get("__name__")) for frame, _ in traceback.walk_tb(error.__traceback__)]
+    stages = [name.split(".")[3] for name in modules if name.startswith(STAGE_PACKAGES)]
+    return f"{next(iter(stages), 'the server')} failed: {type(error).__name__}: {' '.join(str(error).split())[:300]}"

@@ -1,4 +1,4 @@
-"""Presets for the page: the built-in ones, the user's TOML, and the command line that gives the same numbers."""
+"""Presets: the built-in ones, TOML of the user, and the command line that gives the same numbers."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import tomli_w
+
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.presets import FOLDER
 from spinscope.pipeline.registry import Parameters
@@ -14,13 +16,11 @@ from spinscope.pipeline.registry import Parameters
 from .controls import setup_of
 
 Values = dict[str, dict[str, Any]]
-
-
-BIAS_FILE, AGAIN_FILE = "spinscope.bias", "again.h5"  # what the page saves, and the scene taken again with it
+BIAS_FILE, AGAIN_FILE = "spinscope.bias", "again.h5"  # what the page saves, and the scene simulated with it
 
 
 def built_in(opened: Parameters) -> dict[str, Values]:
-    """The presets by name, each in the set-up of the opened recording; `opened` is what it was opened with."""
+    """Presets by name, each in the set-up of the opened recording; `opened` is what it was opened with."""
     found = {}
     for path in sorted(FOLDER.glob("*.toml")):
         found[path.stem] = applied(path.read_text(encoding="utf-8"), opened).as_dict()
@@ -29,7 +29,7 @@ def built_in(opened: Parameters) -> dict[str, Values]:
 
 
 def applied(text: str, opened: Parameters) -> Parameters:
-    """The parameters of a TOML preset; what belongs to the set-up is kept unless the preset names it.
+    """Parameters of a TOML preset; what belongs to the set-up is kept unless the preset names it.
 
     Raises ParameterError that says what is wrong with the preset.
     """
@@ -41,21 +41,22 @@ def applied(text: str, opened: Parameters) -> Parameters:
 
 
 def as_toml(parameters: Parameters) -> str:
-    """A preset of all that differs from the defaults."""
-    lines = ["# Settings of Spinscope; what is not named here has its default."]
-    for group, values in _differing(parameters, Parameters()).items():
-        lines += ["", f"[{group}]"]
-        declared = parameters.group(group).tunables()
-        for name, value in values.items():
-            help_text = f"  # {declared[name].help}" if declared[name].help else ""
-            lines.append(f"{name} = {_toml(value)}{help_text}")
-    return "\n".join([*lines, ""])
+    """TOML of all that differs from the defaults."""
+    note = "# Settings of Spinscope; what is not named here has its default.\n\n"
+    return note + tomli_w.dumps(_differing(parameters, Parameters()))
 
 
 def command(path: Path, parameters: Parameters, window_us: tuple[int, int] | None, *, again: bool = False) -> str:
-    """The command that gives the same numbers: `spinscope analyze ...`, ready for a shell.
+    """Command that gives the same numbers, `spinscope analyze ...`, ready for a shell.
 
-    again : the scene of the recording was simulated again, with the biases of BIAS_FILE
+    Parameters
+    ----------
+    path : Path
+        The recording.
+    window_us : (int, int) or None
+        Clip [start, end); None for all of it.
+    again : bool
+        Whether the scene of the recording was simulated again, with the biases of BIAS_FILE.
     """
     words = ["spinscope", "analyze", AGAIN_FILE if again else str(path)]
     for group, values in _differing(parameters, Parameters()).items():
@@ -86,16 +87,6 @@ def _differing(parameters: Parameters, other: Parameters) -> Values:
         if changed:
             found[group] = changed
     return found
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return f'"{value}"'
-    if isinstance(value, list):
-        return f"[{', '.join(_toml(item) for item in value)}]"
-    return repr(value)
 
 
 def _assignment(value: Any) -> str:

@@ -53,8 +53,8 @@ def client(tuner: Served) -> Client:
 def bytes_of(client: Client, parameters: dict[str, Any], contrast_ms: list[float]) -> bytes:
     """Change, wait, fetch: what the page does; notes what `contrast` took of it."""
     done = client.run(parameters)
-    contrast_ms.append(done["stages"]["contrast"])
-    return client.http.get(client.path(f"pictures/{done['recording']}")).content
+    contrast_ms.append(done["stages_ms"]["contrast"])
+    return client.http.get(client.path(f"pictures/{done['picture']['id']}")).content
 
 
 @pytest.mark.parametrize("knob", KNOBS)
@@ -86,10 +86,10 @@ def test_change_to_first_bytes(benchmark: Any, client: Client, knob: str) -> Non
     kind = type(start) if knob != "spin" else float
 
     def first(values: dict[str, Any]) -> bytes:
-        wish = client.wish({stage: values}, hasty=True)
-        client.http.post(client.path("run"), json=wish)
-        told = client.wait("run", lambda m: m["serial"] == wish["serial"] and m["state"] in ("partial", "done"))
-        return client.http.get(client.path(f"pictures/{told['recording']}")).content
+        request = client.request({stage: values}, interactive=True)
+        client.http.post(client.path("run"), json=request)
+        told = client.wait("run", lambda m: m["serial"] == request["serial"] and m["state"] in ("partial", "done"))
+        return client.http.get(client.path(f"pictures/{told['picture']['id']}")).content
 
     def change() -> tuple[tuple[dict[str, Any]], dict[str, Any]]:
         client.wait("run", lambda m: m["serial"] == client.serial and m["state"] == "done")
@@ -150,11 +150,11 @@ CHANGE = """([pad, settled]) => new Promise((resolve) => {
     const began = performance.now(), before = runner.serial;
     let answer = null;
     const heard = ({ detail }) => {
-        if (detail.serial > before && detail.recording) answer ??= performance.now() - began;
+        if (detail.serial > before && detail.picture) answer ??= performance.now() - began;
     };
     connection.addEventListener("run", heard);
     const look = new MutationObserver(() => {
-        if (runner.serial > before && dataset.picture.startsWith(`${connection.page}-${before + 1}`)) {
+        if (runner.serial > before && dataset.picture.startsWith(`${connection.session}-${before + 1}`)) {
             look.disconnect();
             connection.removeEventListener("run", heard);
             resolve([answer, performance.now() - began]);
@@ -194,7 +194,7 @@ def _shows(page: Any) -> list[float]:
     pictures = []
     for pad in (3.0, 4.0):
         page.evaluate(CHANGE, [pad, True])
-        pictures.append(page.evaluate("`${window.spinscope.connection.page}-${window.spinscope.runner.serial}`"))
+        pictures.append(page.evaluate("`${window.spinscope.connection.session}-${window.spinscope.runner.serial}`"))
     took: list[float] = page.evaluate(
         """async ([pictures, count, pause]) => {
             const { connection, viewer } = window.spinscope, took = [], all = [];

@@ -1,12 +1,23 @@
-// Fixed ball (ball spinner): where it is, by typing, by clicking centre and edge, or found by the program.
+// Fixed ball (ball spinner): its circle, typed, picked by centre and edge in an image, or found automatically.
 
-import { element, notice } from "./elements.js";
-import { post } from "./server.js";
+/** @import { Opening } from "./messages.d.ts" */
+/** @import { Connection } from "./server.js" */
+/** @import { Settings } from "./settings.js" */
+
+import { attempt, element, notice } from "./elements.js";
 
 export class Ball {
+  /**
+   * @param {any} parent
+   * @param {{connection: Connection, settings: Settings, opening: Opening}} app
+   */
   constructor(parent, { connection, settings, opening }) {
-    Object.assign(this, { connection, settings, opening });
-    this.boxes = ["x", "y", "radius"].map((name) => element("input.number", { type: "text", placeholder: "–", "aria-label": `fixed ball ${name} in px` }));
+    this.connection = connection;
+    this.settings = settings;
+    this.opening = opening;
+    this.boxes = ["x", "y", "radius"].map((name) =>
+      element("input.number", { type: "text", placeholder: "–", "aria-label": `fixed ball ${name} in px` })
+    );
     this.state = element("p.note");
     parent.append(
       this.state,
@@ -14,11 +25,11 @@ export class Ball {
       element(
         "div.row",
         {},
-        element("button", { onclick: () => this.#typed() }, "Fix the ball there"),
-        element("button", { onclick: () => this.#click() }, "Click it"),
-        element("button", { onclick: () => this.#find() }, "Find it"),
+        element("button", { onclick: () => this.#typed() }, "Use this circle"),
+        element("button", { onclick: () => this.#pick() }, "Pick in the image"),
+        element("button", { onclick: () => attempt(() => this.#find()) }, "Find automatically"),
       ),
-      (this.fly = element("button", { onclick: () => settings.set("track.ball", "flying") }, "It flies")),
+      this.fly = element("button", { onclick: () => settings.set("track.ball", "flying") }, "Ball in flight"),
     );
     settings.addEventListener("change", () => this.#refresh());
     this.#refresh();
@@ -28,7 +39,9 @@ export class Ball {
     const track = this.settings.parameters.track;
     const fixed = track.ball === "fixed";
     this.fly.hidden = !fixed;
-    this.state.textContent = fixed ? "The ball stays in place." : "The ball flies. A ball spinner's ball stays in place: say where.";
+    this.state.textContent = fixed
+      ? "The ball stays in place (ball spinner)."
+      : "The ball is in flight. For a ball spinner, give the circle of the ball.";
     ["x", "y", "radius"].forEach((name, i) => {
       if (document.activeElement !== this.boxes[i]) this.boxes[i].value = track[`fixed_${name}_px`] ?? "";
     });
@@ -43,32 +56,30 @@ export class Ball {
     this.#fix({ fixed_x_px: x, fixed_y_px: y, fixed_radius_px: radius });
   }
 
-  #fix(values) {
-    document.activeElement?.blur();
+  #fix(/** @type {Record<string, number>} */ values) {
+    /** @type {HTMLElement | null} */ (document.activeElement)?.blur();
     this.settings.setAll({ track: { ball: "fixed", ...values } });
   }
 
   async #find() {
-    const [start_us, end_us] = this.settings.clip;
-    try {
-      this.#fix(await post(this.connection.path("find_ball"), { parameters: this.settings.parameters, start_us, end_us }));
-    } catch (error) {
-      notice(error.message);
-    }
+    this.#fix(await this.connection.post("find_ball", this.settings.request));
   }
 
-  // A picture of where events were: the first click is the centre, the second one on the edge.
-  #click() {
+  // An image of all events: the first click is the centre, the second one on the edge.
+  #pick() {
     const [start_us, end_us] = this.settings.clip;
     const { width_px, height_px } = this.opening.recording;
-    const image = element("img", { src: this.connection.path(`events.png?start_us=${start_us}&end_us=${end_us}`), alt: "events of the clip" });
+    const image = element("img", {
+      src: this.connection.path(`events.png?start_us=${start_us}&end_us=${end_us}`),
+      alt: "events of the clip",
+    });
     const words = element("p", {}, "Click the centre of the ball, then its edge. The wheel zooms, Esc closes.");
     const frame = element("div.frame", {}, image);
     const dialog = element("dialog.pick", {}, words, frame);
     document.body.append(dialog);
     dialog.addEventListener("close", () => dialog.remove());
     let zoom = 1;
-    frame.addEventListener("wheel", (event) => {
+    frame.addEventListener("wheel", (/** @type {WheelEvent} */ event) => {
       event.preventDefault();
       const at = place(event);
       zoom = Math.min(Math.max(zoom * (event.deltaY < 0 ? 1.3 : 1 / 1.3), 1), 12);
@@ -77,12 +88,16 @@ export class Ball {
       frame.scrollLeft = (at.x / width_px) * image.clientWidth - (event.clientX - box.left);
       frame.scrollTop = (at.y / height_px) * image.clientHeight - (event.clientY - box.top);
     }, { passive: false });
-    const place = (event) => {
+    const place = (/** @type {MouseEvent} */ event) => {
       const box = image.getBoundingClientRect();
-      return { x: ((event.clientX - box.left) / box.width) * width_px - 0.5, y: ((event.clientY - box.top) / box.height) * height_px - 0.5 };
+      return {
+        x: ((event.clientX - box.left) / box.width) * width_px - 0.5,
+        y: ((event.clientY - box.top) / box.height) * height_px - 0.5,
+      };
     };
+    /** @type {{x: number, y: number} | null} */
     let centre = null;
-    image.addEventListener("click", (event) => {
+    image.addEventListener("click", (/** @type {MouseEvent} */ event) => {
       const at = place(event);
       if (!centre) {
         centre = at;
@@ -91,8 +106,12 @@ export class Ball {
       }
       const radius = Math.hypot(at.x - centre.x, at.y - centre.y);
       dialog.close();
-      const round = (value) => Number(value.toFixed(1));
-      this.#fix({ fixed_x_px: round(centre.x), fixed_y_px: round(centre.y), fixed_radius_px: Math.max(round(radius), 1) });
+      const round = (/** @type {number} */ value) => Number(value.toFixed(1));
+      this.#fix({
+        fixed_x_px: round(centre.x),
+        fixed_y_px: round(centre.y),
+        fixed_radius_px: Math.max(round(radius), 1),
+      });
     });
     dialog.showModal();
   }

@@ -1,50 +1,64 @@
-// Biases of the sensor: take a simulated scene again, and what each bias does to noise and ball.
+// Biases of the sensor: simulate a scene again, and what each bias does to noise and ball. Event: `taken`.
 
-import { chart } from "./chart.js";
-import { download, element, notice } from "./elements.js";
+/** @import { BiasesMessage, BiasRange, BiasState, BiasSweep, BiasSweepMessage, BiasSweepPoint } from "./messages.d.ts" */
+/** @import { Opening, SweptBias } from "./messages.d.ts" */
+/** @import { Connection } from "./server.js" */
+
+import { Chart } from "./chart.js";
+import { attempt, download, element, notice } from "./elements.js";
 import { post } from "./server.js";
 
-// "Pixel sensitivity" in the paper's supplement: both thresholds at once.
-const TOGETHER = { diff_on_off: ["diff_on", "diff_off"] };
-const COLOURS = { on: "#ef5350", off: "#4295f5" };
-
 export class Biases extends EventTarget {
+  /** @type {Map<string, any>} */
+  #rows = new Map();
+  /** @type {Map<string, Chart>} */
+  #drawn = new Map();
+
+  /**
+   * @param {any} parent
+   * @param {{connection: Connection, opening: Opening}} app
+   */
   constructor(parent, { connection, opening }) {
     super();
     this.connection = connection;
+    this.colours = opening.colours;
+    /** @type {BiasState} */
     this.state = opening.biases;
     this.values = { ...this.state.values };
-    this.before = { ...this.values }; // what the events that are seen were taken with
+    this.before = { ...this.values }; // what the events that are seen were made with
     this.unwanted = false;
-    this.rows = new Map();
     this.note = element("p.note");
     this.progress = element("progress", { hidden: true, max: 1, value: 0 });
     this.stop = element("button", { hidden: true, onclick: () => this.#cancel() }, "Cancel");
     const rows = Object.entries(this.state.ranges).map(([name, range]) => this.#row(name, range));
-    this.file = element("input", { type: "file", accept: ".bias", hidden: true, onchange: () => this.#load() });
-    this.which = element("select", { "aria-label": "Bias of the curve" }, 
-      element("option", { value: "diff_on_off" }, "diff_on = diff_off"),
-      ...Object.keys(this.state.ranges).map((name) => element("option", { value: name }, name)),
-    );
-    this.draw = element("button", { onclick: () => this.#curve() });
+    const load = { type: "file", accept: ".bias", hidden: true, onchange: () => attempt(() => this.#load()) };
+    this.file = element("input", load);
+    const options = this.state.swept.map(({ name, label }) => element("option", { value: name }, label));
+    this.which = element("select", { "aria-label": "Bias to sweep" }, ...options);
+    this.draw = element("button", { onclick: () => attempt(() => this.#sweep()) });
+    this.text = element("div");
     this.charts = element("div.charts");
+    const open = element("button", { onclick: () => this.file.click() }, "Load .bias");
+    const save = element("button", { onclick: () => attempt(() => this.#save()) }, "Save .bias");
     parent.append(
       this.note,
       ...rows,
-      element("div.row", {}, element("button", { onclick: () => this.file.click() }, "Load .bias"), element("button", { onclick: () => this.#save() }, "Save .bias"), this.stop, this.progress),
+      element("div.row", {}, open, save, this.stop, this.progress),
       this.file,
       element("div.row", {}, this.which, this.draw),
       this.charts,
+      this.text,
     );
-    connection.addEventListener("biases", ({ detail }) => this.#taken(detail));
-    connection.addEventListener("bias_curve", ({ detail }) => this.#drawn(detail));
+    connection.on("biases", (message) => this.#taken(message));
+    connection.on("bias_sweep", (message) => this.#receive(message));
     this.#refresh();
   }
 
-  #row(name, { low, high, default: start, help }) {
+  #row(/** @type {string} */ name, /** @type {BiasRange} */ { low, high, default: start, help }) {
     const slider = element("input", { type: "range", min: low, max: high, step: 1, "aria-label": `bias_${name}` });
     const box = element("input.number", { type: "text", "aria-label": `bias_${name}` });
-    const reset = element("button.reset", { title: "Back to the paper's value", onclick: () => this.#put(name, start) }, "↺");
+    const back = { title: "Back to the paper's value", onclick: () => this.#put(name, start) };
+    const reset = element("button.reset", back, "↺");
     slider.addEventListener("input", () => (box.value = slider.value));
     slider.addEventListener("change", () => this.#put(name, Number(slider.value)));
     box.addEventListener("change", () => {
@@ -56,15 +70,16 @@ export class Biases extends EventTarget {
       }
     });
     const title = `bias_${name}\n${help}.\nAllowed: ${low} to ${high}. Paper: ${start}.`;
-    const row = element("div.control", { title }, element("label", {}, name), slider, box, element("span.unit"), reset);
+    const parts = [element("label", {}, name), slider, box, element("span.unit"), reset];
+    const row = element("div.control", { title }, ...parts);
     row.dataset.bias = name;
-    this.rows.set(name, { row, slider, box, reset, start });
+    this.#rows.set(name, { row, slider, box, reset, start });
     return row;
   }
 
   #refresh() {
     const { locked, known, calibrated } = this.state;
-    for (const [name, { row, slider, box, reset, start }] of this.rows) {
+    for (const [name, { row, slider, box, reset, start }] of this.#rows) {
       const value = this.values[name];
       slider.value = value;
       box.value = known || !locked ? value : "";
@@ -73,48 +88,62 @@ export class Biases extends EventTarget {
       row.classList.toggle("differs", !locked && value !== start);
       row.classList.toggle("locked", Boolean(locked));
     }
-    this.note.textContent = locked ?? `Moving a slider takes the scene again with the new setting.${calibrated ? "" : " What a bias means in physical units is a model, not calibrated."}`;
-    this.draw.textContent = locked ? "Rates of this folder's recordings" : "Rates against it";
-    this.draw.title = locked ? "Of those whose biases are known: stated in the recording, or in a .bias file of its name beside it" : "Simulates the scene over the whole range of this bias";
+    const model = calibrated ? "" : " What a bias means in physical units is a model, not calibrated.";
+    this.note.textContent = locked ?? `A moved slider simulates the scene again with the new setting.${model}`;
+    this.draw.textContent = locked ? "Measure the folder's recordings" : "Sweep this bias";
+    this.draw.title = locked
+      ? "Event rates of those whose biases are known: stated in the recording, or in a .bias file of its name beside it"
+      : "Simulates the scene over the whole range of this bias: event rates of ball and noise";
   }
 
-  // Takes values, from a link too.
+  /**
+   * Takes values, from a link too.
+   * @param {Record<string, number>} values
+   */
   take(values) {
     this.values = { ...this.values, ...values };
     this.#refresh();
-    return this.#again();
+    return this.#resimulate();
   }
 
   // The server was started anew and knows the recording as it is on disk.
   restore() {
-    if (JSON.stringify(this.values) !== JSON.stringify(this.state.values)) this.#again();
+    if (JSON.stringify(this.values) !== JSON.stringify(this.state.values)) this.#resimulate();
   }
 
+  #swept(/** @type {string} */ name) {
+    return /** @type {SweptBias} */ (this.state.swept.find((one) => one.name === name));
+  }
+
+  /**
+   * @param {string} name of a swept bias
+   * @param {number} value
+   */
   #put(name, value) {
-    for (const one of TOGETHER[name] ?? [name]) this.values[one] = value;
+    for (const one of this.#swept(name).biases) this.values[one] = value;
     this.which.value = name;
     this.#refresh();
-    this.#again();
+    this.#resimulate();
   }
 
-  async #again() {
+  async #resimulate() {
     this.unwanted = false;
     try {
-      await post(this.connection.path("biases"), { biases: this.values });
+      await this.connection.post("biases", { biases: this.values });
     } catch (error) {
-      notice(error.message);
+      notice(/** @type {Error} */ (error).message);
       this.#back();
     }
   }
 
-  #taken({ state, share = 0, error, biases }) {
-    this.#working(state === "running", share);
+  #taken(/** @type {BiasesMessage} */ { state, content, error }) {
+    this.#working(state === "running", content?.share ?? 0);
     if (error) notice(error);
     // One that a newer one replaces is cancelled, too.
     if (state === "failed" || (state === "cancelled" && this.unwanted)) this.#back();
     if (state !== "done") return;
     this.before = { ...this.values };
-    this.dispatchEvent(new CustomEvent("taken", { detail: biases }));
+    this.dispatchEvent(new CustomEvent("taken"));
   }
 
   // The events are still the earlier ones.
@@ -123,55 +152,72 @@ export class Biases extends EventTarget {
     this.#refresh();
   }
 
-  #working(running, share) {
+  #working(/** @type {boolean} */ running, /** @type {number} */ share) {
     this.stop.hidden = this.progress.hidden = !running;
     this.progress.value = share;
   }
 
   #cancel() {
     this.unwanted = true;
-    for (const kind of ["biases", "bias_curve"]) post(this.connection.path("cancel"), { kind });
+    for (const kind of /** @type {const} */ (["biases", "bias_sweep"])) this.connection.post("cancel", { kind });
   }
 
-  async #curve() {
-    try {
-      await post(this.connection.path("bias_curve"), { biases: this.values, name: this.which.value, is_known: this.state.known });
-    } catch (error) {
-      notice(error.message);
-    }
+  async #sweep() {
+    const request = { biases: this.values, name: this.which.value, is_known: this.state.known };
+    await this.connection.post("bias_sweep", request);
   }
 
-  #drawn(message) {
-    const { state, points, total, name, error, source } = message;
-    this.#working(state === "running", points && total ? points.length / total : 0);
+  #receive(/** @type {BiasSweepMessage} */ { state, content, error }) {
+    this.#working(state === "running", content ? content.points.length / content.total : 0);
     if (error) notice(error);
-    if (!points) return;
-    const good = points.filter((point) => !point.error);
-    const wrong = points.filter((point) => point.error).map((point) => element("p.note", {}, `${point.recording}: ${point.error}`));
-    const varies = Object.keys(this.state.ranges).filter((bias) => new Set(good.map(({ biases }) => biases?.[bias])).size > 1);
-    const names = source === "recorded" && varies.length ? varies : [name ?? this.which.value];
-    const charts = names.flatMap((bias) => this.#charts(bias, good));
-    if (source === "recorded" && good.length && !varies.length) wrong.push(element("p.note", {}, "All of them have the same biases: a point, not a curve."));
-    this.charts.replaceChildren(...charts, ...wrong);
+    if (content) this.#show(content);
   }
 
-  #charts(bias, points) {
-    const [first, ...others] = TOGETHER[bias] ?? [bias];
-    const x = (point) => point.value ?? point.biases[first];
-    const isKnown = (!this.state.locked || this.state.known) && others.every((other) => this.values[other] === this.values[first]);
-    return ["ball", "noise"].map((kind) => chart({
-      title: `${kind === "ball" ? "Ball's events" : "Noise"} [kev/s] against ${bias.replace("diff_on_off", "diff_on = diff_off")}`,
-      low: kind === "ball" ? 0 : null,
-      isLogarithmic: kind === "noise", // as the supplement draws it
-      whole: true,
-      present: isKnown ? this.values[first] : null,
-      onpick: this.state.locked ? null : ({ x: value }) => this.#put(bias, value),
-      series: ["on", "off"].map((polarity) => ({
+  #show(/** @type {BiasSweep} */ { name, points }) {
+    const good = points.filter((point) => !point.error);
+    const notes = points.filter((point) => point.error).map((point) => `${point.recording}: ${point.error}`);
+    const isRecorded = name === null;
+    const varies = Object.keys(this.state.ranges)
+      .filter((bias) => new Set(good.map(({ biases }) => biases[bias])).size > 1);
+    if (isRecorded && good.length && !varies.length) {
+      notes.push("All of them have the same biases: a point, not a curve.");
+    }
+    const shown = isRecorded ? (varies.length ? varies : [this.which.value]) : [name];
+    this.#drawn = new Map([...this.#drawn].filter(([title]) => shown.some((bias) => title.endsWith(bias))));
+    this.charts.replaceChildren(...shown.flatMap((bias) => this.#draw(this.#swept(bias), good)));
+    this.text.replaceChildren(...notes.map((text) => element("p.note", {}, text)));
+  }
+
+  #draw(/** @type {SweptBias} */ { name, label, biases: [first, ...others] }, /** @type {BiasSweepPoint[]} */ points) {
+    const isKnown = (!this.state.locked || this.state.known) &&
+      others.every((other) => this.values[other] === this.values[first]);
+    return /** @type {const} */ (["ball", "noise"]).map((kind) => {
+      const key = `${kind} ${name}`;
+      const chart = this.#drawn.get(key) ?? new Chart();
+      this.#drawn.set(key, chart);
+      const series = /** @type {const} */ (["on", "off"]).map((polarity) => ({
         name: polarity.toUpperCase(),
-        colour: COLOURS[polarity],
-        points: points.map((point) => ({ x: x(point), y: point[`${kind}_${polarity}_hz`] / 1000, label: point.recording })),
-      })),
-    })).filter(Boolean);
+        colour: this.colours[polarity],
+        points: points.map((point) => ({
+          x: point.value ?? point.biases[first],
+          y: (point[`${kind}_${polarity}_hz`] ?? NaN) / 1000,
+          label: point.recording ?? `${label} = ${point.value}`,
+        })),
+      }));
+      attempt(() =>
+        chart.draw({
+          title: kind === "ball" ? "Event rate of the ball" : "Event rate of the noise",
+          x: `bias ${label}`,
+          y: "kev/s",
+          series,
+          fromZero: kind === "ball",
+          isLogarithmic: kind === "noise", // as the supplement draws it
+          present: isKnown ? this.values[first] : null,
+          onpick: this.state.locked ? undefined : (value) => this.#put(name, value),
+        })
+      );
+      return chart.node;
+    });
   }
 
   async #load() {
@@ -180,12 +226,10 @@ export class Biases extends EventTarget {
     try {
       const { biases } = await post("/api/biases/read", { text: await file.text() });
       if (!this.state.locked) return await this.take(biases);
-      // What the recording was taken with: it cannot be changed, but be shown and marked in the plots.
+      // What the recording was made with: it cannot be changed, but be shown and marked in the charts.
       Object.assign(this.values, biases);
       this.state.known = true;
       this.#refresh();
-    } catch (error) {
-      notice(error.message);
     } finally {
       this.file.value = "";
     }

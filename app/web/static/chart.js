@@ -1,103 +1,199 @@
-// A small chart: lines with bands over one axis, points that can be clicked, a mark at the present value.
+// Charts by plotly.js, which is loaded when the first one is shown.
 
-import { drawing, element, number } from "./elements.js";
+const FONT = { family: "system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif", size: 10, color: "#93a0ac" };
+const HEIGHT = 170;
+const CONFIG = { displayModeBar: false, responsive: true };
+/** @type {Promise<any> | null} */
+let loading = null;
 
-const WIDTH = 300;
-const HEIGHT = 110;
-const LEFT = 38;
-const BOTTOM = 17;
-const TOP = 6;
-
-// series: [{name, colour, points: [{x, y, low, high}]}]; x is a number, or the index into `categories`.
-export function chart({ title, series, present = null, scale = "linear", categories = null, low = null, whole = false, isLogarithmic = false, onpick = null }) {
-  const all = series.flatMap(({ points }) => points).filter(({ y }) => y !== null && y !== undefined && Number.isFinite(y));
-  if (!all.length) return null;
-  const known = series.flatMap(({ points }) => points.map(({ x }) => x));
-  const place = placing(known, scale);
-  const values = all.flatMap(({ y, low: a, high: b }) => [y, a ?? y, b ?? y]);
-  const shown = whole ? values : usual(values);
-  const spread = isLogarithmic ? decadesOf(shown) : scaleOf(low === null ? shown : [...shown, low]);
-  const along = (value) => (isLogarithmic ? Math.log(Math.max(value, 1e-9) / spread.low) / Math.log(spread.high / spread.low) : (value - spread.low) / (spread.high - spread.low));
-  const y = (value) => HEIGHT - BOTTOM - (HEIGHT - BOTTOM - TOP) * Math.min(Math.max(along(value), -0.05), 1.05);
-  const svg = drawing("svg", { class: "chart", viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": title });
-  for (const tick of spread.ticks) {
-    svg.append(drawing("line", { class: "grid", x1: LEFT, x2: WIDTH - 4, y1: y(tick), y2: y(tick) }));
-    svg.append(drawing("text", { class: "label", x: LEFT - 4, y: y(tick) + 3, "text-anchor": "end" }, number(tick, 3)));
-  }
-  if (categories) {
-    categories.forEach((name, i) => svg.append(drawing("text", { class: "label", x: place(i), y: HEIGHT - 4, "text-anchor": "middle" }, name)));
-  } else {
-    const ends = [Math.min(...known), Math.max(...known)];
-    svg.append(drawing("text", { class: "label", x: LEFT, y: HEIGHT - 4 }, number(ends[0], 3)));
-    svg.append(drawing("text", { class: "label", x: WIDTH - 4, y: HEIGHT - 4, "text-anchor": "end" }, number(ends[1], 3)));
-  }
-  if (present !== null && Number.isFinite(present)) {
-    svg.append(drawing("line", { class: "present", x1: place(present), x2: place(present), y1: TOP, y2: HEIGHT - BOTTOM }));
-  }
-  for (const one of series) svg.append(...curve(one, place, y, onpick));
-  const names = series.filter(({ name }) => name).map(({ name, colour }) => element("span", { style: `color: ${colour}` }, name));
-  return element("figure", {}, element("figcaption", {}, title, element("span.names", {}, ...names)), svg);
+/** @returns {Promise<any>} */
+function plotly() {
+  loading ??= new Promise((resolve, reject) => {
+    const script = document.createElement("script");
+    script.src = "/plotly/plotly.min.js";
+    script.onload = () => resolve(/** @type {any} */ (globalThis).Plotly);
+    script.onerror = () => {
+      loading = null;
+      reject(new Error("the charts cannot be loaded: is the server still running?"));
+    };
+    document.head.append(script);
+  });
+  return loading;
 }
 
-function curve({ name, colour, points, band = true }, place, y, onpick) {
-  const good = points.filter((p) => p.y !== null && p.y !== undefined && Number.isFinite(p.y)).sort((a, b) => a.x - b.x);
-  const parts = [];
-  const ranged = good.filter((p) => p.low !== undefined && p.low !== null);
-  if (band && ranged.length > 1) {
-    const there = ranged.map((p) => `${place(p.x)} ${y(p.high)}`);
-    const back = [...ranged].reverse().map((p) => `${place(p.x)} ${y(p.low)}`);
-    parts.push(drawing("path", { class: "band", d: `M${[...there, ...back].join("L")}Z`, fill: colour }));
+/** @typedef {{x: any, y: number | null | undefined, std?: number | null, label?: string, value?: any}} Point */
+/** @typedef {{name?: string, colour: string, points: Point[]}} Series */
+/**
+ * @typedef {object} ChartSpec
+ * @property {string} title
+ * @property {string} x title of the x axis
+ * @property {string} y title of the y axis, the unit
+ * @property {Series[]} series
+ * @property {"linear" | "logarithmic" | "cubic" | "none"} [scale] of the x axis
+ * @property {string[] | null} [categories] of the x axis
+ * @property {any} [present] value of x that is in use
+ * @property {{x: any, reason: string}[]} [refused]
+ * @property {boolean} [fromZero] whether the y axis begins at zero
+ * @property {boolean} [isLogarithmic] whether the y axis does
+ * @property {(value: any) => void} [onpick] takes the value of a point
+ */
+
+// A chart that is drawn anew with `draw`.
+export class Chart {
+  constructor() {
+    /** @type {any} */
+    this.node = document.createElement("div");
+    this.node.className = "chart";
+    this.node.setAttribute("role", "img");
+    /** @type {ChartSpec["onpick"]} */
+    this.onpick = undefined;
   }
-  parts.push(drawing("path", { class: "line", d: `M${good.map((p) => `${place(p.x)} ${y(p.y)}`).join("L")}`, stroke: colour }));
-  for (const p of good) {
-    const dot = drawing("circle", { class: onpick ? "dot pick" : "dot", cx: place(p.x), cy: y(p.y), r: onpick ? 3.5 : 2, fill: colour });
-    const said = p.label ?? number(p.x, 4);
-    dot.append(drawing("title", {}, `${name ? `${name}, ` : ""}${said}: ${number(p.y, 4)}${onpick ? ". Click to take it." : ""}`));
-    if (onpick) dot.addEventListener("click", () => onpick(p));
-    parts.push(dot);
+
+  async draw(/** @type {ChartSpec} */ spec) {
+    const { title, series, categories, scale = "linear", refused = [], onpick } = spec;
+    const first = !this.node.classList.contains("drawn");
+    this.node.classList.add("drawn");
+    this.node.classList.toggle("pick", Boolean(onpick));
+    this.node.setAttribute("aria-label", title);
+    this.onpick = onpick;
+    const at = (/** @type {any} */ x) => (scale === "cubic" ? Math.cbrt(x) : x);
+    const shown = series.flatMap(({ points }) => points).filter(({ y }) => Number.isFinite(y));
+    const range = spec.isLogarithmic ? null : usualRange(shown, Boolean(spec.fromZero));
+    /** @type {object[]} */
+    const traces = series.map((one) => trace(one, at, range, Boolean(onpick)));
+    if (refused.length) traces.push(refusals(refused, at, range, spec));
+    const library = await plotly();
+    await library.react(this.node, traces, layout(spec, at, range, [...shown, ...refused]), CONFIG);
+    if (first) {
+      this.node.on("plotly_click", (/** @type {any} */ { points: [point] }) => this.onpick?.(point.customdata));
+    }
+    if (categories) this.node.dataset.categories = categories.join(" ");
   }
-  return parts;
 }
 
-const SPREADS = { linear: (v) => v, logarithmic: (v) => Math.log(Math.max(v, 1e-12)), cubic: Math.cbrt };
+// Whether any of the series has something to show.
+export const hasPoints = (/** @type {Series[]} */ series) =>
+  series.some(({ points }) => points.some(({ y }) => Number.isFinite(y)));
 
-function placing(xs, scale) {
-  const [first, last] = [Math.min(...xs), Math.max(...xs)];
-  const to = scale === "logarithmic" && first <= 0 ? SPREADS.linear : SPREADS[scale];
-  const width = to(last) - to(first) || 1;
-  return (x) => LEFT + 6 + (WIDTH - LEFT - 16) * Math.min(Math.max((to(x) - to(first)) / width, -0.02), 1.02);
+/**
+ * @param {Series} series
+ * @param {(x: any) => any} at
+ * @param {[number, number] | null} range
+ * @param {boolean} canPick
+ */
+function trace({ name, colour, points }, at, range, canPick) {
+  const good = points.filter(({ y }) => Number.isFinite(y));
+  const above = (/** @type {any} */ y) => range !== null && y > range[1];
+  const below = (/** @type {any} */ y) => range !== null && y < range[0];
+  const digits = (/** @type {any} */ v) => (v === null || v === undefined ? "" : Number(v).toPrecision(4));
+  return {
+    name: name ?? "",
+    x: good.map(({ x }) => at(x)),
+    // Off the scale: at its edge, with an arrow for a marker and the true value on it.
+    y: good.map(({ y }) => (above(y) ? range?.[1] : below(y) ? range?.[0] : y)),
+    error_y: { array: good.map(({ y, std }) => (above(y) || below(y) ? 0 : std ?? 0)), thickness: 1, width: 0 },
+    customdata: good.map(({ x, value }) => value ?? x),
+    text: good.map(({ y, std, label }) =>
+      `${label ?? ""}: ${Number(digits(y))}${std ? ` ± ${Number(digits(std))}` : ""}${
+        canPick ? "<br>click to use it" : ""
+      }`
+    ),
+    hoverinfo: "text+name",
+    mode: "lines+markers",
+    line: { color: colour, width: 1.5 },
+    marker: {
+      color: colour,
+      size: 6,
+      symbol: good.map(({ y }) => (above(y) ? "triangle-up-open" : below(y) ? "triangle-down-open" : "circle")),
+    },
+  };
 }
 
-// The values without the few that are so far off that nothing else could be seen; they are drawn at the border.
-function usual(values) {
-  const sorted = [...values].sort((a, b) => a - b);
-  const at = (share) => sorted[Math.round(share * (sorted.length - 1))];
-  const reach = 4 * (at(0.75) - at(0.25)) || Infinity;
-  return sorted.filter((value) => value >= at(0.25) - reach && value <= at(0.75) + reach);
+/**
+ * @param {{x: any, reason: string}[]} refused
+ * @param {(x: any) => any} at
+ * @param {[number, number] | null} range
+ * @param {ChartSpec} spec
+ */
+function refusals(refused, at, range, { series }) {
+  const lowest = Math.min(...series.flatMap(({ points }) => points.map(({ y }) => y ?? Infinity)));
+  const y = range?.[0] ?? (Number.isFinite(lowest) ? lowest : 0);
+  return {
+    name: "refused",
+    x: refused.map(({ x }) => at(x)),
+    y: refused.map(() => y),
+    customdata: refused.map(({ x }) => x),
+    text: refused.map(({ reason }) => reason.replace(/(.{40}\S*) /g, "$1<br>")),
+    hoverinfo: "text+name",
+    showlegend: false,
+    mode: "markers",
+    marker: { color: "#ef5350", size: 7, symbol: "x-thin-open" },
+  };
 }
 
-// Round numbers around the values, three or four of them marked.
-function scaleOf(values) {
-  let [low, high] = [Math.min(...values), Math.max(...values)];
-  if (high - low < 1e-9 * Math.max(Math.abs(high), 1)) [low, high] = [low - (Math.abs(low) * 0.1 || 1), high + (Math.abs(high) * 0.1 || 1)];
-  const raw = (high - low) / 3;
-  const power = 10 ** Math.floor(Math.log10(raw));
-  const step = [1, 2, 5, 10].map((f) => f * power).find((s) => s >= raw);
-  const first = Math.floor(low / step + 1e-9) * step;
-  const ticks = [];
-  for (let tick = first; ticks.length < 8; tick += step) {
-    ticks.push(Number(tick.toPrecision(10)));
-    if (tick >= high - 1e-9 * step) break;
-  }
-  return { low: ticks[0], high: ticks[ticks.length - 1], ticks };
+/**
+ * @param {ChartSpec} spec
+ * @param {(x: any) => any} at
+ * @param {[number, number] | null} range
+ * @param {{x: any}[]} points
+ */
+function layout(spec, at, range, points) {
+  const { title, x, y, scale, categories, present } = spec;
+  const axis = { gridcolor: "#222a32", zeroline: false, linecolor: "#2b343d", ticks: "outside", ticklen: 3 };
+  const known = points.map((point) => point.x).filter((value) => typeof value === "number");
+  /** @type {any} */
+  const across = { ...axis, title: { text: x, standoff: 4 }, type: scale === "logarithmic" ? "log" : "linear" };
+  if (categories) Object.assign(across, { type: "category", categoryorder: "array", categoryarray: categories });
+  if (scale === "cubic" && known.length) Object.assign(across, cubicTicks(Math.min(...known), Math.max(...known)));
+  const line = { type: "line", yref: "paper", y0: 0, y1: 1, line: { color: "#e6ebef", width: 1, dash: "dot" } };
+  const isKnown = present !== null && present !== undefined && (scale !== "logarithmic" || present > 0);
+  return {
+    title: { text: title, font: { ...FONT, size: 11, color: "#e6ebef" }, x: 0.02, xanchor: "left", y: 0.97 },
+    height: HEIGHT,
+    margin: { l: 44, r: 8, t: 34, b: 34 },
+    font: FONT,
+    paper_bgcolor: "#161b21",
+    plot_bgcolor: "#11151a",
+    showlegend: spec.series.filter(({ name }) => name).length > 1,
+    legend: { orientation: "h", x: 1, xanchor: "right", y: 1.02, yanchor: "bottom", font: { ...FONT, size: 9 } },
+    hovermode: "closest",
+    hoverlabel: { font: { size: 11 }, namelength: -1 },
+    dragmode: false,
+    xaxis: across,
+    yaxis: {
+      ...axis,
+      title: { text: y, standoff: 2 },
+      ...(spec.isLogarithmic ? { type: "log", dtick: 1 } : { range: range ?? undefined }),
+    },
+    shapes: isKnown ? [{ ...line, x0: at(present), x1: at(present) }] : [],
+  };
 }
 
-// Powers of ten around the values above zero.
-function decadesOf(values) {
-  const logs = values.filter((value) => value > 0).map(Math.log10);
-  const first = logs.length ? Math.floor(Math.min(...logs)) : 0;
-  const last = Math.max(logs.length ? Math.ceil(Math.max(...logs)) : 1, first + 1);
-  const ticks = [];
-  for (let power = first; power <= last; power += Math.max(1, Math.ceil((last - first) / 4))) ticks.push(10 ** power);
-  return { low: 10 ** first, high: 10 ** last, ticks };
+/**
+ * Five ticks where the x axis goes by the cube root, labelled with the value.
+ * @param {number} low
+ * @param {number} high
+ */
+function cubicTicks(low, high) {
+  const [from, to] = [Math.cbrt(low), Math.cbrt(high)];
+  const values = [0, 0.25, 0.5, 0.75, 1].map((p) => Number(((from + p * (to - from)) ** 3).toPrecision(2)));
+  return { tickvals: values.map(Math.cbrt), ticktext: values.map(String) };
+}
+
+/**
+ * Range of the y axis without the few values so far off that nothing else could be seen.
+ * @param {Point[]} points
+ * @param {boolean} fromZero
+ * @returns {[number, number] | null}
+ */
+function usualRange(points, fromZero) {
+  const values = points.map(({ y }) => /** @type {number} */ (y)).sort((a, b) => a - b);
+  if (!values.length) return null;
+  const at = (/** @type {number} */ share) => values[Math.round(share * (values.length - 1))];
+  const reach = 6 * (at(0.75) - at(0.25)) || Infinity;
+  const usual = points.filter(({ y }) => Math.abs(/** @type {number} */ (y) - at(0.5)) <= reach);
+  const low = fromZero ? 0 : Math.min(...usual.map(({ y, std }) => /** @type {number} */ (y) - (std ?? 0)));
+  const high = Math.max(...usual.map(({ y, std }) => /** @type {number} */ (y) + (std ?? 0)));
+  const spare = 0.08 * (high - low) || Math.abs(high) * 0.1 || 1;
+  return [fromZero ? 0 : low - spare, high + spare];
 }

@@ -1,10 +1,14 @@
 // Sliders, number boxes, switches and choices, made from the parameters' declarations.
 
+/** @import { ControlInfo, SectionInfo } from "./messages.d.ts" */
+/** @import { Settings } from "./settings.js" */
+
 import { element, notice } from "./elements.js";
 
 const STEPS = 1000; // positions of a slider over its whole range
 
 // Where a value lies on a slider (0..1), and back.
+/** @type {Record<string, [(v: number, low: number, high: number) => number, (p: number, low: number, high: number) => number]>} */
 const SCALES = {
   linear: [(v, low, high) => (v - low) / (high - low), (p, low, high) => low + p * (high - low)],
   logarithmic: [
@@ -15,12 +19,15 @@ const SCALES = {
 };
 
 export class Controls {
-  constructor(parent, sections, settings) {
+  /** @type {Map<string, Control>} */
+  controls = new Map();
+  /** @type {{mark: any, names: string[]}[]} */
+  sections = [];
+
+  constructor(/** @type {any} */ parent, /** @type {SectionInfo[]} */ sections, /** @type {Settings} */ settings) {
     this.settings = settings;
-    this.controls = new Map();
-    this.sections = [];
     for (const section of sections) parent.append(this.#section(section));
-    settings.addEventListener("change", () => this.refresh());
+    settings.onChange(() => this.refresh());
     this.refresh();
   }
 
@@ -32,11 +39,11 @@ export class Controls {
     }
   }
 
-  differs(name) {
+  differs(/** @type {string} */ name) {
     return JSON.stringify(this.settings.get(name)) !== JSON.stringify(this.settings.presetValue(name));
   }
 
-  #section({ title, is_setup, controls }) {
+  #section(/** @type {SectionInfo} */ { title, is_setup, controls }) {
     const mark = element("span.mark");
     const body = element("div.body");
     const made = element("details.section", { open: !is_setup }, element("summary", {}, title, mark), body);
@@ -52,17 +59,33 @@ export class Controls {
 }
 
 class Control {
-  constructor(description, controls) {
-    Object.assign(this, description, { controls, settings: controls.settings });
-    const range = this.allowed ? `\nAllowed: ${this.allowed}.` : "";
-    const start = `\nDefault: ${this.#text(this.default) || "none"}${this.unit ? ` ${this.unit}` : ""}.`;
-    this.title = `${this.name}\n${this.help}.${range}${start}`;
+  /** @type {any} */
+  box = null;
+  /** @type {any} */
+  slider = null;
+  dragging = false;
+  stepping = false;
+
+  constructor(/** @type {ControlInfo} */ info, /** @type {Controls} */ controls) {
+    this.info = info;
+    this.name = info.name;
+    this.kind = info.kind;
+    this.scale = info.scale;
+    this.low = info.low ?? -Infinity;
+    this.high = info.high ?? Infinity;
+    this.step = info.step ?? 1;
+    this.controls = controls;
+    this.settings = controls.settings;
+    const { allowed, unit, help, label: text } = info;
+    const range = allowed ? `\nAllowed: ${allowed}.` : "";
+    const start = `\nDefault: ${this.#text(info.default) || "none"}${unit ? ` ${unit}` : ""}.`;
+    this.title = `${this.name}\n${help}.${range}${start}`;
     this.reset = element("button.reset", {
       title: "Back to the preset's value",
       onclick: () => this.#put(this.settings.presetValue(this.name)),
     }, "↺");
     const id = `p-${this.name}`;
-    const label = element("label", { htmlFor: id }, this.label);
+    const label = element("label", { htmlFor: id }, text);
     this.row = element("div.control", { title: this.title }, label, ...this.#inputs(id), this.reset);
     this.row.dataset.name = this.name;
   }
@@ -77,27 +100,30 @@ class Control {
       this.slider.value = Math.round(STEPS * SCALES[this.scale][0](known, this.low, this.high));
       this.slider.classList.toggle("unset", value === null);
     }
-    if (this.slider) this.slider.setAttribute("aria-valuetext", `${this.#text(value)} ${this.unit}`);
+    if (this.slider) this.slider.setAttribute("aria-valuetext", `${this.#text(value)} ${this.info.unit}`);
   }
 
-  #inputs(id) {
-    const label = `${this.name}${this.unit ? ` in ${this.unit}` : ""}`;
+  #inputs(/** @type {string} */ id) {
+    const label = `${this.name}${this.info.unit ? ` in ${this.info.unit}` : ""}`;
     if (this.kind === "switch") {
       this.box = element("input", { type: "checkbox", id, onchange: () => this.#put(this.box.checked) });
       return [element("span.wide", {}, this.box)];
     }
     if (this.kind === "choice") {
-      const options = this.choices.map((choice) => element("option", { value: choice }, choice));
+      const options = this.info.choices.map((choice) => element("option", { value: choice }, choice));
       this.box = element("select.wide", { id, onchange: () => this.#put(this.box.value) }, ...options);
       return [this.box];
     }
     const typed = { type: "text", inputMode: "decimal", autocomplete: "off", spellcheck: false };
     this.box = element("input.number", { ...typed, id, placeholder: "auto", "aria-label": label });
     this.box.addEventListener("change", () => this.#typed());
-    this.box.addEventListener("keydown", (event) => this.#keys(event));
+    this.box.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => this.#keys(event));
     this.box.addEventListener("keyup", () => this.#stepped());
-    this.box.addEventListener("blur", () => this.#stepped() || this.refresh());
-    const unit = element("span.unit", {}, this.unit);
+    this.box.addEventListener("blur", () => {
+      this.#stepped();
+      this.refresh();
+    });
+    const unit = element("span.unit", {}, this.info.unit);
     if (this.scale === "none") {
       this.box.classList.add("long");
       return [this.box, unit];
@@ -105,7 +131,7 @@ class Control {
     this.slider = element("input", { type: "range", min: 0, max: STEPS, step: 1, "aria-label": label });
     this.slider.addEventListener("input", () => this.#dragged());
     this.slider.addEventListener("change", () => this.#released());
-    this.slider.addEventListener("keydown", (event) => this.#keys(event));
+    this.slider.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => this.#keys(event));
     for (const end of ["keyup", "blur"]) this.slider.addEventListener(end, () => this.#stepped());
     return [this.slider, this.box, unit];
   }
@@ -124,13 +150,13 @@ class Control {
 
   #typed() {
     const text = this.box.value.trim().replace(",", this.kind === "numbers" ? "," : ".");
-    if (this.optional && ["", "auto", "none"].includes(text)) return this.#put(null);
+    if (this.info.optional && ["", "auto", "none"].includes(text)) return this.#put(null);
     const numbers = text.split(/[\s,]+/).map(Number);
     const value = this.kind === "numbers" ? numbers : numbers[0];
-    const wrong = numbers.some((n) => !Number.isFinite(n) || n < (this.low ?? -Infinity) || n > (this.high ?? Infinity));
+    const wrong = numbers.some((/** @type {number} */ n) => !Number.isFinite(n) || n < this.low || n > this.high);
     const whole = this.kind !== "whole number" || Number.isInteger(value);
     if (text === "" || wrong || !whole || (this.kind !== "numbers" && numbers.length > 1)) {
-      notice(`${this.name} = ${text || "nothing"} is not possible: ${this.allowed}${whole ? "" : ", whole"}`);
+      notice(`${this.name} = ${text || "nothing"} is not possible: ${this.info.allowed}${whole ? "" : ", whole"}`);
       this.box.blur();
       return this.refresh();
     }
@@ -138,18 +164,20 @@ class Control {
   }
 
   // Arrows go by the parameter's step, Page keys by ten of them, Home and End to the ends.
-  #keys(event) {
+  #keys(/** @type {KeyboardEvent} */ event) {
+    /** @type {Record<string, number>} */
     const steps = { ArrowUp: 1, ArrowDown: -1, PageUp: 10, PageDown: -10, ArrowRight: 1, ArrowLeft: -1 };
     const inBox = event.target === this.box;
     if (inBox && ["ArrowLeft", "ArrowRight", "Home", "End"].includes(event.key)) return;
     if (this.kind === "numbers" || event.ctrlKey || event.metaKey || event.altKey) return;
+    /** @type {number | null} */
     let value = null;
     if (event.key in steps) value = (this.settings.get(this.name) ?? this.low) + steps[event.key] * this.step;
     else if (event.key === "Home") value = this.low;
     else if (event.key === "End") value = this.high;
     if (value === null) return;
     event.preventDefault();
-    value = Math.min(Math.max(value, this.low ?? -Infinity), this.high ?? Infinity);
+    value = Math.min(Math.max(value, this.low), this.high);
     value = Number(value.toPrecision(12));
     // A key that is held down moves on like a drag.
     this.stepping = true;
@@ -163,21 +191,21 @@ class Control {
     this.settings.settle();
   }
 
-  #put(value) {
+  #put(/** @type {any} */ value) {
     this.settings.set(this.name, value);
     if (this.box.type === "text") this.box.value = this.#text(value);
   }
 
   // A dragged value: a multiple of the step, or where that would be too coarse three digits.
-  #rounded(value) {
-    const step = this.step ?? 1;
+  #rounded(/** @type {number} */ value) {
+    const step = this.step;
     let rounded = Math.round(value / step) * step;
     if (Math.abs(value) < 5 * step && this.kind !== "whole number") rounded = Number(value.toPrecision(2));
     if (this.kind === "whole number") rounded = Math.round(Math.abs(value) < 5 * step ? value : rounded);
     return Math.min(Math.max(Number(rounded.toPrecision(12)), this.low), this.high);
   }
 
-  #text(value) {
+  #text(/** @type {any} */ value) {
     if (value === null || value === undefined) return "";
     return Array.isArray(value) ? value.join(", ") : String(value);
   }

@@ -1,6 +1,18 @@
 // The page's address: recording, what differs from how it was opened, biases, clip, playhead and tab.
 
-export async function linkOf({ connection, settings, viewer, opening, biases }, withTab = false) {
+/** @import { Opening } from "./messages.d.ts" */
+/** @import { Settings, Values } from "./settings.js" */
+
+/**
+ * @typedef {object} Linked
+ * @property {{recording: string}} connection
+ * @property {Settings} settings
+ * @property {{playhead_us: number | null, tab: () => Promise<string | null>}} viewer
+ * @property {Opening} opening
+ * @property {{values: Record<string, number>} | null} biases
+ */
+
+export async function linkOf(/** @type {Linked} */ { connection, settings, viewer, opening, biases }, withTab = false) {
   const words = new URLSearchParams();
   words.set("recording", connection.recording);
   for (const text of assignments(settings.parameters, opening.presets.opened)) words.append("set", text);
@@ -10,38 +22,37 @@ export async function linkOf({ connection, settings, viewer, opening, biases }, 
   }
   if (String(settings.clip) !== String(opening.recording.clip_us)) words.set("clip", settings.clip.join("-"));
   const time = viewer.playhead_us;
-  if (time !== null) words.set("t", Math.round(time));
-  const changed = Object.entries(biases.values).filter(([name, value]) => value !== opening.biases.values[name]);
+  if (time !== null) words.set("t", String(Math.round(time)));
+  const changed = Object.entries(biases?.values ?? {}).filter(([name, value]) => value !== opening.biases.values[name]);
   for (const [name, value] of changed) words.append("bias", `${name}:${value}`);
-  if (withTab) words.set("tab", await viewer.tab());
+  if (withTab) words.set("tab", (await viewer.tab()) ?? "");
   return `#${words}`;
 }
 
-export function wantedByLink() {
+export function linked() {
   const words = new URLSearchParams(location.hash.slice(1));
   const clip = (words.get("clip") ?? "").match(/^(-?\d+)-(-?\d+)$/);
+  const biases = words.getAll("bias").map((text) => text.split(":"));
   return {
     recording: words.get("recording"),
-    clip: clip && [Number(clip[1]), Number(clip[2])],
-    time: Number(words.get("t")) || null,
+    clip: clip && /** @type {[number, number]} */ ([Number(clip[1]), Number(clip[2])]),
+    time_us: Number(words.get("t")) || null,
     tab: words.get("tab"),
-    biases: Object.fromEntries(words.getAll("bias").map((text) => text.split(":")).map(([name, value]) => [name, Number(value)])),
-    parameters: (opened) => applied(opened, words.getAll("set")),
-    pinnedBy: (opened) => (words.get("pinned") ? applied(opened, words.getAll("a")) : null),
+    biases: Object.fromEntries(biases.map(([name, value]) => [name, Number(value)])),
+    parameters: (/** @type {Values} */ opened) => applied(opened, words.getAll("set")),
+    pinned: (/** @type {Values} */ opened) => (words.get("pinned") ? applied(opened, words.getAll("a")) : null),
   };
 }
 
-function assignments(values, others) {
-  const found = [];
-  for (const [group, fields] of Object.entries(values)) {
-    for (const [name, value] of Object.entries(fields)) {
-      if (JSON.stringify(value) !== JSON.stringify(others[group][name])) found.push(`${group}.${name}=${JSON.stringify(value)}`);
-    }
-  }
-  return found;
+function assignments(/** @type {Values} */ values, /** @type {Values} */ others) {
+  return Object.entries(values).flatMap(([group, fields]) =>
+    Object.entries(fields)
+      .filter(([name, value]) => JSON.stringify(value) !== JSON.stringify(others[group][name]))
+      .map(([name, value]) => `${group}.${name}=${JSON.stringify(value)}`)
+  );
 }
 
-function applied(opened, texts) {
+function applied(/** @type {Values} */ opened, /** @type {string[]} */ texts) {
   const values = structuredClone(opened);
   for (const text of texts) {
     const [, group, name, value] = text.match(/^(\w+)\.(\w+)=(.*)$/) ?? [];

@@ -1,4 +1,8 @@
 // The strip above the viewer: event rate of the whole recording, its shots, the clip that is worked on, the playhead.
+// Events: `seek` with a time, `choose` and `shot` with a span, all in us.
+
+/** @import { RecordingDescription } from "./messages.d.ts" */
+/** @typedef {[number, number]} Span */
 
 import { drawing, element } from "./elements.js";
 
@@ -6,7 +10,12 @@ const WIDTH = 1200;
 const HEIGHT = 44;
 
 export class Overview extends EventTarget {
-  constructor(parent, recording) {
+  /** @type {Span} */
+  clip = [0, 0];
+  /** @type {Span[]} */
+  shots = [];
+
+  constructor(/** @type {any} */ parent, /** @type {RecordingDescription} */ recording) {
     super();
     this.svg = drawing("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "none" });
     this.chosen = drawing("rect", { class: "chosen", y: 0, height: HEIGHT });
@@ -17,39 +26,40 @@ export class Overview extends EventTarget {
     this.svg.append(this.chosen, this.curve, this.bands, this.drag, this.playhead);
     this.words = element("span.words");
     parent.replaceChildren(this.svg, this.words);
+    this.recording = recording;
     this.#dragging();
     this.take(recording);
   }
 
-  take(recording) {
+  take(/** @type {RecordingDescription} */ recording) {
     this.recording = recording;
     this.curve.replaceChildren(this.#curve());
     this.show(recording.clip_us, []);
   }
 
-  show(clip, shots, words = "") {
+  show(/** @type {Span} */ clip, /** @type {Span[]} */ shots, words = "") {
     this.clip = clip;
     this.shots = shots;
-    this.chosen.setAttribute("x", this.#x(clip[0]));
-    this.chosen.setAttribute("width", Math.max(this.#x(clip[1]) - this.#x(clip[0]), 1));
+    this.chosen.setAttribute("x", String(this.#x(clip[0])));
+    this.chosen.setAttribute("width", String(Math.max(this.#x(clip[1]) - this.#x(clip[0]), 1)));
     this.bands.replaceChildren(...shots.map((shot, index) => this.#band(shot, index)));
     const { start_us, end_us } = this.recording;
     const times = `${(start_us / 1000).toFixed(0)} to ${(end_us / 1000).toFixed(0)} ms`;
     this.words.textContent = [times, words].filter(Boolean).join(" · ");
   }
 
-  move(time_us) {
-    const x = this.#x(time_us ?? this.recording.start_us);
+  move(/** @type {number | null} */ time_us) {
+    const x = String(this.#x(time_us ?? this.recording.start_us));
     this.playhead.setAttribute("x1", x);
     this.playhead.setAttribute("x2", x);
   }
 
-  #x(time_us) {
+  #x(/** @type {number} */ time_us) {
     const { start_us, end_us } = this.recording;
     return (WIDTH * (time_us - start_us)) / (end_us - start_us);
   }
 
-  #time(event) {
+  #time(/** @type {PointerEvent} */ event) {
     const box = this.svg.getBoundingClientRect();
     const { start_us, end_us } = this.recording;
     const share = Math.min(Math.max((event.clientX - box.left) / box.width, 0), 1);
@@ -68,7 +78,7 @@ export class Overview extends EventTarget {
     return drawing("path", { class: "rate", d: `${path}L${WIDTH} ${HEIGHT}Z` });
   }
 
-  #band([start, end], index) {
+  #band(/** @type {Span} */ [start, end], /** @type {number} */ index) {
     const band = drawing("rect", {
       class: "shot",
       x: this.#x(start),
@@ -77,12 +87,19 @@ export class Overview extends EventTarget {
       height: 7,
     });
     const length = ((end - start) / 1000).toFixed(0);
-    band.append(drawing("title", {}, `Shot ${index + 1}: ${(start / 1000).toFixed(1)} ms, ${length} ms long. Click to work on it.`));
+    band.append(
+      drawing(
+        "title",
+        {},
+        `Shot ${index + 1}: ${(start / 1000).toFixed(1)} ms, ${length} ms long. Click to work on it.`,
+      ),
+    );
     return band;
   }
 
   // A click on a shot chooses it, a click elsewhere moves the playhead, a drag chooses a part.
   #dragging() {
+    /** @type {number | null} */
     let from = null;
     this.svg.addEventListener("pointerdown", (event) => {
       from = this.#time(event);
@@ -91,14 +108,14 @@ export class Overview extends EventTarget {
     this.svg.addEventListener("pointermove", (event) => {
       if (from === null) return;
       const [a, b] = [from, this.#time(event)].sort((p, q) => p - q);
-      this.drag.setAttribute("x", this.#x(a));
-      this.drag.setAttribute("width", this.#x(b) - this.#x(a));
+      this.drag.setAttribute("x", String(this.#x(a)));
+      this.drag.setAttribute("width", String(this.#x(b) - this.#x(a)));
     });
     this.svg.addEventListener("pointerup", (event) => {
       if (from === null) return;
       const [a, b] = [from, this.#time(event)].sort((p, q) => p - q);
       from = null;
-      this.drag.setAttribute("width", 0);
+      this.drag.setAttribute("width", "0");
       const wide = this.#x(b) - this.#x(a) > 8;
       const shot = this.shots.find(([start, end]) => start <= b && b < end);
       if (wide) this.#tell("choose", [a, b]);
@@ -107,7 +124,7 @@ export class Overview extends EventTarget {
     });
   }
 
-  #tell(name, detail) {
+  #tell(/** @type {string} */ name, /** @type {any} */ detail) {
     this.dispatchEvent(new CustomEvent(name, { detail }));
   }
 }

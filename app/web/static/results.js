@@ -1,87 +1,113 @@
-// What came out, in numbers: B alone, or A and B beside each other with what differs.
+// Results in numbers: B alone, or A and B beside each other with what differs. Event: `shown`.
 
-import { milliseconds } from "./bar.js";
-import { element, number } from "./elements.js";
+/** @import { EstimateMetrics, MetricInfo, Opening, RunMessage, RunMetrics, ShotMetrics } from "./messages.d.ts" */
+
+import { element, milliseconds, number } from "./elements.js";
 
 export class Results extends EventTarget {
-  sentence = null; // of the largest shot, for the coach
-  #methods = new Set(); // of all runs so far: what is still being computed keeps its place
+  /** @type {string | null} of the largest shot, for the coach */
+  sentence = null;
+  /** @type {Set<string>} of all runs so far: what is still being computed keeps its place */
+  #methods = new Set();
 
-  constructor(parent) {
+  constructor(/** @type {any} */ parent, /** @type {Opening} */ opening) {
     super();
     this.parent = parent;
+    this.opening = opening;
   }
 
-  show({ measures, pinned_measures, differs }) {
-    if (!measures) return;
-    const both = pinned_measures ? [pinned_measures, measures] : [measures];
-    const parts = [];
-    if (pinned_measures) parts.push(...differing(differs));
-    for (const shot of both.flatMap(({ shots }) => shots)) Object.keys(shot.spin).forEach((method) => this.#methods.add(method));
-    parts.push(table(both, [...this.#methods]));
-    for (const warning of new Set(both.map((m) => m.no_shot_reason).filter(Boolean))) {
-      parts.push(element("p.note", {}, `No shot: ${warning}`));
+  show(/** @type {RunMessage} */ { metrics, pinned_metrics, costs_ms, pinned_costs_ms, differences }) {
+    if (!metrics) return;
+    const both = pinned_metrics ? [pinned_metrics, metrics] : [metrics];
+    const costs = pinned_metrics ? [pinned_costs_ms, costs_ms] : [costs_ms];
+    for (const { spin } of both.flatMap(({ shots }) => shots)) {
+      for (const name of Object.keys(spin)) this.#methods.add(name);
+    }
+    const parts = pinned_metrics ? [differing(differences)] : [];
+    parts.push(this.#table(both, costs.map((cost) => Object.values(cost ?? {}).reduce((a, b) => a + b, 0))));
+    for (const reason of new Set(both.map((one) => one.no_shot_reason).filter(Boolean))) {
+      parts.push(element("p.note", {}, `No shot: ${reason}`));
     }
     this.parent.replaceChildren(...parts);
-    this.sentence = mainShot(measures)?.sentence ?? null;
+    this.sentence = mainShot(metrics)?.sentence ?? null;
     this.dispatchEvent(new CustomEvent("shown"));
   }
-}
 
-export function mainShot(measures) {
-  return measures.shots.reduce((best, shot) => (best && best.logo_events >= shot.logo_events ? best : shot), null);
-}
-
-function differing(differs) {
-  if (!differs.length) return [element("p.note", {}, "A and B have the same settings: turn a knob, that is B.")];
-  const rows = differs.map(([name, a, b]) => row(name, [String(a), String(b)]));
-  return [element("table.numbers", {}, heading("Parameter", ["A", "B"]), ...rows)];
-}
-
-function table(both, methods) {
-  const columns = both.length > 1 ? ["A", "B"] : [""];
-  const values = (make) => both.map((m) => make(m) ?? "–");
-  const shots = both.map(mainShot);
-  const rows = [
-    row("Frames tracked", values((m) => `${Math.round(m.tracked_share * m.ticks)} of ${m.ticks} (${Math.round(100 * m.tracked_share)} %)`)),
-    row("Residual of the circle", values((m) => unit(m.residual_px, "px", 2))),
-    row("Track jitter", values((m) => unit(m.jitter_px, "px", 2))),
-    row("Logo events", values((m) => number(m.logo_events))),
-    row("Speed", shots.map((s) => (s?.speed_m_s ? `${number(s.speed_m_s, 3)} m/s` : "–"))),
-  ];
-  for (const method of shots.some(Boolean) ? methods : []) {
-    const estimates = shots.map((shot) => shot?.spin[method]);
-    const trusted = shots.map((shot) => shot?.best === method);
-    rows.push(element("tr.method", {}, element("th", { colSpan: 1 + both.length }, method.replace("_", " "))));
-    rows.push(row("spin", estimates.map((e, i) => spin(e) + (trusted[i] ? " ✔" : "")), reasons(estimates)));
-    rows.push(row("axis", estimates.map(axis)));
-    if (estimates.some((e) => e && e.error_rps !== null)) {
-      rows.push(row("error against truth", estimates.map((e) => (e && e.error_rps !== null ? `${number(e.error_rps, 2)} rps, ${number(e.error_deg, 2)}°` : "–"))));
+  #table(/** @type {RunMetrics[]} */ both, /** @type {number[]} */ costs_ms) {
+    const { run_metrics, shot_metrics, methods, estimate_metrics } = this.opening;
+    const shots = both.map(mainShot);
+    const rows = [
+      ...run_metrics.map((metric) => row(metric.label, both.map((one) => shown(one, metric)))),
+      ...shot_metrics.map((metric) => row(metric.label, shots.map((shot) => shown(shot, metric)))),
+    ];
+    const errors = estimate_metrics.filter(({ name }) => name.startsWith("error_"));
+    for (
+      const { name, label, colour } of methods.filter((method) => shots.some(Boolean) && this.#methods.has(method.name))
+    ) {
+      const estimates = shots.map((shot) => shot?.spin[name]);
+      const heading = element("th", { colSpan: 1 + both.length, style: `color: ${colour}` }, label);
+      rows.push(element("tr.method", {}, heading));
+      const reasons = estimates.map((estimate) => estimate?.reason).filter(Boolean).join("\n");
+      rows.push(row("spin", estimates.map((e, i) => spin(e) + (shots[i]?.best === name ? " ✔ trusted" : "")), reasons));
+      rows.push(row("axis", estimates.map(axis)));
+      for (const metric of errors) {
+        const values = estimates.map((estimate) => shown(estimate, metric));
+        if (values.some((value) => value !== "–")) rows.push(row(metric.label.toLowerCase(), values));
+      }
     }
+    rows.push(row("Computing time", costs_ms.map(milliseconds)));
+    const counts = both.map(({ shots: all }) => (all.length > 1 ? `${all.length} shots, the largest` : ""));
+    const columns = both.length > 1 ? ["A", "B"] : [""];
+    const names = columns.map((c, i) => [c, counts[i]].filter(Boolean).join(": "));
+    return element("table.numbers", {}, names.some(Boolean) ? headings("Result", names) : null, ...rows);
   }
-  rows.push(row("Computing", values((m) => milliseconds(Object.values(m.stage_ms).reduce((a, b) => a + b, 0)))));
-  const shotWords = both.map((m) => (m.shots.length > 1 ? `${m.shots.length} shots, the largest` : ""));
-  const names = columns.map((c, i) => [c, shotWords[i]].filter(Boolean).join(": "));
-  return element("table.numbers", {}, names.some(Boolean) ? heading("Result", names) : null, ...rows);
 }
 
-const heading = (name, columns) => element("tr.heading", {}, element("th", {}, name), ...columns.map((c) => element("th", {}, c)));
-const row = (name, values, title = "") => element("tr", { title }, element("th", {}, name), ...values.map((v) => element("td", {}, v)));
-const unit = (value, name, digits) => (value === null ? null : `${number(value, digits)} ${name}`);
-const reasons = (estimates) => estimates.map((e) => e?.reason).filter(Boolean).join("\n");
+/**
+ * @param {RunMetrics} metrics
+ * @returns {ShotMetrics | null}
+ */
+export function mainShot({ shots }) {
+  return shots.reduce(
+    (/** @type {ShotMetrics | null} */ best, shot) => (best && best.logo_events >= shot.logo_events ? best : shot),
+    null,
+  );
+}
 
-function spin(estimate) {
+function differing(/** @type {[string, any, any][]} */ differences) {
+  if (!differences.length) {
+    return element("p.note", {}, "A and B have the same parameters: change one, that is B.");
+  }
+  const rows = differences.map(([name, a, b]) => row(name, [String(a), String(b)]));
+  return element("table.numbers", {}, headings("Parameter", ["A", "B"]), ...rows);
+}
+
+const headings = (/** @type {string} */ name, /** @type {string[]} */ columns) =>
+  element("tr.heading", {}, element("th", {}, name), ...columns.map((c) => element("th", {}, c)));
+
+const row = (/** @type {string} */ name, /** @type {string[]} */ values, title = "") =>
+  element("tr", { title }, element("th", {}, name), ...values.map((value) => element("td", {}, value)));
+
+function shown(/** @type {any} */ of, /** @type {MetricInfo} */ { name, unit }) {
+  const value = of?.[name];
+  if (value === null || value === undefined) return "–";
+  return unit === "%" ? `${Math.round(100 * value)} %` : [number(value, 3), unit].filter(Boolean).join(" ");
+}
+
+function spin(/** @type {EstimateMetrics | undefined} */ estimate) {
   if (!estimate) return "…";
-  if (estimate.status !== "ok") return `refused: ${estimate.reason}`;
+  if (estimate.magnitude_rps === null) return `refused: ${estimate.reason}`;
   const std = estimate.magnitude_std_rps;
-  return `${estimate.magnitude_rps.toFixed(std < 0.05 ? 2 : 1)}${std === null ? "" : ` ± ${margin(std)}`} rps`;
+  return `${estimate.magnitude_rps.toFixed(std !== null && std < 0.05 ? 2 : 1)}${
+    std === null ? "" : ` ± ${margin(std)}`
+  } rps`;
 }
 
-function axis(estimate) {
+function axis(/** @type {EstimateMetrics | undefined} */ estimate) {
   if (!estimate?.axis) return "–";
   const std = estimate.axis_std_deg;
-  const parts = estimate.axis.map((v) => v.toFixed(2).replace("-", "−")).join(", ");
+  const parts = estimate.axis.map((value) => value.toFixed(2).replace("-", "−")).join(", ");
   return `${parts}${std === null ? "" : ` ± ${margin(std)}°`}`;
 }
 
-const margin = (std) => std.toFixed(std < 0.05 ? 2 : 1);
+const margin = (/** @type {number} */ std) => std.toFixed(std < 0.05 ? 2 : 1);

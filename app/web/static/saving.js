@@ -1,38 +1,44 @@
 // The Save menu: results, pictures, links, presets.
 
-import { byId, download, element, notice } from "./elements.js";
+/** @import { Linked } from "./link.js" */
+
+import { attempt, byId, download, element, notice } from "./elements.js";
 import { linkOf } from "./link.js";
-import { post } from "./server.js";
 
 export class Saving {
-  constructor(app) {
+  /**
+   * @param {Linked & {connection: any, viewer: any}} app
+   * @param {string[]} builtIn names of the presets that a file must not replace
+   */
+  constructor(app, builtIn) {
     this.app = app;
-    this.file = element("input", { type: "file", accept: ".toml", hidden: true, onchange: () => this.#load() });
+    this.builtIn = builtIn;
+    const load = { type: "file", accept: ".toml", hidden: true, onchange: () => attempt(() => this.#load()) };
+    this.file = element("input", load);
     const menu = byId("save");
+    const exports = app.opening.exports.map((
+      { name, label },
+    ) => /** @type {const} */ ([label, () => this.#fetch(name)]));
+    /** @type {(readonly [string, () => any])[]} */
     const entries = [
-      ["Recording with layout (.rrd)", () => this.#fetch("run.rrd")],
-      ["Results (JSON)", () => this.#fetch("results.json")],
-      ["Spin of every method (CSV)", () => this.#fetch("spins.csv")],
-      ["Track (CSV)", () => this.#fetch("track.csv")],
+      ...exports,
       ["Picture of the view (PNG)", () => this.#picture()],
       ["Copy the link to this view", () => this.#copyLink()],
       ["Copy as command line", () => this.#copyCommand()],
       ["Save as preset (TOML)", () => this.#savePreset()],
       ["Load a preset (TOML)", () => this.file.click()],
     ];
-    const act = (work) => async () => {
+    const act = (/** @type {() => any} */ work) => () => {
       menu.open = false;
-      try {
-        await work();
-      } catch (error) {
-        notice(error.message);
-      }
+      return attempt(work);
     };
-    menu.querySelector(".items").append(...entries.map(([name, work]) => element("button", { onclick: act(work) }, name)), this.file);
+    const buttons = entries.map(([label, work]) => element("button", { onclick: act(work) }, label));
+    menu.querySelector(".items").append(...buttons, this.file);
     document.addEventListener("pointerdown", (event) => menu.contains(event.target) || (menu.open = false));
+    document.addEventListener("keydown", ({ key }) => key === "Escape" && (menu.open = false));
   }
 
-  #fetch(name) {
+  #fetch(/** @type {string} */ name) {
     element("a", { href: this.app.connection.path(`export/${name}`), download: "" }).click();
   }
 
@@ -57,32 +63,31 @@ export class Saving {
   }
 
   #written() {
-    const { connection, settings } = this.app;
-    const [start_us, end_us] = settings.clip;
-    return post(connection.path("presets/write"), { parameters: settings.parameters, start_us, end_us });
+    return this.app.connection.post("presets/write", this.app.settings.request);
   }
 
   async #load() {
     const [file] = this.file.files;
     if (!file) return;
     const { connection, settings, opening } = this.app;
-    const { parameters } = await post(connection.path("presets/read"), { text: await file.text() }).catch((error) => {
-      notice(error.message);
-      return {};
-    });
-    this.file.value = "";
-    if (!parameters) return;
-    const plain = file.name.replace(/\.toml$/, "");
-    const name = this.app.builtIn.includes(plain) ? file.name : plain;
-    opening.presets[name] = parameters;
-    const list = byId("preset");
-    if (![...list.options].some(({ value }) => value === name)) list.append(element("option", { value: name }, name));
-    list.value = name;
-    settings.takePreset(name, parameters);
+    try {
+      const { parameters } = await connection.post("presets/read", { text: await file.text() });
+      const plain = file.name.replace(/\.toml$/, "");
+      const name = this.builtIn.includes(plain) ? file.name : plain;
+      opening.presets[name] = parameters;
+      const list = byId("preset");
+      if (![...list.options].some(({ value }) => value === name)) {
+        list.append(element("option", { value: name }, name));
+      }
+      list.value = name;
+      settings.takePreset(name, parameters);
+    } finally {
+      this.file.value = "";
+    }
   }
 }
 
-async function copied(text, what) {
+async function copied(/** @type {string} */ text, /** @type {string} */ what) {
   try {
     await navigator.clipboard.writeText(text);
     notice(`${what} is in the clipboard.`, "info", 3);

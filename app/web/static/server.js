@@ -1,13 +1,23 @@
-// Talking to the server: requests, the stream of messages, and what happens when it goes away.
+// Requests to the server, the stream of its messages, and the run requests: from changed settings to the new picture.
+
+/** @import { Opening, Picture, Posts, RunMessage, ServerMessages, SessionGets, SessionPosts } from "./messages.d.ts" */
+/** @import { Settings } from "./settings.js" */
+/** @import { Viewer } from "./viewer.js" */
+
+import { notice, pause } from "./elements.js";
+
+const REOPEN_MS = 700;
+const PATIENCE_MS = 5000; // as long as a picture takes to draw where there is no graphics card
+const NUMBERS_MS = 1000; // as long as numbers wait for their picture
 
 export class Refused extends Error {
-  constructor(status, text) {
+  constructor(/** @type {number} */ status, /** @type {string} */ text) {
     super(text);
     this.status = status;
   }
 }
 
-async function answered(response) {
+async function answered(/** @type {Response} */ response) {
   if (response.ok) return response;
   let text = `${response.status} ${response.statusText}`;
   try {
@@ -18,37 +28,73 @@ async function answered(response) {
   throw new Refused(response.status, text);
 }
 
-export async function post(path, content = {}) {
-  const body = JSON.stringify(content);
+/**
+ * @template {keyof Posts} P
+ * @param {P} path
+ * @param {Posts[P]["sent"]} content
+ * @returns {Promise<Posts[P]["answered"]>}
+ */
+export async function post(path, content) {
   const headers = { "content-type": "application/json" };
-  const response = await answered(await fetch(path, { method: "POST", headers, body }));
+  const response = await answered(await fetch(path, { method: "POST", headers, body: JSON.stringify(content) }));
   return response.json();
 }
 
-export async function get(path) {
-  return (await answered(await fetch(path))).json();
-}
-
-export async function bytes(path) {
-  return new Uint8Array(await (await answered(await fetch(path))).arrayBuffer());
-}
-
-// The page's connection: opens a page on the server, listens to its messages, opens it anew when the server comes back.
+// The session on the server: opens it, listens to its messages, opens it anew when the server comes back.
 export class Connection extends EventTarget {
-  page = null;
+  session = "";
+  recording = "";
+  /** @type {EventSource | null} */
   #stream = null;
-  #retry = null;
+  /** @type {number | undefined} */
+  #retry = undefined;
 
+  /**
+   * @param {string | null} recording
+   * @returns {Promise<Opening>}
+   */
   async open(recording) {
-    const opening = await post("/api/pages", { recording });
-    this.page = opening.page;
+    const opening = await post("/api/sessions", { recording });
+    this.session = opening.session;
     this.recording = opening.recording.name;
     this.#listen();
     return opening;
   }
 
-  path(rest) {
-    return `/api/pages/${this.page}/${rest}`;
+  path(/** @type {string} */ rest) {
+    return `/api/sessions/${this.session}/${rest}`;
+  }
+
+  /**
+   * @template {keyof SessionPosts} P
+   * @param {P} rest
+   * @param {SessionPosts[P]["sent"]} content
+   * @returns {Promise<SessionPosts[P]["answered"]>}
+   */
+  post(rest, content) {
+    return post(/** @type {any} */ (this.path(rest)), /** @type {any} */ (content));
+  }
+
+  /**
+   * @template {keyof SessionGets} P
+   * @param {P} rest
+   * @returns {Promise<SessionGets[P]["answered"]>}
+   */
+  async get(rest) {
+    return (await answered(await fetch(this.path(rest)))).json();
+  }
+
+  async bytes(/** @type {string} */ rest) {
+    return new Uint8Array(await (await answered(await fetch(this.path(rest)))).arrayBuffer());
+  }
+
+  /**
+   * @template {keyof ServerMessages} K
+   * @param {K} kind
+   * @param {(message: ServerMessages[K]) => void} listener
+   */
+  on(kind, listener) {
+    this.addEventListener(kind, (event) => listener(/** @type {CustomEvent} */ (event).detail));
   }
 
   close() {
@@ -58,7 +104,8 @@ export class Connection extends EventTarget {
 
   #listen() {
     this.#stream?.close();
-    const stream = (this.#stream = new EventsInMemory(this.path("messages")));
+    const stream = new EventSource(this.path("messages"));
+    this.#stream = stream;
     stream.onmessage = (event) => {
       const message = JSON.parse(event.data);
       this.dispatchEvent(new CustomEvent(message.kind, { detail: message }));
@@ -80,6 +127,135 @@ export class Connection extends EventTarget {
       } catch {
         this.#reopen();
       }
-    }, 700);
+    }, REOPEN_MS);
+  }
+}
+
+// Requests a run of the newest settings, as often as the server keeps up while a slider is dragged, and shows its
+// picture. Events: `numbers` with the server's message, `shown` with the serial of the request that is seen.
+export class RunRequests extends EventTarget {
+  serial = 0;
+  isBlind = false; // there is no viewer: numbers alone
+  #hasLayout = false;
+  #dirty = false;
+  #settled = false;
+  /** @type {string | null} what was requested last */
+  #last = null;
+  #sending = false;
+  #sentAt = 0;
+  #running = false;
+  /** @type {number | undefined} */
+  #timer = undefined;
+  /** @type {string | null} the newest picture */
+  #latest = null;
+
+  /**
+   * @param {Connection} connection
+   * @param {Settings} settings
+   * @param {Viewer} viewer
+   * @param {{layout: string, time_us: number | null}} start path of the layout, and where the playhead is at first
+   */
+  constructor(connection, settings, viewer, start) {
+    super();
+    this.connection = connection;
+    this.settings = settings;
+    this.viewer = viewer;
+    this.start = start;
+    connection.on("run", (message) => this.#receive(message));
+    settings.onChange((settled) => this.#change(settled));
+  }
+
+  request(/** @type {boolean} */ settled) {
+    this.#dirty = true;
+    this.#settled ||= settled;
+    this.#schedule();
+  }
+
+  /**
+   * The settings changed; where a drag ends at what has been requested already, there is nothing more to do.
+   * @param {boolean} settled
+   */
+  #change(settled) {
+    if (!settled || this.#dirty || this.#last !== JSON.stringify(this.settings.run)) this.request(settled);
+  }
+
+  #schedule() {
+    clearTimeout(this.#timer);
+    if (!this.#dirty || this.#sending) return;
+    // While a slider is dragged its last picture is awaited; a change that is meant to stay does not wait.
+    const wait_ms = this.#settled || !this.#running ? 0 : this.#sentAt + PATIENCE_MS - performance.now();
+    if (wait_ms <= 0) this.#send();
+    else this.#timer = setTimeout(() => this.#schedule(), wait_ms);
+  }
+
+  async #send() {
+    const interactive = !this.#settled;
+    this.#dirty = this.#settled = false;
+    this.#sending = this.#running = true;
+    this.#sentAt = performance.now();
+    this.#last = JSON.stringify(this.settings.run);
+    const playhead_us = this.viewer.playhead_us;
+    try {
+      await this.connection.post("run", { serial: ++this.serial, ...JSON.parse(this.#last), interactive, playhead_us });
+    } catch (error) {
+      this.#running = false;
+      this.#last = null;
+      if (error instanceof Refused && error.status !== 409 && error.status !== 404) {
+        notice(error.message);
+        this.settings.revert();
+      }
+    } finally {
+      this.#sending = false;
+      this.#schedule();
+    }
+  }
+
+  async #receive(/** @type {RunMessage} */ message) {
+    const { serial, state, picture } = message;
+    if (serial !== this.serial) return;
+    if (state === "failed") this.#last = null;
+    if (!picture || this.isBlind) {
+      // A first picture is enough to let a dragged slider go on, but it is to be seen before the next one is made.
+      if (["failed", "partial", "done"].includes(state)) this.#end(serial);
+      this.#tell("numbers", message);
+      return;
+    }
+    const seen = this.#show(picture);
+    // For any change of the page the browser composes all of it anew: numbers come with their picture.
+    if (this.#hasLayout) await Promise.race([seen.catch(() => {}), pause(NUMBERS_MS)]);
+    this.#tell("numbers", message);
+    if (!(await seen)) return;
+    this.#end(serial);
+    this.#tell("shown", message);
+  }
+
+  /**
+   * Fetches and shows a picture; false where a newer one took its place.
+   * @param {Picture} picture
+   */
+  async #show(picture) {
+    this.#latest = picture.id;
+    try {
+      const content = await this.connection.bytes(`pictures/${picture.id}`);
+      if (this.#latest !== picture.id) return false;
+      if (!this.#hasLayout) await this.viewer.layout(await this.connection.bytes(this.start.layout));
+      await this.viewer.show(content, picture.id, (!this.#hasLayout && this.start.time_us) || picture.opening_us);
+      if (!this.#hasLayout) await this.viewer.tab(); // until the layout is there: before it, one of the viewer's own
+      this.#hasLayout = true;
+      return true;
+    } catch (error) {
+      if (this.isBlind || (error instanceof Refused && error.status === 404)) return false;
+      throw error;
+    }
+  }
+
+  #end(/** @type {number} */ serial) {
+    if (serial !== this.serial) return;
+    this.#running = false;
+    this.#schedule();
+  }
+
+  #tell(/** @type {"numbers" | "shown"} */ name, /** @type {RunMessage} */ detail) {
+    this.dispatchEvent(new CustomEvent(name, { detail }));
   }
 }

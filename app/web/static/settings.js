@@ -1,43 +1,78 @@
 // The settings of the page: parameters of B, of A when it is pinned, the clip; with undo and redo.
 
-export const copy = (value) => structuredClone(value);
+/** @typedef {Record<string, Record<string, any>>} Values */
+/** @typedef {{parameters: Values, pinned: Values | null, clip: [number, number], preset: {name: string, values: Values}}} Snapshot */
+
+/**
+ * @template T
+ * @param {T} value
+ * @returns {T}
+ */
+const copy = (value) => structuredClone(value);
 
 export class Settings extends EventTarget {
+  /** @type {Values} */
   parameters = {};
+  /** @type {Values | null} */
   pinned = null;
+  /** @type {[number, number]} */
   clip = [0, 0];
+  /** @type {{name: string, values: Values}} */
   preset = { name: "opened", values: {} };
+  /** @type {{parameters: Values, clip: [number, number]} | null} */
   fallback = null;
+  /** @type {Snapshot[]} */
   #past = [];
+  /** @type {Snapshot[]} */
   #future = [];
-  #settled = null;
+  /** @type {Snapshot} */
+  #settled = this.#snapshot();
 
+  /** @param {{parameters: Values, pinned?: Values | null, clip: [number, number], preset: Snapshot["preset"]}} snapshot */
   start({ parameters, pinned, clip, preset }) {
-    Object.assign(this, { parameters: copy(parameters), pinned: copy(pinned ?? null), clip: [...clip], preset });
+    Object.assign(this, { parameters: copy(parameters), pinned: copy(pinned ?? null), clip: copy(clip), preset });
     this.#past = [];
     this.#future = [];
     this.#settled = this.#snapshot();
     this.#tell(true);
   }
 
-  get(name) {
+  // What a run request asks for.
+  get run() {
+    return { parameters: this.parameters, pinned: this.pinned, start_us: this.clip[0], end_us: this.clip[1] };
+  }
+
+  // What a request of a tool asks about.
+  get request() {
+    return { parameters: this.parameters, start_us: this.clip[0], end_us: this.clip[1] };
+  }
+
+  onChange(/** @type {(settled: boolean) => void} */ listener) {
+    this.addEventListener("change", (event) => listener(/** @type {CustomEvent} */ (event).detail.settled));
+  }
+
+  get(/** @type {string} */ name) {
     const [group, field] = name.split(".");
     return this.parameters[group][field];
   }
 
-  presetValue(name) {
+  presetValue(/** @type {string} */ name) {
     const [group, field] = name.split(".");
     return this.preset.values[group]?.[field];
   }
 
-  // One value; while a slider is dragged it is not settled, and undo goes back to where the drag began.
+  /**
+   * One value; while a slider is dragged it is not settled, and undo goes back to where the drag began.
+   * @param {string} name
+   * @param {any} value
+   */
   set(name, value, settled = true) {
     const [group, field] = name.split(".");
     this.parameters[group][field] = value;
     this.#changed(settled);
   }
 
-  setAll(values, settled = true) {
+  setAll(/** @type {Values} */ values, settled = true) {
     for (const [group, fields] of Object.entries(values)) Object.assign(this.parameters[group], copy(fields));
     this.#changed(settled);
   }
@@ -46,12 +81,12 @@ export class Settings extends EventTarget {
     this.#changed(true);
   }
 
-  takePreset(name, values) {
+  takePreset(/** @type {string} */ name, /** @type {Values} */ values) {
     this.preset = { name, values: copy(values) };
     this.setAll(values);
   }
 
-  takeClip(start, end) {
+  takeClip(/** @type {number} */ start, /** @type {number} */ end) {
     this.clip = [start, end];
     this.#changed(true);
   }
@@ -61,14 +96,14 @@ export class Settings extends EventTarget {
     this.#changed(true);
   }
 
-  unpin(backToA) {
-    if (backToA) this.parameters = this.pinned;
+  unpin(/** @type {boolean} */ backToA) {
+    if (backToA && this.pinned) this.parameters = this.pinned;
     this.pinned = null;
     this.#changed(true);
   }
 
   swap() {
-    [this.parameters, this.pinned] = [this.pinned, this.parameters];
+    if (this.pinned) [this.parameters, this.pinned] = [this.pinned, this.parameters];
     this.#changed(true);
   }
 
@@ -92,28 +127,30 @@ export class Settings extends EventTarget {
   // then the recording is taken as it was opened.
   revert() {
     if (JSON.stringify(this.#snapshot()) !== JSON.stringify(this.#settled)) this.#take(this.#settled);
-    else if (this.canUndo) this.#take((this.#settled = this.#past.pop()));
+    else if (this.canUndo) this.#take(this.#settled = /** @type {Snapshot} */ (this.#past.pop()));
     else if (this.fallback) this.start({ ...this.fallback, preset: this.preset });
     this.fallback = null;
   }
 
+  /** @returns {Snapshot} */
   #snapshot() {
     return copy({ parameters: this.parameters, pinned: this.pinned, clip: this.clip, preset: this.preset });
   }
 
-  #go(from, to) {
-    if (!from.length) return;
+  #go(/** @type {Snapshot[]} */ from, /** @type {Snapshot[]} */ to) {
+    const next = from.pop();
+    if (!next) return;
     to.push(this.#settled);
-    this.#settled = from.pop();
+    this.#settled = next;
     this.#take(this.#settled);
   }
 
-  #take(snapshot) {
+  #take(/** @type {Snapshot} */ snapshot) {
     Object.assign(this, copy(snapshot));
     this.#tell(true);
   }
 
-  #changed(settled) {
+  #changed(/** @type {boolean} */ settled) {
     if (settled) {
       const now = this.#snapshot();
       if (JSON.stringify(now) !== JSON.stringify(this.#settled)) {
@@ -126,7 +163,7 @@ export class Settings extends EventTarget {
     this.#tell(settled);
   }
 
-  #tell(settled) {
+  #tell(/** @type {boolean} */ settled) {
     this.dispatchEvent(new CustomEvent("change", { detail: { settled } }));
   }
 }

@@ -6,13 +6,17 @@ const TIMELINE = "t";
 const POLL_MS = 15;
 const PATIENCE_MS = 120_000; // without a graphics card a picture may take seconds
 const PICTURE_MS = 10_000;
+const LAYOUT_MS = 30_000;
 const ANSWER_MS = 3000;
 const APPLICATION = "spinscope";
 
+/** @typedef {Record<string, any>} Blueprint */
+/** @typedef {"paused" | "playing" | "following"} PlayState */
+
 // The viewer asks elsewhere for its newest version; this page talks to its own server alone.
 function stayAtHome() {
-  const ask = window.fetch;
-  window.fetch = (target, options) => {
+  const ask = globalThis.fetch;
+  globalThis.fetch = (/** @type {any} */ target, options) => {
     const { origin } = new URL(target.url ?? target, location.href);
     return origin === location.origin ? ask(target, options) : Promise.resolve(new Response(null, { status: 404 }));
   };
@@ -21,29 +25,50 @@ function stayAtHome() {
 // A canvas that has been shown loses its picture, which is to be saved: this keeps it.
 function keepPictures() {
   const made = HTMLCanvasElement.prototype.getContext;
-  HTMLCanvasElement.prototype.getContext = function (kind, options) {
-    return made.call(this, kind, kind.startsWith("webgl") ? { ...options, preserveDrawingBuffer: true } : options);
+  /** @type {any} */ (HTMLCanvasElement.prototype).getContext = function (
+    /** @type {string} */ kind,
+    /** @type {any} */ options,
+  ) {
+    return made.call(
+      this,
+      /** @type {any} */ (kind),
+      kind.startsWith("webgl") ? { ...options, preserveDrawingBuffer: true } : options,
+    );
   };
 }
 
-const storeOf = (id) => `Recording:${APPLICATION}:${id}`;
+const storeOf = (/** @type {string} */ id) => `Recording:${APPLICATION}:${id}`;
 
+// Event: `moved` with the playhead's time in us.
 export class Viewer extends EventTarget {
+  /** @type {any} */
   #viewer = null;
+  /** @type {any} */
   #channel = null;
+  /** @type {Promise<any>} */
   #queue = Promise.resolve();
-  #sent = new Set(); // ids of the recordings in the viewer
-  #shown = null; // the one that is seen
-  // Where that stands, as the viewer tells of every move: asking it would have it paint, which takes long in software.
+  /** @type {Set<string>} ids of the recordings in the viewer */
+  #sent = new Set();
+  /** @type {string | null} the one that is seen */
+  #shown = null;
+  /**
+   * Its playhead, as the viewer tells of every move: asking it would have it paint, which takes long in software.
+   * @type {number | null}
+   */
   #time_ns = null;
+  /** @type {PlayState} */
   #play = "paused";
 
-  // Loads the viewer; whatever else is asked of it meanwhile waits.
+  /**
+   * Loads the viewer; whatever else is asked of it meanwhile waits.
+   * @param {string} version
+   * @param {HTMLElement} parent
+   */
   start(version, parent) {
     return this.#next(() => this.#start(version, parent));
   }
 
-  async #start(version, parent) {
+  async #start(/** @type {string} */ version, /** @type {HTMLElement} */ parent) {
     stayAtHome();
     keepPictures();
     const { WebViewer } = await import(`/rerun/${version}/widget.js`);
@@ -60,25 +85,31 @@ export class Viewer extends EventTarget {
     for (const panel of ["top", "blueprint", "selection"]) viewer.override_panel_state(panel, "hidden");
   }
 
-  // Everything that touches the viewer, one after the other.
+  /**
+   * Everything that touches the viewer, one after the other.
+   * @template T
+   * @param {() => T | Promise<T>} work
+   * @returns {Promise<T>}
+   */
   #next(work) {
     const done = this.#queue.then(work);
     this.#queue = done.catch(() => {});
     return done;
   }
 
-  layout(bytes) {
+  layout(/** @type {Uint8Array} */ bytes) {
     return this.#next(() => this.#channel.send_rrd(bytes));
   }
 
   #follow() {
-    const told = (kind, note) => this.#viewer.on(kind, (event) => event.recording_id === this.#shown && note(event));
+    const told = (/** @type {string} */ kind, /** @type {(event: any) => void} */ note) =>
+      this.#viewer.on(kind, (/** @type {any} */ event) => event.recording_id === this.#shown && note(event));
     told("time_update", ({ time }) => this.#moved(time));
     told("play", () => (this.#play = "playing"));
     told("pause", () => (this.#play = "paused"));
   }
 
-  #moved(time_ns) {
+  #moved(/** @type {number} */ time_ns) {
     this.#time_ns = time_ns;
     this.dispatchEvent(new CustomEvent("moved", { detail: this.playhead_us }));
   }
@@ -93,7 +124,12 @@ export class Viewer extends EventTarget {
     this.#time_ns = null;
   }
 
-  // Show a recording in place of the present one, at the same playhead; at `time_us` when there is none.
+  /**
+   * Shows a recording in place of the present one, at the same playhead; at `time_us` when there is none.
+   * @param {Uint8Array} bytes
+   * @param {string} id
+   * @param {number} time_us
+   */
   show(bytes, id, time_us) {
     return this.#next(async () => {
       const taken = this.#taken_in(id);
@@ -114,7 +150,7 @@ export class Viewer extends EventTarget {
   }
 
   // Sets the playhead. A recording may be open before the viewer knows of its times: then it refuses, and is asked again.
-  async #placed(where) {
+  async #placed(/** @type {any} */ where) {
     const until = performance.now() + PATIENCE_MS;
     for (;;) {
       try {
@@ -127,7 +163,7 @@ export class Viewer extends EventTarget {
   }
 
   // Has the viewer paint until something happened: data alone does not always wake it.
-  async #awake(happened) {
+  async #awake(/** @type {Promise<void>} */ happened) {
     let waiting = true;
     const over = () => (waiting = false);
     happened.then(over, over);
@@ -140,10 +176,14 @@ export class Viewer extends EventTarget {
   }
 
   // The viewer takes a recording in with its next picture, and knows nothing of it until then.
+  /**
+   * @param {string} id
+   * @returns {Promise<void>}
+   */
   #taken_in(id) {
     return new Promise((resolve, reject) => {
       const late = setTimeout(() => reject(new Error("the viewer does not take the recording in")), PATIENCE_MS);
-      const stop = this.#viewer.on("recording_open", ({ recording_id }) => {
+      const stop = this.#viewer.on("recording_open", (/** @type {any} */ { recording_id }) => {
         if (recording_id !== id) return;
         clearTimeout(late);
         stop();
@@ -152,7 +192,7 @@ export class Viewer extends EventTarget {
     });
   }
 
-  seek(time_us, play_state = "paused") {
+  seek(/** @type {number} */ time_us, /** @type {PlayState} */ play_state = "paused") {
     return this.#next(async () => {
       if (this.#shown === null) return;
       const duration_nanos = BigInt(Math.round(time_us * 1000));
@@ -160,12 +200,16 @@ export class Viewer extends EventTarget {
     });
   }
 
-  play(play_state) {
+  play(/** @type {PlayState} */ play_state) {
     return this.#next(() => this.#viewer.set_time({ play_state }));
   }
 
-  // The tab of this name without the others, without the time line and without its view of that origin; returns what
-  // `together` takes to undo it.
+  /**
+   * Shows the tab of this name without the others, without the time line and without its view of that origin;
+   * returns what `together` takes to undo it.
+   * @param {string} name
+   * @param {string} left_out
+   */
   alone(name, left_out) {
     return this.#next(async () => {
       if (this.#shown === null) return null;
@@ -178,20 +222,24 @@ export class Viewer extends EventTarget {
     });
   }
 
-  together(blueprint) {
+  together(/** @type {Blueprint | null} */ blueprint) {
     return this.#next(async () => {
       this.#viewer.override_panel_state("time", null);
       if (blueprint) await this.#take(blueprint);
     });
   }
 
-  #take(blueprint) {
-    return this.#viewer.set_blueprint(blueprint, { kind: "recording", recording: storeOf(this.#shown) });
+  #take(/** @type {Blueprint} */ blueprint) {
+    const recording = storeOf(this.#shown ?? "");
+    return this.#viewer.set_blueprint(blueprint, { kind: "recording", recording });
   }
 
-  // The layout; right after its recording the viewer may still show one of its own making, without our tabs.
+  /**
+   * The layout; right after its recording the viewer may still show one of its own making, without our tabs.
+   * @returns {Promise<Blueprint>}
+   */
   async #layout() {
-    const until = performance.now() + PICTURE_MS;
+    const until = performance.now() + LAYOUT_MS;
     for (;;) {
       const { blueprint } = await this.#viewer.get_blueprint();
       if (performance.now() > until || tabs(blueprint).some(({ title }) => title)) return blueprint;
@@ -216,7 +264,7 @@ export class Viewer extends EventTarget {
       while (performance.now() < until) {
         canvas.dispatchEvent(new PointerEvent("pointermove", { bubbles: true, clientX: Math.random(), clientY: 1 }));
         await new Promise((resolve) => requestAnimationFrame(resolve));
-        copy.getContext("2d").drawImage(canvas, 0, 0);
+        copy.getContext("2d")?.drawImage(canvas, 0, 0);
         if (hasContent(copy)) return new Promise((resolve) => copy.toBlob(resolve, "image/png"));
       }
       throw new Error("the browser does not give the picture: take a screenshot instead");
@@ -228,15 +276,19 @@ export class Viewer extends EventTarget {
   }
 }
 
-function rootOf(blueprint) {
+function rootOf(/** @type {Blueprint} */ blueprint) {
   const { root_container } = blueprint["/viewport"]?.ViewportBlueprint ?? {};
   return blueprint[`/container/${root_container}`]?.ContainerBlueprint ?? {};
 }
 
-// The tabs of the layout: [{id, title, front}].
+/**
+ * The tabs of the layout.
+ * @param {Blueprint} blueprint
+ * @returns {{id: string, title: string | undefined, front: boolean}[]}
+ */
 function tabs(blueprint) {
   const root = rootOf(blueprint);
-  return (root.contents ?? []).map((path) => {
+  return (root.contents ?? []).map((/** @type {string} */ path) => {
     const id = path.split("/").pop();
     const title = blueprint[`/container/${id}`]?.ContainerBlueprint.display_name;
     return { id, title, front: root.active_tab === path };
@@ -245,33 +297,48 @@ function tabs(blueprint) {
 
 const NEARER = 0.62; // the ball as large as its ring allows
 
-// The layout with one container for its root: panels, and the views in it side by side, but for those of an origin;
-// the first one seen from nearer by.
+/**
+ * The layout with one container for its root: panels, and the views in it side by side, but for those of an origin;
+ * the first one seen from nearer by.
+ * @param {Blueprint} blueprint
+ * @param {string} root
+ * @param {string} left_out
+ */
 function only(blueprint, root, left_out) {
+  /** @type {Blueprint} */
   const kept = {};
-  for (const [path, content] of Object.entries(blueprint)) if (!/^\/(container|view)\//.test(path)) kept[path] = content;
+  for (const [path, content] of Object.entries(blueprint)) {
+    if (!/^\/(container|view)\//.test(path)) kept[path] = content;
+  }
+  /** @type {string[]} */
   const views = [];
-  const gather = (path) => {
+  const gather = (/** @type {string} */ path) => {
     const inner = blueprint[path]?.ContainerBlueprint?.contents;
-    if (inner) return inner.forEach((next) => gather(`/${next}`));
+    if (inner) return inner.forEach((/** @type {string} */ next) => gather(`/${next}`));
     if (blueprint[path]?.ViewBlueprint?.space_origin !== left_out) views.push(path);
   };
   gather(`/container/${root}`);
-  for (const [name, content] of Object.entries(blueprint)) if (views.some((path) => name === path || name.startsWith(`${path}/`))) kept[name] = content;
+  for (const [name, content] of Object.entries(blueprint)) {
+    if (views.some((path) => name === path || name.startsWith(`${path}/`))) kept[name] = content;
+  }
   const eye = structuredClone(kept[`${views[0]}/EyeControls3D`]);
   if (eye?.EyeControls3D.position) {
-    eye.EyeControls3D.position = eye.EyeControls3D.position.map((value) => NEARER * value);
+    eye.EyeControls3D.position = eye.EyeControls3D.position.map((/** @type {number} */ value) => NEARER * value);
     kept[`${views[0]}/EyeControls3D`] = eye;
   }
   const { ContainerBlueprint, ...rest } = structuredClone(blueprint[`/container/${root}`]);
   const contents = views.map((path) => path.slice(1));
-  kept[`/container/${root}`] = { ...rest, ContainerBlueprint: { ...ContainerBlueprint, contents, col_shares: views.map((_, i) => (i ? 2 : 3)) } };
+  kept[`/container/${root}`] = {
+    ...rest,
+    ContainerBlueprint: { ...ContainerBlueprint, contents, col_shares: views.map((_, i) => (i ? 2 : 3)) },
+  };
   kept["/viewport"] = structuredClone(blueprint["/viewport"]);
   kept["/viewport"].ViewportBlueprint.root_container = root;
   return kept;
 }
 
-function hasContent(canvas) {
-  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, Math.min(canvas.height, 80));
+function hasContent(/** @type {HTMLCanvasElement} */ canvas) {
+  const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+  const { data } = context.getImageData(0, 0, canvas.width, Math.min(canvas.height, 80));
   return data.some((value, i) => i % 4 < 3 && value > 60);
 }

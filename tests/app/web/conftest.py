@@ -1,4 +1,4 @@
-"""A tuner that answers, on a free port of this machine, in this process."""
+"""A web application that answers, on a free port of this machine, in this process."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ import httpx
 import pytest
 import uvicorn
 
-from spinscope.app.web.serving import _listening_socket
-from spinscope.app.web.web import application
-from spinscope.app.web.workshop import Workshop
+from spinscope.app.web.app_state import AppState
+from spinscope.app.web.application import application
+from spinscope.app.web.server import listening_socket
 from spinscope.pipeline.session import Choices
 
 PATIENCE_S = 120.0  # the first run on a machine compiles the kernels
@@ -23,17 +23,17 @@ PATIENCE_S = 120.0  # the first run on a machine compiles the kernels
 
 @dataclass
 class Served:
-    """A server and its workshop, and how to stop it."""
+    """A server and its state, and how to stop it."""
 
     address: str
-    workshop: Workshop
+    state: AppState
     stop: Callable[[], None]
     clients: list[Client] = field(default_factory=list)
 
     def open(self, recording: str | None = None) -> Client:
         """A new page that listens; closed with the server at the latest."""
         http = httpx.Client(timeout=60.0)
-        answer = http.post(f"{self.address}api/pages", json={"recording": recording})
+        answer = http.post(f"{self.address}api/sessions", json={"recording": recording})
         assert answer.status_code == 200, answer.text
         client = Client(self.address, answer.json(), http)
         client.listener = threading.Thread(target=client.listen, daemon=True)
@@ -44,19 +44,19 @@ class Served:
     def close(self, client: Client) -> None:
         """End a page and its threads."""
         self.clients.remove(client)
-        page = self.workshop.page(client.opening["page"])
-        if page is not None:
-            self.workshop.close_page(page)
-            page.join(10)
+        session = self.state.sessions.get(client.opening["session"])
+        if session is not None:
+            self.state.close_session(session)
+            session.join(10)
         client.listener.join(10)
         client.http.close()
 
 
-def served(path: Path, port: int = 0, choices: Choices | None = None) -> Served:
+def served(path: Path, port: int = 0, choices: Choices | None = None, **options: Any) -> Served:
     """Start serving a recording."""
-    workshop = Workshop(path, choices or Choices())
-    listening = _listening_socket(port)
-    config = uvicorn.Config(application(workshop), log_level="error", timeout_graceful_shutdown=2)
+    state = AppState(path, choices or Choices(), **options)
+    listening = listening_socket(port)
+    config = uvicorn.Config(application(state), log_level="error", timeout_graceful_shutdown=2)
     server = uvicorn.Server(config)
     thread = threading.Thread(target=lambda: server.run([listening]), daemon=True)
     thread.start()
@@ -64,12 +64,12 @@ def served(path: Path, port: int = 0, choices: Choices | None = None) -> Served:
     def stop() -> None:
         for client in list(made.clients):
             made.close(client)
-        workshop.close()
+        state.close()
         server.should_exit = True
         thread.join(10)
         listening.close()
 
-    made = Served(f"http://127.0.0.1:{listening.getsockname()[1]}/", workshop, stop)
+    made = Served(f"http://127.0.0.1:{listening.getsockname()[1]}/", state, stop)
     return made
 
 
@@ -100,7 +100,7 @@ class Client:
     _arrived: threading.Condition = field(default_factory=threading.Condition)
 
     def path(self, rest: str) -> str:
-        return f"{self.address}api/pages/{self.opening['page']}/{rest}"
+        return f"{self.address}api/sessions/{self.opening['session']}/{rest}"
 
     def listen(self) -> None:
         """Gather the messages until the server ends them."""
@@ -111,19 +111,19 @@ class Client:
                         self.messages.append(json.loads(line.removeprefix("data: ")))
                         self._arrived.notify_all()
 
-    def wish(self, parameters: dict[str, Any] | None = None, **more: Any) -> dict[str, Any]:
+    def request(self, parameters: dict[str, Any] | None = None, **more: Any) -> dict[str, Any]:
         """A run request of the next serial."""
         self.serial += 1
         start_us, end_us = self.opening["recording"]["clip_us"]
-        wish = {"serial": self.serial, "parameters": parameters or {}, "start_us": start_us, "end_us": end_us}
-        return {**wish, **more}
+        request = {"serial": self.serial, "parameters": parameters or {}, "start_us": start_us, "end_us": end_us}
+        return {**request, **more}
 
     def run(self, parameters: dict[str, Any] | None = None, **more: Any) -> dict[str, Any]:
         """Ask for a run and wait for its end; the last message on it."""
-        wish = self.wish(parameters, **more)
-        answer = self.http.post(self.path("run"), json=wish)
+        request = self.request(parameters, **more)
+        answer = self.http.post(self.path("run"), json=request)
         assert answer.status_code == 202, answer.text
-        return self.wait("run", lambda m: m["serial"] == wish["serial"] and m["state"] in ("done", "failed"))
+        return self.wait("run", lambda m: m["serial"] == request["serial"] and m["state"] in ("done", "failed"))
 
     def wait(self, kind: str, holds: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
         """The first message of a kind for which something holds."""

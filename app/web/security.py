@@ -1,8 +1,9 @@
-"""Who may talk to the tuner: pages that it served itself, in pieces of reasonable size."""
+"""Security of the web application: requests of its own pages only, of limited size, and headers for the browser."""
 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Awaitable, Callable, MutableMapping
 from typing import Any
 
@@ -13,6 +14,8 @@ Send = Callable[[Message], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 BODY_BYTES = 256 * 1024  # a preset of every parameter is 4 kB
+# By name alone: through an SSH tunnel the page is reached at another port than the server's own.
+OWN_HOST = re.compile(r"(127\.0\.0\.1|localhost)(:\d{1,5})?")
 HEADERS = (
     # Nothing is fetched from elsewhere: the browser itself holds the page to it.
     (
@@ -27,14 +30,14 @@ HEADERS = (
 )
 
 
-class Guard:
-    """Refuses requests for another host (DNS rebinding), from another origin, without JSON, or too long."""
+class SecurityMiddleware:
+    """Refuse requests for another host (DNS rebinding), from another origin, without JSON, or too long."""
 
     def __init__(self, app: App) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """One request."""
+        """Handle one request."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -52,8 +55,7 @@ class Guard:
 
 def _refusal(scope: Scope, headers: dict[str, str]) -> tuple[int, str] | None:
     host = headers.get("host", "")
-    port = scope["server"][1] if scope.get("server") else None
-    if host not in (f"127.0.0.1:{port}", f"localhost:{port}"):
+    if not OWN_HOST.fullmatch(host):
         return 421, "this server answers to 127.0.0.1 and localhost only"
     origin = headers.get("origin")
     if origin is not None and origin != f"http://{host}":
@@ -72,7 +74,7 @@ def _refusal(scope: Scope, headers: dict[str, str]) -> tuple[int, str] | None:
 
 
 async def _body(receive: Receive) -> bytes | None:
-    """The whole request body; None when it is too long."""
+    """Read the whole request body; None when it is too long."""
     parts: list[bytes] = []
     length = 0
     while True:
@@ -88,7 +90,7 @@ async def _body(receive: Receive) -> bytes | None:
 
 
 def _replay(body: bytes, receive: Receive) -> Receive:
-    """Hand the body on as if it had just come; then what comes next, which is the end of the connection."""
+    """Return a receiver that gives the body, and then what comes next, which is the end of the connection."""
     handed = False
 
     async def replayed() -> Message:

@@ -1,18 +1,21 @@
-"""Tuning curve, search, biases: what they compute, and that they can be stopped."""
+"""Sweeps, optimization, biases: what they compute, and that they can be cancelled."""
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from spinscope.app.web.biases import known_biases
-from spinscope.app.web.controls import scale_of, sections
-from spinscope.app.web.curve import values_over
-from spinscope.app.web.search import REFUSED, cost_of
+from spinscope.app.tuning.bias_sweep import known_biases
+from spinscope.app.tuning.optimization import REFUSED, cost_of
+from spinscope.app.tuning.parameter_sweep import scale_of, sweep_values
+from spinscope.app.web.controls import sections
 from spinscope.pipeline.biases import BiasParameters
 from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.metrics import EstimateMetrics, RunMetrics, ShotMetrics
 from spinscope.pipeline.registry import Parameters
 from spinscope.pipeline.session import Choices
 from spinscope.pipeline.simulated_recordings import simulate_to_file
@@ -21,18 +24,18 @@ from .conftest import Client, served
 
 
 def test_every_parameter_has_one_control() -> None:
-    names = [control["name"] for section in sections() for control in section["controls"]]
+    names = [control.name for section in sections() for control in section.controls]
     wanted = [f"{group}.{field}" for group, fields in Parameters().as_dict().items() for field in fields]
     assert sorted(names) == sorted(wanted)
-    titles = [section["title"] for section in sections() if not section["is_setup"]]
-    assert titles[:3] == ["Filter", "Surface (EROS)", "Cleaning"] and titles[-2:] == ["Spin", "Contrast"]
+    titles = [section.title for section in sections() if not section.is_setup]
+    assert titles[:3] == ["Filter", "Surface (EROS)", "Cleaning"] and titles[-2:] == ["Spin", "Contrast maximisation"]
 
 
 @pytest.mark.parametrize("name", ["logo.pad_px", "filter.threshold_us", "surface.k_px", "track.coast_us"])
-def test_the_values_of_a_curve_span_the_range(name: str) -> None:
+def test_the_values_of_a_sweep_span_the_range(name: str) -> None:
     stage, field = name.split(".")
     tunable = Parameters().group(stage).tunables()[field]
-    values = values_over(tunable, name, None, None, 9)
+    values = sweep_values(tunable, name, None, None, 9)
     assert values[0] == tunable.low and values[-1] == pytest.approx(tunable.high)
     assert values == sorted(set(values))
     assert scale_of(tunable) in ("linear", "logarithmic", "cubic")
@@ -40,30 +43,30 @@ def test_the_values_of_a_curve_span_the_range(name: str) -> None:
         Parameters().with_values({stage: {field: value}})
 
 
-def test_a_curve_over_choices_takes_all_of_them_and_a_wrong_range_is_refused() -> None:
+def test_a_sweep_over_choices_takes_all_of_them_and_a_wrong_range_is_refused() -> None:
     tunable = Parameters().group("filter").tunables()["mode"]
-    assert values_over(tunable, "filter.mode", None, None, 5) == list(tunable.choices)
+    assert sweep_values(tunable, "filter.mode", None, None, 5) == list(tunable.choices)
     pad = Parameters().group("logo").tunables()["pad_px"]
     for low, high, points in ((3.0, 2.0, 5), (0.0, 1e9, 5), (0.0, 5.0, 1), (0.0, 5.0, 10_000)):
         with pytest.raises(ParameterError):
-            values_over(pad, "logo.pad_px", low, high, points)
+            sweep_values(pad, "logo.pad_px", low, high, points)
 
 
-def test_a_curve_tells_every_point_and_agrees_with_single_runs(client: Client) -> None:
+def test_a_sweep_tells_every_point_and_agrees_with_single_runs(client: Client) -> None:
     request = {"parameters": {}, "name": "logo.pad_px", "low": 2.0, "high": 6.0, "points": 3}
-    assert client.post("curve", **request).status_code == 202
-    done = client.wait("curve", lambda m: m["state"] == "done")
-    assert [point["value"] for point in done["points"]] == [2.0, 4.0, 6.0]
-    alone = client.run({"logo": {"pad_px": 4.0}})["measures"]
-    assert done["points"][1]["logo_events"] == alone["logo_events"]
-    assert done["points"][1]["spin"] == alone["shots"][0]["spin"]
+    assert client.post("sweep", **request).status_code == 202
+    done = client.wait("sweep", lambda m: m["state"] == "done")
+    assert [point["value"] for point in done["content"]["points"]] == [2.0, 4.0, 6.0]
+    alone = client.run({"logo": {"pad_px": 4.0}})["metrics"]
+    assert done["content"]["points"][1]["logo_events"] == alone["logo_events"]
+    assert done["content"]["points"][1]["spin"] == alone["shots"][0]["spin"]
 
 
-def test_a_curve_can_be_cancelled(client: Client) -> None:
-    client.post("curve", parameters={}, name="surface.k_px", points=31)
-    client.wait("curve", lambda m: m["state"] == "running")
-    assert client.post("cancel", kind="curve").status_code == 200
-    client.wait("curve", lambda m: m["state"] == "cancelled")
+def test_a_sweep_can_be_cancelled(client: Client) -> None:
+    client.post("sweep", parameters={}, name="surface.k_px", points=31)
+    client.wait("sweep", lambda m: m["state"] == "running")
+    assert client.post("cancel", kind="sweep").status_code == 200
+    client.wait("sweep", lambda m: m["state"] == "cancelled")
     assert client.post("cancel", kind="nothing").status_code == 422
 
 
@@ -78,34 +81,78 @@ def test_a_curve_can_be_cancelled(client: Client) -> None:
         {"names": ["track.fixed_x_px"] * 9},
     ],
 )
-def test_a_search_that_makes_no_sense_is_refused(client: Client, content: dict[str, Any]) -> None:
+def test_an_optimization_that_makes_no_sense_is_refused(client: Client, content: dict[str, Any]) -> None:
     request = {"parameters": {}, "names": ["logo.pad_px"], "objective": "truth", "trials": 3, **content}
-    answer = client.post("search", **request)
+    answer = client.post("optimization", **request)
     if content["names"][:1] == ["track.fixed_x_px"]:
         assert answer.status_code == 202  # one parameter named often is one parameter
-        client.post("cancel", kind="search")
+        client.post("cancel", kind="optimization")
         return
     assert answer.status_code == 400 and answer.json()["error"]
 
 
-def test_a_search_never_ends_worse_than_it_began_and_tells_the_best_so_far(client: Client) -> None:
+def test_an_optimization_never_ends_worse_than_it_began_and_tells_the_best_so_far(client: Client) -> None:
     start = {"logo": {"pad_px": 9.0}}
     names = ["logo.pad_px", "flow.reach_px"]
-    client.post("search", parameters=start, names=names, objective="truth", trials=6)
-    done = client.wait("search", lambda m: m["state"] in ("done", "failed"))
+    client.post("optimization", parameters=start, names=names, objective="truth", trials=6)
+    done = client.wait("optimization", lambda m: m["state"] in ("done", "failed"))
     assert done["state"] == "done", done
-    assert len(done["trials"]) == 6 and done["best"] == min(done["trials"]) <= done["trials"][0]
+    found = done["content"]
+    assert len(found["trials"]) == 6 and found["best"] == min(found["trials"]) <= found["trials"][0]
     values = {name.split(".")[0]: {} for name in names}
-    for name, value in done["values"].items():
+    for name, value in found["values"].items():
         stage, field = name.split(".")
         values[stage][field] = value
-    measured = client.run({**start, **values})["measures"]
-    assert cost_of(measured, "truth") == pytest.approx(done["best"])
+    shot = client.run({**start, **values})["metrics"]["shots"][0]
+    assert shot["spin"][shot["best"]]["error_share"] == pytest.approx(found["best"])
+
+
+def metrics_with(best: str | None, estimate: EstimateMetrics | None) -> RunMetrics:
+    shot = ShotMetrics(
+        start_us=0,
+        end_us=1,
+        logo_events=5,
+        speed_m_s=None,
+        best=best,
+        kind=None,
+        sentence="",
+        spin={} if estimate is None else {"triplet": estimate},
+    )
+    return RunMetrics(
+        ticks=1,
+        tracked_share=1.0,
+        residual_px=0.5,
+        jitter_px=None,
+        logo_events=5,
+        shots=[shot],
+        no_shot_reason=None,
+    )
 
 
 def test_no_answer_is_the_worst_objective() -> None:
-    assert cost_of({"shots": []}, "truth") == REFUSED
-    assert cost_of({"shots": [{"logo_events": 0, "best": None, "spin": {}}]}, "stated") == REFUSED
+    no_shot = dataclasses.replace(metrics_with(None, None), shots=[])
+    for objective in ("truth", "stated"):
+        assert cost_of(no_shot, objective) == cost_of(metrics_with(None, None), objective) == REFUSED
+
+
+def test_the_objectives_weigh_error_uncertainty_and_residual() -> None:
+    estimate = EstimateMetrics(
+        status="ok",
+        reason=None,
+        magnitude_rps=50.0,
+        magnitude_std_rps=2.0,
+        axis=[0.0, 0.0, 1.0],
+        axis_std_deg=np.degrees(0.03),
+        error_rps=1.0,
+        error_deg=2.0,
+        error_share=0.07,
+    )
+    metrics = metrics_with("triplet", estimate)
+    assert cost_of(metrics, "truth") == 0.07
+    assert cost_of(metrics, "stated") == pytest.approx(0.05 + 0.1 * 0.5)  # 2/50 and 0.03 rad together, and 0.5 px
+    unknown = dataclasses.replace(estimate, error_share=None, axis_std_deg=None)
+    for objective in ("truth", "stated"):
+        assert cost_of(metrics_with("triplet", unknown), objective) == REFUSED
 
 
 def test_biases_of_a_finished_recording_are_locked_and_say_why(client: Client) -> None:
@@ -145,15 +192,18 @@ def test_a_simulated_scene_is_taken_again_with_other_biases(simulated: Path) -> 
         assert written["needs"] == "spinscope.bias"
         assert written["command"].startswith(f"spinscope simulate again --scene {simulated} --biases spinscope.bias")
         assert written["command"].endswith("&& spinscope analyze again.h5")
-        client.post("bias_curve", biases=biases, name="diff_on", points=3)
-        curve = client.wait("bias_curve", lambda m: m["state"] in ("done", "failed"))
+        client.post("bias_sweep", biases=biases, name="diff_on", points=3)
+        curve = client.wait("bias_sweep", lambda m: m["state"] in ("done", "failed"))
         assert curve["state"] == "done", curve
-        noise = [point["noise_on_hz"] for point in curve["points"]]
+        noise = [point["noise_on_hz"] for point in curve["content"]["points"]]
         assert noise[0] > noise[1] > noise[2]
-        client.post("bias_curve", biases=biases, name="diff_on_off", points=2)
-        both = client.wait("bias_curve", lambda m: m["state"] == "done" and m["name"] == "diff_on_off")
-        assert [point["value"] for point in both["points"]] == [-35, 140]  # where both thresholds have a setting
-        assert both["points"][0]["noise_off_hz"] > both["points"][1]["noise_off_hz"]
+        client.post("bias_sweep", biases=biases, name="diff_on_off", points=2)
+        both = client.wait("bias_sweep", lambda m: m["state"] == "done" and m["content"]["name"] == "diff_on_off")
+        assert [point["value"] for point in both["content"]["points"]] == [
+            -35,
+            140,
+        ]  # where both thresholds have a setting
+        assert both["content"]["points"][0]["noise_off_hz"] > both["content"]["points"][1]["noise_off_hz"]
         text = client.http.post(f"{tuner.address}api/biases/write", json={"biases": biases}).json()["text"]
         read = client.http.post(f"{tuner.address}api/biases/read", json={"text": text}).json()
         assert read["biases"] == biases
@@ -164,9 +214,9 @@ def test_a_simulated_scene_is_taken_again_with_other_biases(simulated: Path) -> 
         client.messages.clear()
         client.post("biases", biases=client.opening["biases"]["values"])
         client.wait("biases", lambda m: m["state"] == "done")
-        page = tuner.workshop.page(client.opening["page"])
-        assert page is not None
-        assert len(page.bench.session.recording.path.stem) == len(simulated.stem) + 9
+        session = tuner.state.sessions.get(client.opening["session"])
+        assert session is not None
+        assert len(session.runner.recording.session.recording.path.stem) == len(simulated.stem) + 9
     finally:
         tuner.stop()
 
@@ -181,11 +231,11 @@ def test_recordings_with_bias_files_beside_them_give_measured_rates(
     try:
         page = tuner.open()
         assert page.opening["biases"]["values"]["diff_on"] == 10
-        page.post("bias_curve", biases=page.opening["biases"]["values"], name="diff_on")
-        done = page.wait("bias_curve", lambda m: m["state"] in ("done", "failed"))
+        page.post("bias_sweep", biases=page.opening["biases"]["values"], name="diff_on")
+        done = page.wait("bias_sweep", lambda m: m["state"] in ("done", "failed"))
         assert done["state"] == "done", done
-        assert [point["biases"]["diff_on"] for point in done["points"]] == [10, 60]
-        assert all(point["ball_on_hz"] > 0 and point["noise_on_hz"] > 0 for point in done["points"])
+        assert [point["biases"]["diff_on"] for point in done["content"]["points"]] == [10, 60]
+        assert all(point["ball_on_hz"] > 0 and point["noise_on_hz"] > 0 for point in done["content"]["points"])
     finally:
         tuner.stop()
     (tmp_path / "take10.bias").unlink()
@@ -194,16 +244,16 @@ def test_recordings_with_bias_files_beside_them_give_measured_rates(
     alone = served(tmp_path / "take10.h5")
     try:
         page = alone.open()
-        page.post("bias_curve", biases=page.opening["biases"]["values"], name="diff_on")
-        page.wait("bias_curve", lambda m: m["state"] == "failed")
+        page.post("bias_sweep", biases=page.opening["biases"]["values"], name="diff_on")
+        page.wait("bias_sweep", lambda m: m["state"] == "failed")
         # A .bias file loaded in the page says what the recording was taken with.
-        page.post("bias_curve", biases={"diff_on": 25}, name="diff_on", is_known=True)
-        done = page.wait("bias_curve", lambda m: m["state"] == "done")
-        assert [point["biases"]["diff_on"] for point in done["points"]] == [25]
+        page.post("bias_sweep", biases={"diff_on": 25}, name="diff_on", is_known=True)
+        done = page.wait("bias_sweep", lambda m: m["state"] == "done")
+        assert [point["biases"]["diff_on"] for point in done["content"]["points"]] == [25]
     finally:
         alone.stop()
-    client.post("bias_curve", biases={}, name="diff_on")
-    failed = client.wait("bias_curve", lambda m: m["state"] == "failed")
+    client.post("bias_sweep", biases={}, name="diff_on")
+    failed = client.wait("bias_sweep", lambda m: m["state"] == "failed")
     assert "no recording of this folder" in failed["error"]
 
 
@@ -216,8 +266,8 @@ def test_the_window_of_the_opened_recording_is_not_asked_of_the_folders_others(s
     try:
         page = tuner.open()
         assert page.opening["recordings"] == ["flight_back.h5", "flight_fast_top.h5"]
-        page.post("bias_curve", biases={}, name="diff_on")
-        done = page.wait("bias_curve", lambda m: m["state"] == "done")
-        assert [point.get("error") for point in done["points"]] == [None, None]
+        page.post("bias_sweep", biases={}, name="diff_on")
+        done = page.wait("bias_sweep", lambda m: m["state"] == "done")
+        assert [point.get("error") for point in done["content"]["points"]] == [None, None]
     finally:
         tuner.stop()

@@ -1,4 +1,4 @@
-"""The server without a browser: runs, what is refused, two pages, presets, exports."""
+"""Web application without a browser: runs, refusals, two sessions, presets, exports."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from click.testing import CliRunner
 from rerun.chunk import RrdReader
 
 from spinscope.app.cli import cli
-from spinscope.app.web.bench import Bench
+from spinscope.app.web.app_state import AppState
+from spinscope.app.web.open_recording import OpenRecording
 from spinscope.pipeline.registry import STAGES, Parameters, needed_stages
 from spinscope.pipeline.session import Choices
 
@@ -25,21 +26,21 @@ from .conftest import Client, Served
 
 def stages_run(done: dict[str, Any]) -> set[str]:
     """The stages that had to be computed for this answer."""
-    return {stage for stage, ms in done["stages"].items() if ms > 0 and stage in STAGES.names}
+    return {stage for stage, ms in done["stages_ms"].items() if ms > 0 and stage in STAGES.names}
 
 
 def test_a_run_gives_a_picture_that_rerun_can_read_and_numbers_near_the_truth(client: Client, tmp_path: Path) -> None:
     done = client.run()
     assert done["state"] == "done"
-    picture = client.http.get(client.path(f"pictures/{done['recording']}"))
+    picture = client.http.get(client.path(f"pictures/{done['picture']['id']}"))
     assert picture.status_code == 200
     path = tmp_path / "run.rrd"
     path.write_bytes(picture.content)
     entities = {chunk.entity_path for chunk in RrdReader(path).stream()}
     assert {"/image/events", "/image/surface", "/plots/x/kalman", "/compare"} <= entities
-    shot = done["measures"]["shots"][0]
+    shot = done["metrics"]["shots"][0]
     assert shot["spin"]["triplet"]["error_rps"] < 2.0
-    assert done["measures"]["tracked_share"] > 0.8
+    assert done["metrics"]["tracked_share"] > 0.8
 
 
 @pytest.mark.parametrize(
@@ -52,33 +53,33 @@ def test_a_run_gives_a_picture_that_rerun_can_read_and_numbers_near_the_truth(cl
         ("logo", "pad_px", 3.25),
         ("rate", "ema_us", 2500),
         ("flow", "reach_px", 3.5),
-        ("spin", "triplet_solve", "paper"),
+        ("spin", "triplet_solve", "least_squares"),
     ],
 )
 def test_a_change_runs_its_stage_and_those_below_and_going_back_runs_nothing(
     client: Client, stage: str, field: str, value: Any
 ) -> None:
+    value_before = getattr(Parameters().group(stage), field)
+    assert value != value_before
     client.run()
-    before = getattr(Parameters().group(stage), field)
-    other = value if value != before else "least_squares"
-    changed = client.run({stage: {field: other}})
+    # A value that no other test has run, so that nothing of it is known yet.
+    changed = client.run({stage: {field: value}})
     own = {one.name for one in STAGES if one.group == stage}
     below = {one.name for one in STAGES if own & {needed.name for needed in needed_stages([one.name])}}
     assert own <= stages_run(changed) <= below
-    back = client.run()
-    assert stages_run(back) == set()
+    assert stages_run(client.run()) == set()
 
 
-def test_frames_that_would_not_fit_are_refused(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("spinscope.app.web.bench.MOST_FRAMES_BYTES", 30 * 1280 * 720)
-    answer = client.http.post(client.path("run"), json=client.wish({"track": {"tick_us": 1000}}))
+def test_frames_that_would_not_fit_are_refused(client: Client, tuner: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tuner.state.recording(), "max_frame_bytes", 30 * 1280 * 720)
+    answer = client.http.post(client.path("run"), json=client.request({"track": {"tick_us": 1000}}))
     assert answer.status_code == 400 and "frames of this clip" in answer.json()["error"]
 
 
-def test_the_newest_wish_wins_and_an_older_one_is_refused(client: Client) -> None:
+def test_the_newest_request_wins_and_an_older_one_is_refused(client: Client) -> None:
     client.run()
-    old = client.wish({"logo": {"pad_px": 4.0}})
-    new = client.wish({"logo": {"pad_px": 5.0}})
+    old = client.request({"logo": {"pad_px": 4.0}})
+    new = client.request({"logo": {"pad_px": 5.0}})
     assert client.http.post(client.path("run"), json=new).status_code == 202
     assert client.http.post(client.path("run"), json=old).status_code == 409
     client.wait("run", lambda m: m["serial"] == new["serial"] and m["state"] == "done")
@@ -86,34 +87,34 @@ def test_the_newest_wish_wins_and_an_older_one_is_refused(client: Client) -> Non
 
 
 def test_a_burst_of_changes_ends_with_the_last_one(client: Client) -> None:
-    wishes = [client.wish({"surface": {"k_px": k}}) for k in range(3, 15)]
-    for wish in wishes:
-        assert client.http.post(client.path("run"), json=wish).status_code == 202
-    last = client.wait("run", lambda m: m["serial"] == wishes[-1]["serial"] and m["state"] == "done")
-    assert last["state"] == "done"
-    finished = {m["serial"] for m in client.messages if m["state"] == "done"}
-    assert wishes[-1]["serial"] in finished
+    requests = [client.request({"surface": {"k_px": k}}) for k in range(3, 15)]
+    for request in requests:
+        assert client.http.post(client.path("run"), json=request).status_code == 202
+    client.wait("run", lambda m: m["serial"] == requests[-1]["serial"] and m["state"] == "done")
+    assert client.http.get(client.path("export/results.json")).json()["parameters"]["surface"]["k_px"] == 14
+    finished = [m["serial"] for m in client.messages if m["kind"] == "run" and m["state"] == "done"]
+    assert finished == sorted(set(finished)) and len(finished) < len(requests)
 
 
 def test_two_pages_on_one_process_do_not_disturb_each_other(tuner: Served) -> None:
     one, two = tuner.open(), tuner.open()
-    assert one.opening["page"] != two.opening["page"]
-    first, second = one.wish({"logo": {"pad_px": 1.5}}), two.wish({"logo": {"pad_px": 6.5}})
+    assert one.opening["session"] != two.opening["session"]
+    first, second = one.request({"logo": {"pad_px": 1.5}}), two.request({"logo": {"pad_px": 6.5}})
     one.http.post(one.path("run"), json=first)
     two.http.post(two.path("run"), json=second)
     ends = [c.wait("run", lambda m: m["state"] == "done") for c in (one, two)]
-    events = [end["measures"]["logo_events"] for end in ends]
+    events = [end["metrics"]["logo_events"] for end in ends]
     assert events[0] > events[1]
-    assert two.http.get(two.path(f"pictures/{ends[0]['recording']}")).status_code == 404
+    assert two.http.get(two.path(f"pictures/{ends[0]['picture']['id']}")).status_code == 404
 
 
 def test_a_and_b_are_in_one_recording_with_a_table_of_what_differs(client: Client, tmp_path: Path) -> None:
     done = client.run({"logo": {"pad_px": 5.0}}, pinned={})
-    assert done["differs"] == [["logo.pad_px", Parameters().logo.pad_px, 5.0]]
-    assert done["pinned_measures"]["logo_events"] > done["measures"]["logo_events"]
-    assert set(done["pinned_measures"]["stage_ms"]) == set(STAGES.names)
+    assert done["differences"] == [["logo.pad_px", Parameters().logo.pad_px, 5.0]]
+    assert done["pinned_metrics"]["logo_events"] > done["metrics"]["logo_events"]
+    assert set(done["pinned_costs_ms"]) == set(STAGES.names)
     path = tmp_path / "ab.rrd"
-    path.write_bytes(client.http.get(client.path(f"pictures/{done['recording']}")).content)
+    path.write_bytes(client.http.get(client.path(f"pictures/{done['picture']['id']}")).content)
     chunks = list(RrdReader(path).stream())
     entities = {chunk.entity_path for chunk in chunks}
     assert {"/image/surface", "/A/image/surface", "/plots/spin/triplet", "/A/plots/spin/triplet"} <= entities
@@ -135,19 +136,19 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"start_us": 1.5}, "integer"),
     ({"serial": -1}, "greater than or equal to 0"),
     ({"unknown": 1}, "Extra inputs"),
-    ({"hasty": "yes"}, "valid boolean"),
+    ({"interactive": "yes"}, "valid boolean"),
 ]
 
 
 @pytest.mark.parametrize(("content", "said"), REFUSED, ids=[said for _, said in REFUSED])
 def test_a_bad_request_gets_one_line_and_changes_nothing(client: Client, content: dict[str, Any], said: str) -> None:
     client.run()
-    wish = {**client.wish(), **content}
-    answer = client.http.post(client.path("run"), json=wish)
+    request = {**client.request(), **content}
+    answer = client.http.post(client.path("run"), json=request)
     assert 400 <= answer.status_code < 500
     error = answer.json()["error"]
     assert said in error and "\n" not in error and len(error) < 500
-    assert client.run()["stages"].keys() and stages_run(client.run()) == set()
+    assert client.run()["stages_ms"].keys() and stages_run(client.run()) == set()
 
 
 @pytest.mark.parametrize(
@@ -159,11 +160,25 @@ def test_not_a_number_is_refused(client: Client, text: str) -> None:
 
 
 def test_strangers_are_turned_away(tuner: Served) -> None:
-    page = f"{tuner.address}api/pages"
+    page = f"{tuner.address}api/sessions"
     assert httpx.post(page, json={}, headers={"origin": "http://elsewhere.example"}).status_code == 403
     assert httpx.post(page, json={}, headers={"origin": "null"}).status_code == 403
-    assert httpx.post(page, json={}, headers={"sec-fetch-site": "cross-site"}).status_code == 403
-    assert httpx.get(tuner.address, headers={"host": "elsewhere.example"}).status_code == 421
+    for site in ("cross-site", "same-site", "nonsense"):
+        assert httpx.post(page, json={}, headers={"sec-fetch-site": site}).status_code == 403
+        assert httpx.get(f"{tuner.address}static/main.js", headers={"sec-fetch-site": site}).status_code == 403
+    # Origins that only begin or end like ours, or differ in scheme or port.
+    own = tuner.address.rstrip("/")
+    port = own.rpartition(":")[2]
+    for origin in (
+        f"{own}0",
+        f"{own}.evil.example",
+        own.replace("http:", "https:"),
+        f"http://localhost:{port}",
+        own[:-1],
+    ):
+        assert httpx.post(page, json={}, headers={"origin": origin}).status_code == 403, origin
+    for host in ("elsewhere.example", f"127.0.0.1.elsewhere.example:{port}", f"localhost@evil.example:{port}", ""):
+        assert httpx.get(tuner.address, headers={"host": host}).status_code == 421, host
     assert httpx.post(page, content="{}", headers={"content-type": "text/plain"}).status_code == 415
     assert httpx.post(page, json={"recording": "x" * 300_000}).status_code == 413
     assert (
@@ -171,17 +186,25 @@ def test_strangers_are_turned_away(tuner: Served) -> None:
         == 413
     )
     assert httpx.post(page, content="{", headers={"content-type": "application/json"}).status_code == 422
-    assert httpx.get(f"{tuner.address}api/pages/none/recording").status_code == 404
+    assert httpx.get(f"{tuner.address}api/sessions/none/recording").status_code == 404
     assert httpx.get(f"{tuner.address}nothing").status_code == 404
-    assert httpx.get(f"{tuner.address}static/../web.py").status_code == 404
-    assert httpx.get(f"{tuner.address}static/%2e%2e/web.py").status_code == 404
-    own = {"origin": tuner.address.rstrip("/"), "sec-fetch-site": "same-origin"}
-    assert httpx.post(page, json={}, headers=own).status_code == 200
+    assert httpx.get(f"{tuner.address}static/../application.py").status_code == 404
+    assert httpx.get(f"{tuner.address}static/%2e%2e/application.py").status_code == 404
+    headers = {"origin": own, "sec-fetch-site": "same-origin"}
+    assert httpx.post(page, json={}, headers=headers).status_code == 200
+
+
+def test_the_page_is_reached_through_a_tunnel_at_another_port_and_by_a_link(tuner: Served) -> None:
+    tunnel = {"host": "localhost:9999", "origin": "http://localhost:9999", "sec-fetch-site": "same-origin"}
+    assert httpx.post(f"{tuner.address}api/sessions", json={}, headers=tunnel).status_code == 200
+    visit = {"sec-fetch-site": "cross-site", "sec-fetch-mode": "navigate"}
+    assert httpx.get(tuner.address, headers=visit).status_code == 200
+    assert httpx.get(f"{tuner.address}static/main.js", headers=visit).status_code == 403
 
 
 @pytest.mark.parametrize("name", ["../README.md", "/etc/passwd", "nothing.h5", "..", "", "a/../flight_back.h5x"])
 def test_nothing_outside_the_folder_is_opened(tuner: Served, name: str) -> None:
-    answer = httpx.post(f"{tuner.address}api/pages", json={"recording": name})
+    answer = httpx.post(f"{tuner.address}api/sessions", json={"recording": name})
     assert answer.status_code == 400 and "in the opened folder" in answer.json()["error"]
 
 
@@ -198,7 +221,7 @@ def test_the_page_fetches_nothing_from_elsewhere(tuner: Served) -> None:
 
 
 def test_the_viewer_is_served_with_its_class_and_its_program(tuner: Served) -> None:
-    version = httpx.post(f"{tuner.address}api/pages", json={}).json()["viewer"]
+    version = httpx.post(f"{tuner.address}api/sessions", json={}).json()["viewer_version"]
     script = httpx.get(f"{tuner.address}rerun/{version}/widget.js")
     assert script.headers["content-type"].startswith("text/javascript")
     assert script.text.rstrip().endswith("export { WebViewer };")
@@ -219,8 +242,8 @@ def test_a_stage_that_raises_says_so_and_the_last_good_state_stays(
         patch.setitem(STAGES._entries, "logo", dataclasses.replace(STAGES["logo"], step=broken))
         bad = client.run({"logo": {"pad_px": 7.75}})
     assert bad["state"] == "failed"
-    assert bad["error"].startswith("logo failed") or "out of order" in bad["error"]
-    assert client.http.get(client.path(f"pictures/{good['recording']}")).status_code == 200
+    assert bad["error"] == "the server failed: ValueError: out of order"
+    assert client.http.get(client.path(f"pictures/{good['picture']['id']}")).status_code == 200
     assert client.run({"logo": {"pad_px": 7.75}})["state"] == "done"
 
 
@@ -279,21 +302,36 @@ def test_a_fixed_ball_is_found_and_its_picture_shown(tuner: Served) -> None:
     # Where the ball is: the samples' README.
     assert abs(found["fixed_x_px"] - 528.43) < 3 and abs(found["fixed_y_px"] - 426.87) < 3
     done = client.run({"track": {"ball": "fixed", **found}})
-    assert done["measures"]["shots"]
+    assert done["metrics"]["shots"]
 
 
 def test_a_long_recording_is_worked_on_clip_by_clip(flight: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("spinscope.app.web.bench.CLIP_FRAMES_BYTES", 10 * 1280 * 720)
-    bench = Bench.open(flight, Choices())
-    assert bench.is_long
-    start_us, end_us = bench.first_clip_us()
-    assert end_us - start_us <= bench.longest_us == 50_000
-    for share in bench.find_shots(bench.session.parameters):
+    monkeypatch.setattr("spinscope.app.web.open_recording.CLIP_FRAMES_BYTES", 10 * 1280 * 720)
+    recording = OpenRecording.open(flight, Choices())
+    assert recording.is_long
+    start_us, end_us = recording.first_clip_us()
+    assert end_us - start_us <= recording.longest_us == 50_000
+    for share in recording.find_shots(recording.session.parameters):
         last = share
     assert last == 1.0
-    assert len(bench.found) == 1
-    found_start_us, found_end_us = bench.found[0]
+    assert len(recording.found_us) == 1
+    found_start_us, found_end_us = recording.found_us[0]
     assert found_end_us - found_start_us > 80_000
-    clip = bench.clip(start_us, end_us)
-    ticks = [step.tick for step in clip.run(bench.session.parameters)]
+    clip = recording.clip(start_us, end_us)
+    ticks = list(clip.chain.run(recording.session.parameters))
     assert ticks[0].packet.start_us <= start_us and ticks[-1].packet.end_us == end_us
+
+
+@pytest.mark.parametrize(("tools", "is_long"), [(True, True), (False, False)])
+def test_without_tools_more_is_shown_at_once(
+    flight: Path, monkeypatch: pytest.MonkeyPatch, tools: bool, is_long: bool
+) -> None:
+    monkeypatch.setattr("spinscope.app.web.open_recording.CLIP_FRAMES_BYTES", 10 * 1280 * 720)
+    state = AppState(flight, Choices(), tools=tools)
+    try:
+        recording = state.recording()
+        assert recording.is_long is is_long
+        clip = recording.first_clip()
+        clip.chain.check(clip.parameters, recording.max_frame_bytes)
+    finally:
+        state.close()

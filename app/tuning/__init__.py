@@ -1,0 +1,1 @@
+"""Sweeps and optimization of parameters and biases, on top of the pipeline; no web in it."""

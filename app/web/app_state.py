@@ -1,0 +1,139 @@
+"""State of the web application: the open recordings of one folder and the sessions of its clients."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import OrderedDict
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from spinscope.app.viewer.drawing_cache import DrawingCache
+from spinscope.pipeline.errors import ParameterError, RecordingError
+from spinscope.pipeline.recordings import readable_suffixes
+from spinscope.pipeline.session import Choices
+
+from .client_session import ClientSession
+from .open_recording import VIEW_FRAMES_BYTES, OpenRecording
+from .shot_detection_job import ShotDetectionJob
+
+RECORDINGS_KEPT = 2  # each holds its events: 20 s of a rally are 260 MB
+SESSIONS_MOST = 16
+ALONE_S = 20.0  # a session without its browser for so long is closed; a reload takes less
+
+
+class AppState:
+    """Open recordings and client sessions.
+
+    Parameters
+    ----------
+    path : Path
+        Recording that was asked for; others of its folder may be opened from the page.
+    choices : Choices
+        What was chosen on the command line.
+    tools : bool
+        Whether the page shows its tools (`tune`), or the viewer alone (`view`).
+    layout : str
+        Layout of the viewer in front.
+
+    Attributes
+    ----------
+    sessions : dict
+        Open sessions by id.
+    """
+
+    def __init__(self, path: Path, choices: Choices, *, tools: bool = True, layout: str = "all") -> None:
+        self.path = path.absolute()
+        self.folder = self.path.parent
+        self.tools, self.layout = tools, layout
+        self.drawings = DrawingCache()
+        self._choices = choices
+        self._recordings: OrderedDict[Path, OpenRecording] = OrderedDict()
+        self._detections: dict[Path, ShotDetectionJob] = {}
+        self._scratch: TemporaryDirectory[str] | None = None
+        self.sessions: dict[str, ClientSession] = {}
+        self._lock = threading.Lock()
+
+    def recording(self, name: str | None = None) -> OpenRecording:
+        """The recording of that name in the folder, opened when it is not yet; raises SpinscopeError."""
+        path = self.path if name is None else self._inside(name)
+        with self._lock:
+            recording = self._recordings.pop(path, None)
+            if recording is None:
+                choices = self._choices if path == self.path else self._choices.for_others
+                frames_bytes = None if self.tools else VIEW_FRAMES_BYTES
+                recording = OpenRecording.open(path, choices, frames_bytes=frames_bytes)
+            self._recordings[path] = recording
+            while len(self._recordings) > RECORDINGS_KEPT:
+                detection = self._detections.pop(self._recordings.popitem(last=False)[0], None)
+                if detection is not None:
+                    detection.close()
+            return recording
+
+    def recording_names(self) -> list[str]:
+        """Names of the recordings in the folder."""
+        suffixes = readable_suffixes()
+        found = {path.name for path in self.folder.iterdir() if path.suffix.lower() in suffixes and path.is_file()}
+        return sorted(found | {self.path.name})
+
+    def open_session(self, name: str | None) -> ClientSession:
+        """Open a session on a recording; raises SpinscopeError."""
+        recording = self.recording(name)
+        self.close_lonely_sessions()
+        with self._lock:
+            if len(self.sessions) >= SESSIONS_MOST:
+                raise ParameterError(f"{SESSIONS_MOST} pages are open: close one of them")
+            session = ClientSession(recording, self.drawings)
+            self.sessions[session.id] = session
+        self.detect_shots(session)
+        return session
+
+    def detect_shots(self, session: ClientSession) -> None:
+        """Report the shots of a long recording to a session, searching for them when nobody has yet."""
+        recording = session.runner.recording
+        if recording.is_long:
+            path = recording.session.recording.path
+            if path not in self._detections:
+                self._detections[path] = ShotDetectionJob(recording, recording.session.parameters)
+            self._detections[path].add(session.messages)
+
+    @property
+    def scratch(self) -> Path:
+        """A folder for simulated recordings; it goes with the program."""
+        if self._scratch is None:
+            self._scratch = TemporaryDirectory(prefix="spinscope-")
+        return Path(self._scratch.name)
+
+    def close_lonely_sessions(self) -> None:
+        """Close the sessions that no browser has listened to for a while."""
+        now_s = time.monotonic()
+        for session in list(self.sessions.values()):
+            if session.listeners == 0 and now_s - session.last_sign_of_life_s > ALONE_S:
+                self.close_session(session)
+
+    def close_session(self, session: ClientSession) -> None:
+        """End a session: its run, its jobs and its connection."""
+        self.sessions.pop(session.id, None)
+        session.close()
+        for detection in list(self._detections.values()):
+            detection.remove(session.messages)
+
+    def close(self) -> None:
+        """Close all sessions, wait for all threads, and leave nothing behind."""
+        sessions = list(self.sessions.values())
+        for session in sessions:
+            session.close()
+        for detection in self._detections.values():
+            detection.close()
+        for session in sessions:
+            session.join(2.0)
+        self.drawings.close()
+        if self._scratch is not None:
+            self._scratch.cleanup()
+            self._scratch = None
+
+    def _inside(self, name: str) -> Path:
+        path = self.folder / name
+        if not name or Path(name).name != name or not path.is_file():
+            raise RecordingError(f"there is no recording {name!r} in the opened folder: choose one of its files")
+        return path

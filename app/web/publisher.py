@@ -1,0 +1,141 @@
+"""Publisher of a client session: draws results, keeps the newest pictures and reports progress."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import OrderedDict
+from typing import Any, Literal
+
+from spinscope.app.viewer.comparison import compared, note_with_a, note_without_a
+from spinscope.app.viewer.drawing_cache import DrawingCache
+from spinscope.app.viewer.rrd import rrd_bytes
+from spinscope.app.viewer.run import ViewedRun
+from spinscope.pipeline.metrics import RunMetrics
+from spinscope.pipeline.registry import STAGES
+from spinscope.pipeline.session import Result
+
+from .message_queue import MessageQueue
+from .open_recording import OpenRecording
+from .presets import differences
+from .schemas import Picture, RunMessage, RunRequest
+
+# A client learns of a run's progress this often, and not at all of one that is over at once: every change of the page
+# has the browser put the whole picture together anew, in the very time in which it is waited for.
+REPORT_S, QUIET_S = 0.05, 0.3
+PICTURES_KEPT = 3
+DRAWING = "drawing"  # counted beside the stages
+
+State = Literal["loading", "computing", "drawing", "partial", "done", "failed"]
+
+
+class RunReport:
+    """Progress of one run request: seconds by stage and what is being done, told at a bearable rate."""
+
+    def __init__(self, queue: MessageQueue, serial: int) -> None:
+        self.serial = serial
+        self._queue = queue
+        self._began_s = time.perf_counter()
+        self._seconds = dict.fromkeys([*STAGES.names, DRAWING], 0.0)
+        self._told: tuple[str, float] = ("", 0.0)  # what was told last, and when
+        self._lock = threading.Lock()
+
+    def add(self, seconds: dict[str, float]) -> None:
+        """Count what stages took; from any thread."""
+        with self._lock:
+            for stage, more in seconds.items():
+                self._seconds[stage] += more
+
+    def tell(self, state: State, share: float = 0.0, *, force: bool = False, **content: Any) -> None:
+        """Tell the client, unless it was told of this state a moment ago."""
+        now_s, (last_state, last_s) = time.perf_counter(), self._told
+        is_due = state != last_state or now_s - last_s >= REPORT_S
+        if not force and not (is_due and now_s - self._began_s >= QUIET_S):
+            return
+        self._told = state, now_s
+        self._queue.put(
+            RunMessage(
+                serial=self.serial,
+                state=state,
+                share=share,
+                stages_ms={name: 1000 * seconds for name, seconds in self._seconds.items()},
+                total_ms=1000 * (now_s - self._began_s),
+                **content,
+            )
+        )
+
+
+class Publisher:
+    """Draws the results of a client's runs and tells it where to fetch them."""
+
+    def __init__(self, session_id: str, queue: MessageQueue, drawings: DrawingCache) -> None:
+        self.drawings = drawings
+        self._session_id, self._queue = session_id, queue
+        self._pictures: OrderedDict[str, bytes] = OrderedDict()
+
+    def report(self, request: RunRequest) -> RunReport:
+        """Report on a new request."""
+        return RunReport(self._queue, request.serial)
+
+    def picture(self, picture_id: str) -> bytes | None:
+        """Bytes of a picture; None where a newer one has taken its place."""
+        return self._pictures.get(picture_id)
+
+    def draw(self, b: Result, a: Result | None, report: RunReport, *, partial: bool) -> Picture:
+        """Draw a run, beside that of A if there is one, and keep the picture."""
+        report.tell("drawing", 1.0)
+        began_s = time.perf_counter()
+        run = ViewedRun.of(b)
+        chunks = self._chunks(b, run)
+        if a is None:
+            chunks += note_without_a(run)
+        else:
+            chunks += [*compared(self._chunks(a, ViewedRun.of(a))), *note_with_a(run, _difference_text(a, b))]
+        picture_id = f"{self._session_id}-{report.serial}{f'-part{len(b.ticks)}' if partial else ''}"
+        content = rrd_bytes(chunks, picture_id)
+        report.add({DRAWING: time.perf_counter() - began_s})
+        self._pictures[picture_id] = content
+        while len(self._pictures) > PICTURES_KEPT:
+            self._pictures.popitem(last=False)
+        return Picture(
+            id=picture_id,
+            size_bytes=len(content),
+            start_us=run.start_us,
+            end_us=run.end_us,
+            opening_us=run.opening_us,
+        )
+
+    def publish(
+        self,
+        recording: OpenRecording,
+        picture: Picture,
+        b: Result,
+        a: Result | None,
+        report: RunReport,
+        *,
+        partial: bool,
+    ) -> None:
+        """Tell the client of a picture, with the metrics of a run that is whole."""
+        is_whole = len(b.ticks) == b.session.chain.tick_count(b.session.parameters)
+        content: dict[str, Any] = {}
+        if is_whole:
+            content |= {"metrics": RunMetrics.of(b), "costs_ms": recording.costs_ms(b.session, b.session.parameters)}
+        if a is not None:
+            content |= {
+                "pinned_metrics": RunMetrics.of(a),
+                "pinned_costs_ms": recording.costs_ms(a.session, a.session.parameters),
+                "differences": differences(a.session.parameters, b.session.parameters),
+            }
+        report.tell("partial" if partial else "done", 1.0, force=True, picture=picture, **content)
+
+    def _chunks(self, result: Result, run: ViewedRun) -> list[Any]:
+        return self.drawings.chunks(run, result.session.chain.keys(result.session.parameters))
+
+
+def _difference_text(a: Result, b: Result) -> str:
+    """Table of the Compare tab: which parameters of A and B differ."""
+    rows = differences(a.session.parameters, b.session.parameters)
+    if not rows:
+        return "## A and B have the same parameters\n\nChange one: that is B."
+    lines = ["| parameter | A | B |", "|---|---|---|"]
+    return "\n".join([*lines, *(f"| {name} | {first} | {second} |" for name, first, second in rows)])

@@ -1,0 +1,335 @@
+"""All messages between the server and the page, checked strictly; `static/messages.d.ts` is generated from them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+from spinscope.app.tuning.bias_sweep import BiasState, BiasSweep, Resimulation
+from spinscope.app.tuning.optimization import Optimization
+from spinscope.app.tuning.parameter_sweep import ParameterSweep, Scale
+from spinscope.pipeline.metrics import RunMetrics
+from spinscope.pipeline.registry import Parameters
+
+Values = dict[str, dict[str, Any]]
+TEXT_MOST = 100_000
+Microseconds = Annotated[int, Field(ge=-(2**62), le=2**62)]
+
+
+if TYPE_CHECKING:
+    ParameterValues = Parameters
+else:
+    ParameterValues = Annotated[Values, AfterValidator(Parameters().with_values)]
+
+
+class Request(BaseModel):
+    """Request of the page: unknown fields are refused, and nothing is converted."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class OpenRequest(Request):
+    """Open a session on a recording of the folder; None for the one the program was started with."""
+
+    recording: str | None = Field(default=None, max_length=255)
+
+
+class RunRequest(Request):
+    """Run a clip with `parameters`, beside those pinned as A; the request with the highest serial is the newest.
+
+    While a slider is being dragged (`interactive`) a picture without the slowest stages comes first.
+    """
+
+    serial: int = Field(ge=0, lt=2**53)
+    parameters: ParameterValues
+    pinned: ParameterValues | None = None
+    start_us: Microseconds
+    end_us: Microseconds
+    playhead_us: float | None = Field(default=None, allow_inf_nan=False)
+    interactive: bool = False
+
+
+class TextRequest(Request):
+    """A preset (TOML) or a .bias file to read."""
+
+    text: str = Field(max_length=TEXT_MOST)
+
+
+class SettingsRequest(Request):
+    """Parameters, and the clip when it is not the first one of the recording."""
+
+    parameters: ParameterValues
+    start_us: Microseconds | None = None
+    end_us: Microseconds | None = None
+
+
+class SweepRequest(SettingsRequest):
+    """Sweep one parameter; without low and high over its whole range."""
+
+    name: str = Field(max_length=100)
+    low: float | None = None
+    high: float | None = None
+    points: int = 15
+
+
+class OptimizationRequest(SettingsRequest):
+    """Optimize some parameters."""
+
+    names: list[str] = Field(max_length=20)
+    objective: str = Field(max_length=20)
+    trials: int = 40
+
+
+class CancelRequest(Request):
+    """Cancel the job of a kind."""
+
+    kind: Literal["sweep", "optimization", "biases", "bias_sweep"]
+
+
+class BiasRequest(Request):
+    """Biases to simulate the scene with, or to write to a file."""
+
+    biases: dict[str, int]
+
+
+class BiasSweepRequest(BiasRequest):
+    """Sweep a bias, all others as given; for a real recording, whose own biases these may be, measure the folder."""
+
+    is_known: bool = False
+    name: str = Field(max_length=20)
+    points: int = 9
+
+
+class Response(BaseModel):
+    """Answer of the server."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+class Done(Response):
+    """Answer without content."""
+
+
+class Choice(Response):
+    """Anything that the page offers by name."""
+
+    name: str
+    label: str
+    help: str = ""
+
+
+class MethodInfo(Choice):
+    """A spin method with its colour, as CSS."""
+
+    colour: str
+
+
+class MetricInfo(Response):
+    """A metric of a run, shot or estimate: field name, label and unit (% for a share of 0 to 1)."""
+
+    name: str
+    label: str
+    unit: str
+
+
+class EventRate(Response):
+    """Event rate of the whole recording: counts of bins of equal length, and their edges."""
+
+    counts: list[int]
+    edges_us: list[int]
+
+
+class RecordingDescription(Response):
+    """The opened recording, worked on shot by shot if it is long; `clip_us` is the first clip, [start, end)."""
+
+    name: str
+    events: int
+    width_px: int
+    height_px: int
+    start_us: int
+    end_us: int
+    longest_us: int
+    is_long: bool
+    clip_us: tuple[int, int]
+    margin_us: int
+    has_truth: bool
+    warnings: list[str]
+    rate: EventRate
+
+
+class ControlInfo(Response):
+    """Declaration of one parameter, as its control needs it."""
+
+    name: str
+    label: str
+    kind: str
+    default: Any
+    optional: bool
+    unit: str
+    low: float | None
+    high: float | None
+    step: float | None
+    choices: list[str]
+    help: str
+    allowed: str
+    scale: Scale
+
+
+class SectionInfo(Response):
+    """A group of controls; `is_setup` where it belongs to the set-up and not to the method."""
+
+    title: str
+    is_setup: bool
+    controls: list[ControlInfo]
+
+
+class Opening(Response):
+    """Everything that the page needs to know at first; without `tools` it shows the viewer alone, `tab` in front."""
+
+    session: str
+    viewer_version: str
+    tools: bool
+    tab: str
+    recording: RecordingDescription
+    recordings: list[str]
+    sections: list[SectionInfo]
+    stages: list[Choice]
+    methods: list[MethodInfo]
+    run_metrics: list[MetricInfo]
+    shot_metrics: list[MetricInfo]
+    estimate_metrics: list[MetricInfo]
+    tabs: list[Choice]
+    exports: list[Choice]
+    objectives: list[Choice]
+    suggested: list[str]
+    colours: dict[str, str]
+    presets: dict[str, Values]
+    biases: BiasState
+
+
+class Reopened(Response):
+    """The recording after its scene was simulated again."""
+
+    recording: RecordingDescription
+    biases: BiasState
+
+
+class PresetValues(Response):
+    """Parameters read from a preset."""
+
+    parameters: Values
+
+
+class WrittenSettings(Response):
+    """Settings as a preset and as a command line; `needs` names a file that the command reads."""
+
+    toml: str
+    command: str
+    needs: str | None
+
+
+class BiasValues(Response):
+    """Biases read from a file."""
+
+    biases: dict[str, int]
+
+
+class BiasText(Response):
+    """A .bias file."""
+
+    text: str
+
+
+class Picture(Response):
+    """An .rrd picture that is ready to be fetched."""
+
+    id: str
+    size_bytes: int
+    start_us: int
+    end_us: int
+    opening_us: int
+
+
+class Message(Response):
+    """Message of the server."""
+
+    kind: str
+
+
+class RunMessage(Message):
+    """Progress or result of a run request.
+
+    Attributes
+    ----------
+    stages_ms, total_ms : dict, float
+        Time spent for this request so far, by stage.
+    metrics, pinned_metrics : RunMetrics or None
+        Metrics of B and A once all ticks are there.
+    costs_ms, pinned_costs_ms : dict or None
+        What each stage of B and A took when it was computed, perhaps for an earlier request.
+    differences : list
+        (stage.field, value of A, value of B) of all that differs.
+    """
+
+    kind: Literal["run"] = "run"
+    serial: int
+    state: Literal["loading", "computing", "drawing", "partial", "done", "failed"]
+    share: float
+    stages_ms: dict[str, float]
+    total_ms: float
+    error: str | None = None
+    picture: Picture | None = None
+    metrics: RunMetrics | None = None
+    costs_ms: dict[str, float] | None = None
+    pinned_metrics: RunMetrics | None = None
+    pinned_costs_ms: dict[str, float] | None = None
+    differences: list[tuple[str, Any, Any]] = []
+
+
+class ShotsMessage(Message):
+    """Shots of a long recording found so far, [start, end) in us, and the share of it that was searched."""
+
+    kind: Literal["shots"] = "shots"
+    share: float
+    shots: list[tuple[int, int]]
+    error: str | None = None
+
+
+class JobMessage(Message):
+    """Progress of a job; `content` holds what there is so far."""
+
+    state: Literal["running", "done", "cancelled", "failed"]
+    error: str | None = None
+    content: Any = None
+
+
+class SweepMessage(JobMessage):
+    """Progress of a parameter sweep."""
+
+    kind: Literal["sweep"] = "sweep"
+    content: ParameterSweep | None = None
+
+
+class OptimizationMessage(JobMessage):
+    """Progress of an optimization."""
+
+    kind: Literal["optimization"] = "optimization"
+    content: Optimization | None = None
+
+
+class BiasesMessage(JobMessage):
+    """Progress of a re-simulation."""
+
+    kind: Literal["biases"] = "biases"
+    content: Resimulation | None = None
+
+
+class BiasSweepMessage(JobMessage):
+    """Progress of a bias sweep."""
+
+    kind: Literal["bias_sweep"] = "bias_sweep"
+    content: BiasSweep | None = None
+
+
+ServerMessage = RunMessage | ShotsMessage | SweepMessage | OptimizationMessage | BiasesMessage | BiasSweepMessage

@@ -1,0 +1,148 @@
+"""Server of the web application: on this machine alone, until Ctrl-C."""
+
+from __future__ import annotations
+
+import gc
+import os
+import shutil
+import socket
+import sys
+import threading
+import webbrowser
+from collections.abc import Callable
+from pathlib import Path
+
+import uvicorn
+
+from spinscope.app.terminal import note
+from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.session import Choices
+
+from .app_state import AppState
+from .application import application
+from .open_recording import OpenRecording
+
+HOST = "127.0.0.1"
+PORT = 8377  # free of well-known services; another one is taken when it is busy
+
+
+class _Server(uvicorn.Server):
+    """Announces its address once it answers, and ends the sessions before it waits for their connections to end."""
+
+    def __init__(self, config: uvicorn.Config, state: AppState, announce: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._state, self._announce = state, announce
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        self._announce()
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        self._state.close()
+        await super().shutdown(sockets)
+
+
+def serve(
+    path: Path,
+    choices: Choices,
+    port: int | None = None,
+    *,
+    open_browser: bool = True,
+    tools: bool = True,
+    layout: str = "all",
+) -> None:
+    """Open a recording and serve its page until Ctrl-C.
+
+    Parameters
+    ----------
+    port : int or None
+        Port asked for; another free one is taken when it is busy. None for the usual one.
+    open_browser : bool
+        Whether to open the page where there is a browser; the address is printed in any case.
+    tools, layout
+        See AppState.
+
+    Raises
+    ------
+    SpinscopeError
+        For a recording or choices that cannot be used, or when no port can be opened.
+    """
+    state = AppState(path, choices, tools=tools, layout=layout)
+    recording = state.recording()
+    # While the browser loads the page and the viewer, which takes longer.
+    threading.Thread(target=_load_kernels, args=(recording,), name="kernels", daemon=True).start()
+    listening = listening_socket(PORT if port is None else port)
+    config = uvicorn.Config(
+        application(state),
+        log_level="error",
+        lifespan="on",
+        access_log=False,
+        server_header=False,
+        timeout_graceful_shutdown=2,
+    )
+
+    def announce() -> None:
+        own_port = listening.getsockname()[1]
+        address = f"http://{HOST}:{own_port}/"
+        tunnel = f"`ssh -L {own_port}:{HOST}:{own_port} THIS_MACHINE` brings it to your own machine"
+        if tools:
+            sys.stdout.write(f"{address}\n")
+            sys.stdout.flush()
+        is_open = open_browser and show_in_browser(address)
+        if not tools:
+            hint = "" if is_open else f" (no browser here: {tunnel}, `--save FILE.rrd` writes a file instead)"
+            note(f"the viewer is at {address}{hint}; Ctrl-C stops it")
+        elif not is_open:
+            note(f"open the address in a browser; from elsewhere, {tunnel}")
+
+    for warning in [] if tools else recording.session.warnings:
+        note(f"warning: {warning}")
+    try:
+        _Server(config, state, announce).run([listening])
+    except KeyboardInterrupt:  # Ctrl-C is how it is meant to end
+        return
+    finally:
+        listening.close()
+
+
+def show_in_browser(address: str) -> bool:
+    """Open an address in a graphical browser; False where there is none (a text browser would take the terminal)."""
+    if sys.platform.startswith("linux") and not shutil.which("wslview"):
+        if not any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")):
+            return False
+    try:
+        found = webbrowser.get()
+    except webbrowser.Error:
+        return False
+    if isinstance(found, webbrowser.GenericBrowser) and not isinstance(found, webbrowser.BackgroundBrowser):
+        return False
+    return found.open(address)
+
+
+def listening_socket(port: int) -> socket.socket:
+    """A socket that listens on the port, or on a free one when that is busy; raises ParameterError."""
+    if not 0 <= port <= 65535:
+        raise ParameterError(f"port {port} is out of range: 1 to 65535")
+    for candidate in (port, 0):
+        listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listening.bind((HOST, candidate))
+            listening.listen(128)
+        except OSError as error:
+            listening.close()
+            if candidate == 0:
+                raise ParameterError(f"no port can be opened on {HOST} ({error.strerror})") from None
+            continue
+        return listening
+    raise AssertionError("unreachable")
+
+
+def _load_kernels(recording: OpenRecording) -> None:
+    """Load the kernels, and leave them and the libraries out of Python's search for garbage.
+
+    They are a quarter of a million objects: looking through them took 0.15 s of every tenth picture.
+    """
+    recording.load_kernels()
+    gc.collect()
+    gc.freeze()

@@ -1,0 +1,116 @@
+// Generated from app/web/schemas.py by `python -m tests.app.web.message_types`: do not edit.
+/** Declaration of one bias. */
+export type BiasRange = { low: number; high: number; default: number; help: string };
+/** Biases to simulate the scene with, or to write to a file. */
+export type BiasRequest = { biases: Record<string, number> };
+/** Biases of a recording. */
+export type BiasState = { values: Record<string, number>; known: boolean; locked: string | null; calibrated: boolean; ranges: Record<string, BiasRange>; swept: SweptBias[] };
+/** The points of a sweep so far: simulated over one bias (`name`), or of recordings whose biases are known. */
+export type BiasSweep = { name: string | null; total: number; points: BiasSweepPoint[] };
+/** Progress of a bias sweep. */
+export type BiasSweepMessage = { kind: "bias_sweep"; state: "running" | "done" | "cancelled" | "failed"; error: string | null; content: BiasSweep | null };
+/** Event rates with one setting, of the whole sensor; only `error` where a recording could not be used. */
+export type BiasSweepPoint = { value: number | null; recording: string | null; biases: Record<string, number>; error: string | null; ball_on_hz: number | null; ball_off_hz: number | null; noise_on_hz: number | null; noise_off_hz: number | null };
+/** Sweep a bias, all others as given; for a real recording, whose own biases these may be, measure the folder. */
+export type BiasSweepRequest = { biases: Record<string, number>; is_known?: boolean; name: string; points?: number };
+/** A .bias file. */
+export type BiasText = { text: string };
+/** Biases read from a file. */
+export type BiasValues = { biases: Record<string, number> };
+/** Progress of a re-simulation. */
+export type BiasesMessage = { kind: "biases"; state: "running" | "done" | "cancelled" | "failed"; error: string | null; content: Resimulation | null };
+/** Cancel the job of a kind. */
+export type CancelRequest = { kind: "sweep" | "optimization" | "biases" | "bias_sweep" };
+/** Anything that the page offers by name. */
+export type Choice = { name: string; label: string; help: string };
+/** Declaration of one parameter, as its control needs it. */
+export type ControlInfo = { name: string; label: string; kind: string; default: any; optional: boolean; unit: string; low: number | null; high: number | null; step: number | null; choices: string[]; help: string; allowed: string; scale: "linear" | "logarithmic" | "cubic" | "none" };
+/** Answer without content. */
+export type Done = {  };
+/** Estimate of one method for one shot, ready for JSON; None for what is not known. */
+export type EstimateMetrics = { status: string; reason: string | null; magnitude_rps: number | null; magnitude_std_rps: number | null; axis: number[] | null; axis_std_deg: number | null; error_rps: number | null; error_deg: number | null; error_share: number | null };
+/** Event rate of the whole recording: counts of bins of equal length, and their edges. */
+export type EventRate = { counts: number[]; edges_us: number[] };
+/** A spin method with its colour, as CSS. */
+export type MethodInfo = { name: string; label: string; help: string; colour: string };
+/** A metric of a run, shot or estimate: field name, label and unit (% for a share of 0 to 1). */
+export type MetricInfo = { name: string; label: string; unit: string };
+/** Open a session on a recording of the folder; None for the one the program was started with. */
+export type OpenRequest = { recording?: string | null };
+/** Everything that the page needs to know at first; without `tools` it shows the viewer alone, `tab` in front. */
+export type Opening = { session: string; viewer_version: string; tools: boolean; tab: string; recording: RecordingDescription; recordings: string[]; sections: SectionInfo[]; stages: Choice[]; methods: MethodInfo[]; run_metrics: MetricInfo[]; shot_metrics: MetricInfo[]; estimate_metrics: MetricInfo[]; tabs: Choice[]; exports: Choice[]; objectives: Choice[]; suggested: string[]; colours: Record<string, string>; presets: Record<string, Record<string, Record<string, any>>>; biases: BiasState };
+/** The trials of an optimization so far. */
+export type Optimization = { objective: string; total: number; trials: number[]; best: number | null; values: Record<string, boolean | number | string | null> };
+/** Progress of an optimization. */
+export type OptimizationMessage = { kind: "optimization"; state: "running" | "done" | "cancelled" | "failed"; error: string | null; content: Optimization | null };
+/** Optimize some parameters. */
+export type OptimizationRequest = { parameters: Record<string, Record<string, any>>; start_us?: number | null; end_us?: number | null; names: string[]; objective: string; trials?: number };
+/** The points of a sweep so far. */
+export type ParameterSweep = { name: string; total: number; points: SweepPoint[] };
+/** An .rrd picture that is ready to be fetched. */
+export type Picture = { id: string; size_bytes: number; start_us: number; end_us: number; opening_us: number };
+/** Parameters read from a preset. */
+export type PresetValues = { parameters: Record<string, Record<string, any>> };
+/** The opened recording, worked on shot by shot if it is long; `clip_us` is the first clip, [start, end). */
+export type RecordingDescription = { name: string; events: number; width_px: number; height_px: number; start_us: number; end_us: number; longest_us: number; is_long: boolean; clip_us: [number, number]; margin_us: number; has_truth: boolean; warnings: string[]; rate: EventRate };
+/** The recording after its scene was simulated again. */
+export type Reopened = { recording: RecordingDescription; biases: BiasState };
+/** Progress of a re-simulation with these biases, as the share done. */
+export type Resimulation = { share: number; biases: Record<string, number> };
+/** Progress or result of a run request. */
+export type RunMessage = { kind: "run"; serial: number; state: "loading" | "computing" | "drawing" | "partial" | "done" | "failed"; share: number; stages_ms: Record<string, number>; total_ms: number; error: string | null; picture: Picture | null; metrics: RunMetrics | null; costs_ms: Record<string, number> | null; pinned_metrics: RunMetrics | null; pinned_costs_ms: Record<string, number> | null; differences: [string, any, any][] };
+/** Metrics of a run over all its shots. */
+export type RunMetrics = { ticks: number; tracked_share: number; residual_px: number | null; jitter_px: number | null; logo_events: number; shots: ShotMetrics[]; no_shot_reason: string | null };
+/** Run a clip with `parameters`, beside those pinned as A; the request with the highest serial is the newest. */
+export type RunRequest = { serial: number; parameters: Record<string, Record<string, any>>; pinned?: Record<string, Record<string, any>> | null; start_us: number; end_us: number; playhead_us?: number | null; interactive?: boolean };
+/** A group of controls; `is_setup` where it belongs to the set-up and not to the method. */
+export type SectionInfo = { title: string; is_setup: boolean; controls: ControlInfo[] };
+/** Parameters, and the clip when it is not the first one of the recording. */
+export type SettingsRequest = { parameters: Record<string, Record<string, any>>; start_us?: number | null; end_us?: number | null };
+/** One shot with the estimate of every method. */
+export type ShotMetrics = { start_us: number; end_us: number; logo_events: number; speed_m_s: number | null; best: string | null; kind: string | null; sentence: string; spin: Record<string, EstimateMetrics> };
+/** Shots of a long recording found so far, [start, end) in us, and the share of it that was searched. */
+export type ShotsMessage = { kind: "shots"; share: number; shots: [number, number][]; error: string | null };
+/** Progress of a parameter sweep. */
+export type SweepMessage = { kind: "sweep"; state: "running" | "done" | "cancelled" | "failed"; error: string | null; content: ParameterSweep | null };
+/** Metrics of a run with one value; only `error` where the value does not go with the others. */
+export type SweepPoint = { value: boolean | number | string; error: string | null; tracked_share: number | null; residual_px: number | null; jitter_px: number | null; logo_events: number | null; best: string | null; spin: Record<string, EstimateMetrics> };
+/** Sweep one parameter; without low and high over its whole range. */
+export type SweepRequest = { parameters: Record<string, Record<string, any>>; start_us?: number | null; end_us?: number | null; name: string; low?: number | null; high?: number | null; points?: number };
+/** What one sweep varies: one bias, or several together. */
+export type SweptBias = { name: string; label: string; biases: string[] };
+/** A preset (TOML) or a .bias file to read. */
+export type TextRequest = { text: string };
+/** Settings as a preset and as a command line; `needs` names a file that the command reads. */
+export type WrittenSettings = { toml: string; command: string; needs: string | null };
+/** Messages of the server by their kind. */
+export interface ServerMessages {
+  "run": RunMessage;
+  "shots": ShotsMessage;
+  "sweep": SweepMessage;
+  "optimization": OptimizationMessage;
+  "biases": BiasesMessage;
+  "bias_sweep": BiasSweepMessage;
+}
+/** POST requests of a session: what is sent and answered. */
+export interface SessionPosts {
+  "bias_sweep": { sent: BiasSweepRequest; answered: Done };
+  "biases": { sent: BiasRequest; answered: Done };
+  "cancel": { sent: CancelRequest; answered: Done };
+  "find_ball": { sent: SettingsRequest; answered: Record<string, number> };
+  "optimization": { sent: OptimizationRequest; answered: Done };
+  "presets/read": { sent: TextRequest; answered: PresetValues };
+  "presets/write": { sent: SettingsRequest; answered: WrittenSettings };
+  "run": { sent: RunRequest; answered: Done };
+  "sweep": { sent: SweepRequest; answered: Done };
+}
+/** GET requests of a session: what is sent and answered. */
+export interface SessionGets {
+  "recording": { sent: null; answered: Reopened };
+}
+/** POST requests: what is sent and answered. */
+export interface Posts {
+  "/api/biases/read": { sent: TextRequest; answered: BiasValues };
+  "/api/biases/write": { sent: BiasRequest; answered: BiasText };
+  "/api/sessions": { sent: OpenRequest; answered: Opening };
+}

@@ -1,0 +1,347 @@
+"""Client sessions: metrics, drawings made once, coalescing queues, jobs, runs."""
+
+from __future__ import annotations
+
+import asyncio
+import dataclasses
+import threading
+import time
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spinscope.app.tuning.bias_sweep import Resimulation
+from spinscope.app.tuning.clip_run import run_clip
+from spinscope.app.viewer.comparison import compared
+from spinscope.app.viewer.drawers import DRAWERS, Drawer
+from spinscope.app.viewer.drawing_cache import DrawingCache
+from spinscope.app.viewer.rrd import layout_bytes, rrd_bytes
+from spinscope.app.viewer.run import ViewedRun
+from spinscope.app.viewer.views import views
+from spinscope.app.web.client_session import ClientSession
+from spinscope.app.web.jobs import Job, error_text
+from spinscope.app.web.message_queue import MessageQueue, RequestQueue, Superseded
+from spinscope.app.web.open_recording import OpenRecording
+from spinscope.app.web.schemas import BiasesMessage, Picture, RunMessage, RunRequest, ServerMessage, ShotsMessage
+from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.metrics import RunMetrics, _jitter_px, coach_sentence
+from spinscope.pipeline.registry import quick_stages
+from spinscope.pipeline.results import Circle, SpinEstimate
+from spinscope.pipeline.session import Choices, Result
+from spinscope.pipeline.spin_terms import kind_of_spin
+
+from .conftest import Client
+
+
+@pytest.fixture(scope="module")
+def recording(samples: Path) -> OpenRecording:
+    return OpenRecording.open(samples / "flight_fast_top.h5", Choices())
+
+
+@pytest.fixture(scope="module")
+def finished(recording: OpenRecording) -> Result:
+    return run_clip(recording.first_clip(), recording.session.parameters, lambda: None)
+
+
+def test_the_jitter_of_a_smooth_track_is_the_noise_put_on_it() -> None:
+    random = np.random.default_rng(3)
+    sigma = 0.2
+    places = np.stack([np.linspace(0, 800, 400), np.linspace(0, 300, 400)], axis=1) + sigma * random.standard_normal(
+        (400, 2)
+    )
+    ticks: list[Any] = [
+        SimpleNamespace(track=SimpleNamespace(measured=Circle(x, y, 20.0, 1.0), shot=0)) for x, y in places
+    ]
+    assert _jitter_px(ticks) == pytest.approx(sigma, rel=0.1)
+    assert _jitter_px(ticks[:2]) is None
+
+
+def test_metrics_agree_with_the_ticks_and_the_truth(finished: Result) -> None:
+    found = RunMetrics.of(finished)
+    assert found.ticks == len(finished.ticks)
+    assert found.logo_events == sum(len(tick.logo.events) for tick in finished.ticks)
+    estimate, own = found.shots[0].spin["triplet"], finished.shots[0].estimates["triplet"]
+    assert estimate.magnitude_rps == own.magnitude_rps
+    # By the cosine rule from what else is told: |spin - truth| / |truth|.
+    truth = finished.session.truth
+    assert truth is not None and own.magnitude_rps is not None and estimate.error_deg is not None
+    size = float(np.linalg.norm(truth.spin_rps[len(truth.t_us) // 2]))
+    angle = np.radians(estimate.error_deg)
+    gap = np.sqrt(size**2 + own.magnitude_rps**2 - 2 * size * own.magnitude_rps * np.cos(angle))
+    assert estimate.error_share == pytest.approx(gap / size, rel=0.02)
+
+
+def test_what_did_not_change_is_not_drawn_again(recording: OpenRecording, finished: Result) -> None:
+    clip = recording.first_clip()
+    drawings = DrawingCache()
+    try:
+        first = drawings.chunks(ViewedRun.of(finished), clip.chain.keys(recording.session.parameters))
+        again = drawings.chunks(ViewedRun.of(finished), clip.chain.keys(recording.session.parameters))
+        assert all(a is b for a, b in zip(first, again, strict=True))
+        other = recording.session.parameters.with_assignments(["logo.pad_px=5"])
+        changed = drawings.chunks(ViewedRun.of(run_clip(clip, other, lambda: None)), clip.chain.keys(other))
+        same = {c.entity_path for c in changed if not c.is_static and any(c is f for f in first)}
+        assert {"/image/events", "/image/surface", "/plots/x/kalman"} <= same
+        assert "/image/ball/logo" not in same
+    finally:
+        drawings.close()
+
+
+def test_drawings_keep_to_their_budget(finished: Result, recording: OpenRecording) -> None:
+    drawings = DrawingCache(budget_bytes=1)
+    try:
+        keys = recording.first_clip().chain.keys(recording.session.parameters)
+        assert drawings.chunks(ViewedRun.of(finished), keys)
+        drawings.keep_budget()
+        assert len(drawings._made) == 1
+    finally:
+        drawings.close()
+
+
+def test_drawings_are_sorted_out_while_requests_never_cease(
+    recording: OpenRecording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("spinscope.app.web.runner.IDLE_S", 60.0)
+    monkeypatch.setattr("spinscope.app.web.runner.REQUESTS_MOST", 2)
+    drawings, sorted_out = DrawingCache(), list[int]()
+    monkeypatch.setattr(drawings, "keep_budget", lambda: sorted_out.append(1))
+    session = ClientSession(recording, drawings)
+    start_us, end_us = recording.first_clip_us()
+    try:
+        for serial in range(5):
+            values = {"logo": {"pad_px": 2 + serial / 10}}
+            before, until = session.runner.result, time.monotonic() + 30
+            session.requests.put(RunRequest(serial=serial, parameters=values, start_us=start_us, end_us=end_us))
+            while session.runner.result is before and time.monotonic() < until:
+                time.sleep(0.01)
+            assert session.runner.result is not before
+    finally:
+        session.close()
+        session.join(10)
+        drawings.close()
+    assert len(sorted_out) == 2
+    assert not session.runner._thread.is_alive()
+
+
+def test_the_layout_has_a_tab_for_every_view(finished: Result) -> None:
+    labels = [view.label for view in views(compare=True)]
+    assert labels == ["All stages", "Tracker", "Logo and flow", "Spin", "Compare", "Coach"]
+    assert [view.label for view in views()] == [label for label in labels if label != "Compare"]
+    for tab in ("", "Coach", "nothing"):
+        assert layout_bytes(ViewedRun.of(finished), tab).startswith(b"RRF2")
+
+
+def test_a_recording_of_a_and_b_is_whole(finished: Result, recording: OpenRecording) -> None:
+    drawings = DrawingCache()
+    try:
+        chunks = drawings.chunks(
+            ViewedRun.of(finished), recording.first_clip().chain.keys(recording.session.parameters)
+        )
+    finally:
+        drawings.close()
+    both = rrd_bytes([*chunks, *compared(chunks)], "both")
+    assert len(both) > 1.5 * len(rrd_bytes(chunks, "one"))
+
+
+def progress(state: str = "computing", picture: str | None = None, share: float = 0.0) -> RunMessage:
+    made = None if picture is None else Picture(id=picture, size_bytes=1, start_us=0, end_us=1, opening_us=0)
+    return RunMessage(serial=1, state=state, share=share, stages_ms={}, total_ms=0.0, picture=made)
+
+
+def read(queue: MessageQueue, count: int) -> list[ServerMessage]:
+    """The first messages of a queue."""
+
+    async def reading() -> list[ServerMessage]:
+        found = []
+        async for message in queue.messages():
+            found.append(message)
+            if len(found) == count:
+                queue.close()
+        return found
+
+    return asyncio.run(reading())
+
+
+def test_an_old_message_of_a_kind_gives_way_to_a_newer_one() -> None:
+    queue = MessageQueue()
+    for share in range(100):
+        queue.put(progress(share=share))
+    queue.put(ShotsMessage(share=1.0, shots=[(3, 5)]))
+    assert read(queue, 2) == [progress(share=99), ShotsMessage(share=1.0, shots=[(3, 5)])]
+
+
+def test_progress_does_not_take_the_place_of_an_unread_picture() -> None:
+    queue = MessageQueue()
+    for message in (progress(), progress("partial", "1"), progress("drawing"), progress("loading")):
+        queue.put(message)
+    assert [message.state for message in read(queue, 2)] == ["partial", "loading"]
+
+
+def test_the_newest_request_supersedes_those_before_it() -> None:
+    requests = RequestQueue()
+    old, new = (RunRequest(serial=serial, parameters={}, start_us=0, end_us=1) for serial in (4, 7))
+    assert requests.get(0.0) is None
+    assert requests.put(old) and requests.put(new)
+    assert not requests.put(old) and not requests.put(new)
+    assert requests.get() is new
+    assert requests.get(0.0) is None
+    requests.check(new)
+    with pytest.raises(Superseded):
+        requests.check(old)
+    requests.close()
+    for ended in (requests.get, lambda: requests.check(new)):
+        with pytest.raises(Superseded):
+            ended()
+
+
+def test_a_job_tells_how_it_ended_and_stops_when_asked() -> None:
+    queue = MessageQueue()
+    content = Resimulation(1.0, {"diff_on": 3})
+
+    def fail(_: Job) -> Resimulation:
+        raise ParameterError("the bias is out of range")
+
+    Job(BiasesMessage, queue, lambda _: content)._thread.join(5)
+    assert queue._waiting["biases", False] == BiasesMessage(state="done", content=content)
+    Job(BiasesMessage, queue, fail)._thread.join(5)
+    assert queue._waiting["biases", False] == BiasesMessage(state="failed", error="the bias is out of range")
+    began = threading.Event()
+
+    def endless(job: Job) -> Resimulation:
+        while True:
+            began.set()
+            job.check()
+            time.sleep(0.001)
+
+    job = Job(BiasesMessage, queue, endless)
+    assert began.wait(5)
+    job.cancel(5)
+    assert queue._waiting["biases", False] == BiasesMessage(state="cancelled")
+
+
+@pytest.mark.parametrize(
+    ("module", "said"),
+    [
+        ("spinscope.pipeline.stages.logo", "logo failed: ValueError: two lines"),
+        ("spinscope.pipeline.spin.contrast.stage", "contrast failed: ValueError: two lines"),
+        ("elsewhere", "the server failed: ValueError: two lines"),
+    ],
+)
+def test_an_error_is_one_line_that_names_the_stage(module: str, said: str) -> None:
+    namespace: dict[str, Any] = {"__name__": module}
+    exec("def step():\n    raise ValueError('two\\nlines')", namespace)
+    with pytest.raises(ValueError, match="two") as raised:
+        namespace["step"]()
+    assert error_text(raised.value) == said
+    assert error_text(ParameterError("too high")) == "too high"
+
+
+@pytest.fixture
+def told(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
+    """All messages on runs; a page on a busy machine may read but the newest."""
+    messages: list[dict[str, Any]] = []
+    put = MessageQueue.put
+
+    def noted(queue: MessageQueue, message: ServerMessage) -> None:
+        if message.kind == "run":
+            messages.append(message.model_dump(mode="json"))
+        put(queue, message)
+
+    monkeypatch.setattr(MessageQueue, "put", noted)
+    return messages
+
+
+def test_what_is_seen_at_the_playhead_comes_first_when_the_rest_takes_long(
+    client: Client, monkeypatch: pytest.MonkeyPatch, told: list[dict[str, Any]]
+) -> None:
+    monkeypatch.setattr("spinscope.app.web.runner.REST_WORTH_WAITING_S", 0.0)
+    start_us, end_us = client.opening["recording"]["clip_us"]
+    middle_us = (start_us + end_us) / 2
+    done = client.run({"surface": {"k_px": 13}}, playhead_us=middle_us)
+    parts = [m for m in told if m["state"] == "partial"]
+    assert len(parts) == 1
+    assert middle_us <= parts[0]["picture"]["end_us"] < done["picture"]["end_us"]
+    assert client.http.get(client.path(f"pictures/{parts[0]['picture']['id']}")).status_code == 200
+
+
+def test_a_dragged_slider_gets_a_picture_without_the_slowest_stage_first(
+    client: Client, told: list[dict[str, Any]]
+) -> None:
+    done = client.run({"logo": {"pad_px": 3.3}}, interactive=True)
+    assert set(done["metrics"]["shots"][0]["spin"]) == {"triplet", "normal_flow", "contrast"}
+    (first,) = (m for m in told if m["state"] == "partial")
+    assert set(first["metrics"]["shots"][0]["spin"]) == {"triplet", "normal_flow"}
+    assert first["picture"]["end_us"] == done["picture"]["end_us"] and first["picture"]["id"] != done["picture"]["id"]
+    told.clear()
+    client.run({"logo": {"pad_px": 3.3}}, interactive=True)
+    assert not [m for m in told if m["state"] == "partial"]
+
+
+def test_what_is_drawn_early_is_drawn_once(recording: OpenRecording) -> None:
+    clip = recording.first_clip()
+    parameters = recording.session.parameters.with_assignments(["logo.pad_px=3.7"])
+    early = Result.of(dataclasses.replace(clip, parameters=parameters), clip.chain.run(parameters, quick_stages()))
+    whole = run_clip(clip, parameters, lambda: None)
+    assert early.ticks[0].get("contrast") is None and whole.ticks[0].get("contrast") is not None
+    drawings, keys = DrawingCache(), clip.chain.keys(parameters)
+    try:
+        drawings.begin(ViewedRun.of(early), keys)
+        without, with_late = (drawings.chunks(ViewedRun.of(one), keys) for one in (early, whole))
+    finally:
+        drawings.close()
+    with_late = [chunk for chunk in with_late if not chunk.is_static]
+    same = {chunk.entity_path for chunk in with_late if any(chunk is other for other in without)}
+    assert {"/image/events", "/image/surface", "/image/ball/logo"} <= same
+    assert not {path for path in same if "contrast" in path or path.startswith("/world")}
+
+
+def test_a_drawing_that_fails_is_tried_again(finished: Result, recording: OpenRecording) -> None:
+    attempts: list[int] = []
+
+    def flaky(_: Any) -> list[Any]:
+        attempts.append(1)
+        if len(attempts) == 1:
+            raise ValueError("no pixels")
+        return []
+
+    drawings, keys = DrawingCache(), recording.first_clip().chain.keys(recording.session.parameters)
+    try:
+        with DRAWERS.registered(Drawer(name="flaky", stage="filter", draw=flaky)):
+            with pytest.raises(ValueError, match="no pixels"):
+                drawings.chunks(ViewedRun.of(finished), keys)
+            assert drawings.chunks(ViewedRun.of(finished), keys)
+        assert len(attempts) == 2
+    finally:
+        drawings.close()
+
+
+def test_the_coach_is_told_in_one_sentence() -> None:
+    up, forward = (0.0, 0.0, -1.0), np.array([8.9, 0.0, 0.0])
+    spin = 54.0 * np.array([0.0, -np.cos(np.radians(12)), np.sin(np.radians(12))])
+    estimate = SpinEstimate("contrast", spin, 4.0 * np.eye(3), None)
+    said = coach_sentence(estimate, kind_of_spin(spin, forward, up), forward)
+    assert said == "Topspin 54 ±2 rps (3240 rpm), 32 km/h, axis tilted 12° from pure topspin"
+    in_place = coach_sentence(estimate, kind_of_spin(spin, None, up), None)
+    assert in_place == "Spin 54 ±2 rps (3240 rpm), axis up the image, tilted by 12°"
+    assert coach_sentence(None, None, forward) == "Spin not known, 32 km/h"
+
+
+def test_the_background_makes_way_while_somebody_waits(
+    recording: OpenRecording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("spinscope.app.web.open_recording.MAKE_WAY_S", 60.0)
+    done = threading.Event()
+
+    def background() -> None:
+        recording.make_way()
+        done.set()
+
+    with recording.at_work(), recording.at_work():
+        thread = threading.Thread(target=background)
+        thread.start()
+        assert not done.wait(0.05)
+    assert done.wait(10)
+    thread.join()

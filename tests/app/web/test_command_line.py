@@ -1,0 +1,128 @@
+"""Commands that serve the page: `tune`, `view`, and none."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import webbrowser
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from click.testing import CliRunner
+
+from spinscope.app.cli import cli
+from spinscope.app.web.server import listening_socket, show_in_browser
+from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.session import DEFAULT_SAMPLE, Choices
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[tuple[Any, ...], dict[str, Any]]]:
+    """What the command line asks the web application to serve, instead of serving it."""
+    found: list[tuple[tuple[Any, ...], dict[str, Any]]] = []
+    monkeypatch.setattr("spinscope.app.web.serve", lambda *given, **named: found.append((given, named)))
+    return found
+
+
+def test_without_a_command_the_default_sample_is_tuned(asked: list[Any]) -> None:
+    assert CliRunner().invoke(cli, []).exit_code == 0
+    assert asked == [((DEFAULT_SAMPLE, Choices(), None), {"open_browser": True})]
+    assert DEFAULT_SAMPLE.is_file()
+
+
+def test_the_options_of_tune_are_handed_on(asked: list[Any]) -> None:
+    arguments = ["tune", "shot.h5", "--port", "0", "--no-browser", "--set", "logo.pad_px=3", "--window", "5", "9"]
+    assert CliRunner().invoke(cli, arguments).exit_code == 0
+    choices = Choices(assignments=("logo.pad_px=3",), window_us=(5, 9))
+    assert asked == [((Path("shot.h5"), choices, 0), {"open_browser": False})]
+
+
+def test_view_serves_the_page_without_tools(asked: list[Any]) -> None:
+    assert CliRunner().invoke(cli, ["view", "shot.h5", "--layout", "spin", "--set", "logo.pad_px=3"]).exit_code == 0
+    assert asked == [((Path("shot.h5"), Choices(assignments=("logo.pad_px=3",))), {"tools": False, "layout": "spin"})]
+
+
+def started(*arguments: str) -> subprocess.Popen[str]:
+    no_window = {
+        key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
+    }
+    command = [sys.executable, "-m", "spinscope", *arguments]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=no_window)
+
+
+def test_the_address_is_one_line_and_ctrl_c_leaves_nothing_running(samples: Path) -> None:
+    process = started("tune", str(samples / "spinner_ball2_side.h5"), "--no-browser", "--port", "0")
+    assert process.stdout is not None
+    address = process.stdout.readline().strip()
+    answer = httpx.get(address, timeout=30)
+    assert answer.status_code == 200 and address.startswith("http://127.0.0.1:")
+    process.send_signal(signal.SIGINT)
+    rest, errors = process.communicate(timeout=60)
+    assert process.returncode == 0 and rest == "" and "Traceback" not in errors
+    port = address.rpartition(":")[2].strip("/")
+    assert f"ssh -L {port}:127.0.0.1:{port}" in errors
+    with pytest.raises(httpx.ConnectError):
+        httpx.get(address, timeout=5)
+
+
+def test_view_says_where_it_is_and_how_to_get_there_without_a_browser(samples: Path) -> None:
+    process = started("view", str(samples / "spinner_ball2_side.h5"), "--layout", "coach")
+    assert process.stderr is not None
+    line = next(line for line in process.stderr if "http://" in line)
+    found = re.fullmatch(
+        r"the viewer is at (http://127\.0\.0\.1:(\d+)/) \(no browser here: `ssh -L \2:127\.0\.0\.1:\2 THIS_MACHINE` .*"
+        r"`--save FILE\.rrd` .*\); Ctrl-C stops it\n",
+        line,
+    )
+    assert found, line
+    opening = httpx.post(f"{found[1]}api/sessions", json={}, timeout=30).json()
+    assert opening["tools"] is False and opening["tab"] == "Coach"
+    process.send_signal(signal.SIGINT)
+    written, errors = process.communicate(timeout=60)
+    assert process.returncode == 0 and written == "" and "Traceback" not in errors
+
+
+class GraphicalBrowser(webbrowser.BackgroundBrowser):
+    def open(self, url: str, new: int = 0, autoraise: bool = True) -> bool:
+        return True
+
+
+@pytest.mark.parametrize(
+    ("variable", "found", "expected"),
+    [
+        (None, GraphicalBrowser("browser"), False),
+        ("DISPLAY", GraphicalBrowser("browser"), True),
+        ("DISPLAY", webbrowser.GenericBrowser("lynx"), False),  # a text browser would take the terminal
+        ("DISPLAY", None, False),
+    ],
+)
+def test_only_a_graphical_browser_is_opened(
+    monkeypatch: pytest.MonkeyPatch, variable: str | None, found: Any, expected: bool
+) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    if variable:
+        monkeypatch.setenv(variable, ":0")
+
+    def get() -> Any:
+        if found is None:
+            raise webbrowser.Error("could not locate runnable browser")
+        return found
+
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.setattr("webbrowser.get", get)
+    monkeypatch.setattr("shutil.which", lambda _: None)
+    assert show_in_browser("http://127.0.0.1:1/") is expected
+
+
+def test_a_busy_port_gives_another_and_an_impossible_one_is_refused() -> None:
+    with listening_socket(0) as first, listening_socket(first.getsockname()[1]) as second:
+        assert {first.getsockname()[0], second.getsockname()[0]} == {"127.0.0.1"}
+        assert first.getsockname()[1] != second.getsockname()[1]
+    with pytest.raises(ParameterError, match="out of range"):
+        listening_socket(70_000)
