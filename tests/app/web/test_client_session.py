@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import dataclasses
 import threading
 import time
 from pathlib import Path
@@ -15,12 +14,7 @@ import pytest
 
 from spinscope.app.tuning.bias_sweep import Resimulation
 from spinscope.app.tuning.clip_run import run_clip
-from spinscope.app.viewer.comparison import compared
-from spinscope.app.viewer.drawers import DRAWERS, Drawer
 from spinscope.app.viewer.drawing_cache import DrawingCache
-from spinscope.app.viewer.rrd import layout_bytes, rrd_bytes
-from spinscope.app.viewer.run import ViewedRun
-from spinscope.app.viewer.views import views
 from spinscope.app.web.client_session import ClientSession
 from spinscope.app.web.jobs import Job, error_text
 from spinscope.app.web.message_queue import MessageQueue, RequestQueue, Superseded
@@ -28,7 +22,6 @@ from spinscope.app.web.open_recording import OpenRecording
 from spinscope.app.web.schemas import BiasesMessage, Picture, RunMessage, RunRequest, ServerMessage, ShotsMessage
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.metrics import RunMetrics, _jitter_px, coach_sentence
-from spinscope.pipeline.registry import quick_stages
 from spinscope.pipeline.results import Circle, SpinEstimate
 from spinscope.pipeline.session import Choices, Result
 from spinscope.pipeline.spin_terms import kind_of_spin
@@ -74,33 +67,6 @@ def test_metrics_agree_with_the_ticks_and_the_truth(finished: Result) -> None:
     assert estimate.error_share == pytest.approx(gap / size, rel=0.02)
 
 
-def test_what_did_not_change_is_not_drawn_again(recording: OpenRecording, finished: Result) -> None:
-    clip = recording.first_clip()
-    drawings = DrawingCache()
-    try:
-        first = drawings.chunks(ViewedRun.of(finished), clip.chain.keys(recording.session.parameters))
-        again = drawings.chunks(ViewedRun.of(finished), clip.chain.keys(recording.session.parameters))
-        assert all(a is b for a, b in zip(first, again, strict=True))
-        other = recording.session.parameters.with_assignments(["logo.pad_px=5"])
-        changed = drawings.chunks(ViewedRun.of(run_clip(clip, other, lambda: None)), clip.chain.keys(other))
-        same = {c.entity_path for c in changed if not c.is_static and any(c is f for f in first)}
-        assert {"/image/events", "/image/surface", "/plots/x/kalman"} <= same
-        assert "/image/ball/logo" not in same
-    finally:
-        drawings.close()
-
-
-def test_drawings_keep_to_their_budget(finished: Result, recording: OpenRecording) -> None:
-    drawings = DrawingCache(budget_bytes=1)
-    try:
-        keys = recording.first_clip().chain.keys(recording.session.parameters)
-        assert drawings.chunks(ViewedRun.of(finished), keys)
-        drawings.keep_budget()
-        assert len(drawings._made) == 1
-    finally:
-        drawings.close()
-
-
 def test_drawings_are_sorted_out_while_requests_never_cease(
     recording: OpenRecording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -124,26 +90,6 @@ def test_drawings_are_sorted_out_while_requests_never_cease(
         drawings.close()
     assert len(sorted_out) == 2
     assert not session.runner._thread.is_alive()
-
-
-def test_the_layout_has_a_tab_for_every_view(finished: Result) -> None:
-    labels = [view.label for view in views(compare=True)]
-    assert labels == ["All stages", "Tracker", "Logo and flow", "Spin", "Compare", "Coach"]
-    assert [view.label for view in views()] == [label for label in labels if label != "Compare"]
-    for tab in ("", "Coach", "nothing"):
-        assert layout_bytes(ViewedRun.of(finished), tab).startswith(b"RRF2")
-
-
-def test_a_recording_of_a_and_b_is_whole(finished: Result, recording: OpenRecording) -> None:
-    drawings = DrawingCache()
-    try:
-        chunks = drawings.chunks(
-            ViewedRun.of(finished), recording.first_clip().chain.keys(recording.session.parameters)
-        )
-    finally:
-        drawings.close()
-    both = rrd_bytes([*chunks, *compared(chunks)], "both")
-    assert len(both) > 1.5 * len(rrd_bytes(chunks, "one"))
 
 
 def progress(state: str = "computing", picture: str | None = None, share: float = 0.0) -> RunMessage:
@@ -278,44 +224,6 @@ def test_a_dragged_slider_gets_a_picture_without_the_slowest_stage_first(
     told.clear()
     client.run({"logo": {"pad_px": 3.3}}, interactive=True)
     assert not [m for m in told if m["state"] == "partial"]
-
-
-def test_what_is_drawn_early_is_drawn_once(recording: OpenRecording) -> None:
-    clip = recording.first_clip()
-    parameters = recording.session.parameters.with_assignments(["logo.pad_px=3.7"])
-    early = Result.of(dataclasses.replace(clip, parameters=parameters), clip.chain.run(parameters, quick_stages()))
-    whole = run_clip(clip, parameters, lambda: None)
-    assert early.ticks[0].get("contrast") is None and whole.ticks[0].get("contrast") is not None
-    drawings, keys = DrawingCache(), clip.chain.keys(parameters)
-    try:
-        drawings.begin(ViewedRun.of(early), keys)
-        without, with_late = (drawings.chunks(ViewedRun.of(one), keys) for one in (early, whole))
-    finally:
-        drawings.close()
-    with_late = [chunk for chunk in with_late if not chunk.is_static]
-    same = {chunk.entity_path for chunk in with_late if any(chunk is other for other in without)}
-    assert {"/image/events", "/image/surface", "/image/ball/logo"} <= same
-    assert not {path for path in same if "contrast" in path or path.startswith("/world")}
-
-
-def test_a_drawing_that_fails_is_tried_again(finished: Result, recording: OpenRecording) -> None:
-    attempts: list[int] = []
-
-    def flaky(_: Any) -> list[Any]:
-        attempts.append(1)
-        if len(attempts) == 1:
-            raise ValueError("no pixels")
-        return []
-
-    drawings, keys = DrawingCache(), recording.first_clip().chain.keys(recording.session.parameters)
-    try:
-        with DRAWERS.registered(Drawer(name="flaky", stage="filter", draw=flaky)):
-            with pytest.raises(ValueError, match="no pixels"):
-                drawings.chunks(ViewedRun.of(finished), keys)
-            assert drawings.chunks(ViewedRun.of(finished), keys)
-        assert len(attempts) == 2
-    finally:
-        drawings.close()
 
 
 def test_the_coach_is_told_in_one_sentence() -> None:
