@@ -50,7 +50,7 @@ export class Chart {
   }
 
   async draw(/** @type {ChartSpec} */ spec) {
-    const { title, series, categories, scale = "linear", refused = [], onpick } = spec;
+    const { title, series, scale = "linear", refused = [], onpick } = spec;
     const first = !this.node.classList.contains("drawn");
     this.node.classList.add("drawn");
     this.node.classList.toggle("pick", Boolean(onpick));
@@ -67,7 +67,6 @@ export class Chart {
     if (first) {
       this.node.on("plotly_click", (/** @type {any} */ { points: [point] }) => this.onpick?.(point.customdata));
     }
-    if (categories) this.node.dataset.categories = categories.join(" ");
   }
 }
 

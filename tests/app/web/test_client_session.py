@@ -1,4 +1,4 @@
-"""Client sessions: metrics, drawings made once, coalescing queues, jobs, runs."""
+"""Client sessions: coalescing queues, jobs, runs."""
 
 from __future__ import annotations
 
@@ -6,14 +6,11 @@ import asyncio
 import threading
 import time
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pytest
 
 from spinscope.app.tuning.bias_sweep import Resimulation
-from spinscope.app.tuning.clip_run import run_clip
 from spinscope.app.viewer.drawing_cache import DrawingCache
 from spinscope.app.web.client_session import ClientSession
 from spinscope.app.web.jobs import Job, error_text
@@ -21,10 +18,7 @@ from spinscope.app.web.message_queue import MessageQueue, RequestQueue, Supersed
 from spinscope.app.web.open_recording import OpenRecording
 from spinscope.app.web.schemas import BiasesMessage, Picture, RunMessage, RunRequest, ServerMessage, ShotsMessage
 from spinscope.pipeline.errors import ParameterError
-from spinscope.pipeline.metrics import RunMetrics, _jitter_px, coach_sentence
-from spinscope.pipeline.results import Circle, SpinEstimate
-from spinscope.pipeline.session import Choices, Result
-from spinscope.pipeline.spin_terms import kind_of_spin
+from spinscope.pipeline.session import Choices
 
 from .conftest import Client
 
@@ -32,39 +26,6 @@ from .conftest import Client
 @pytest.fixture(scope="module")
 def recording(samples: Path) -> OpenRecording:
     return OpenRecording.open(samples / "flight_fast_top.h5", Choices())
-
-
-@pytest.fixture(scope="module")
-def finished(recording: OpenRecording) -> Result:
-    return run_clip(recording.first_clip(), recording.session.parameters, lambda: None)
-
-
-def test_the_jitter_of_a_smooth_track_is_the_noise_put_on_it() -> None:
-    random = np.random.default_rng(3)
-    sigma = 0.2
-    places = np.stack([np.linspace(0, 800, 400), np.linspace(0, 300, 400)], axis=1) + sigma * random.standard_normal(
-        (400, 2)
-    )
-    ticks: list[Any] = [
-        SimpleNamespace(track=SimpleNamespace(measured=Circle(x, y, 20.0, 1.0), shot=0)) for x, y in places
-    ]
-    assert _jitter_px(ticks) == pytest.approx(sigma, rel=0.1)
-    assert _jitter_px(ticks[:2]) is None
-
-
-def test_metrics_agree_with_the_ticks_and_the_truth(finished: Result) -> None:
-    found = RunMetrics.of(finished)
-    assert found.ticks == len(finished.ticks)
-    assert found.logo_events == sum(len(tick.logo.events) for tick in finished.ticks)
-    estimate, own = found.shots[0].spin["triplet"], finished.shots[0].estimates["triplet"]
-    assert estimate.magnitude_rps == own.magnitude_rps
-    # By the cosine rule from what else is told: |spin - truth| / |truth|.
-    truth = finished.session.truth
-    assert truth is not None and own.magnitude_rps is not None and estimate.error_deg is not None
-    size = float(np.linalg.norm(truth.spin_rps[len(truth.t_us) // 2]))
-    angle = np.radians(estimate.error_deg)
-    gap = np.sqrt(size**2 + own.magnitude_rps**2 - 2 * size * own.magnitude_rps * np.cos(angle))
-    assert estimate.error_share == pytest.approx(gap / size, rel=0.02)
 
 
 def test_drawings_are_sorted_out_while_requests_never_cease(
@@ -224,17 +185,6 @@ def test_a_dragged_slider_gets_a_picture_without_the_slowest_stage_first(
     told.clear()
     client.run({"logo": {"pad_px": 3.3}}, interactive=True)
     assert not [m for m in told if m["state"] == "partial"]
-
-
-def test_the_coach_is_told_in_one_sentence() -> None:
-    up, forward = (0.0, 0.0, -1.0), np.array([8.9, 0.0, 0.0])
-    spin = 54.0 * np.array([0.0, -np.cos(np.radians(12)), np.sin(np.radians(12))])
-    estimate = SpinEstimate("contrast", spin, 4.0 * np.eye(3), None)
-    said = coach_sentence(estimate, kind_of_spin(spin, forward, up), forward)
-    assert said == "Topspin 54 ±2 rps (3240 rpm), 32 km/h, axis tilted 12° from pure topspin"
-    in_place = coach_sentence(estimate, kind_of_spin(spin, None, up), None)
-    assert in_place == "Spin 54 ±2 rps (3240 rpm), axis up the image, tilted by 12°"
-    assert coach_sentence(None, None, forward) == "Spin not known, 32 km/h"
 
 
 def test_the_background_makes_way_while_somebody_waits(
