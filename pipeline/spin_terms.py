@@ -49,14 +49,14 @@ class Kind:
 
     @property
     def sentence(self) -> str:
-        """The kind with what else is in it, like `topspin with right sidespin (24° off pure topspin)`."""
+        """The kind with what else is in it, like `topspin with right sidespin (axis tilted 24° from pure topspin)`."""
         if not self.parts_rps or self.name == "no spin":
-            return self.name if self.name == "no spin" else f"{self.name}, {self.off_deg:.0f}° off"
+            return self.name if self.name == "no spin" else f"{self.name}, tilted by {self.off_deg:.0f}°"
         whole = np.linalg.norm(list(self.parts_rps.values()))
         ranked = sorted(self.parts_rps.items(), key=lambda part: -abs(part[1]))[1:]
         also = [_signed_name(name, value) for name, value in ranked if abs(value) >= WORTH_A_WORD * whole]
         mixture = f" with {' and '.join(also)}" if also else ""
-        return f"{self.name}{mixture} ({self.off_deg:.0f}° off pure {self.name})"
+        return f"{self.name}{mixture} (axis tilted {self.off_deg:.0f}° from pure {self.name})"
 
 
 def kind_of_spin(spin_rps: Vector, velocity_m_s: Vector | None, up: Sequence[float]) -> Kind:

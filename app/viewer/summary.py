@@ -138,10 +138,11 @@ class _TickState:
         estimate, kind, _ = self.answer
         magnitude, std = estimate.magnitude_rps or 0.0, estimate.magnitude_std_rps
         margin = "" if std is None else f" ± {rpm(std):.0f}"
+        more = kind.sentence.removeprefix(kind.name).strip(" ,")
         return (
             (f"{magnitude:.0f} rps", f"{rpm(magnitude):.0f}{margin} rpm"),
             speed_lines,
-            (kind.name.capitalize(), kind.sentence.removeprefix(kind.name).strip(" ,")),
+            (kind.name.capitalize(), more.strip("()") if more.startswith("(") else more),
         )
 
 

@@ -61,7 +61,7 @@ def test_a_mixture_is_named_by_its_largest_part_and_says_the_rest():
     assert kind.name == "topspin"
     assert kind.off_deg == pytest.approx(np.degrees(np.arctan2(30, 40)))
     assert kind.parts_rps == pytest.approx({"topspin": 40, "left sidespin": -30, "corkscrew": 0})
-    assert kind.sentence == "topspin with right sidespin (37° off pure topspin)"
+    assert kind.sentence == "topspin with right sidespin (axis tilted 37° from pure topspin)"
 
 
 def test_another_up_direction_names_another_kind():
@@ -75,7 +75,7 @@ def test_a_ball_in_place_has_only_an_axis():
     kind = kind_of_spin(np.array([49.5, -2.3, 6.7]), None, LOOKING_DOWN)
     assert kind.name == "axis to the right in the image"
     assert kind.parts_rps == {}
-    assert kind.sentence == "axis to the right in the image, 8° off"
+    assert kind.sentence == "axis to the right in the image, tilted by 8°"
     assert kind_of_spin(np.array([0.0, 0.0, -3.0]), None, LOOKING_DOWN).name == "axis towards the camera"
 
 
