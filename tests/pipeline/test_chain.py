@@ -192,6 +192,22 @@ def test_forgotten_results_are_made_again_when_asked_for(calls: dict[str, int]) 
     assert calls["track"] == 20
 
 
+@pytest.mark.parametrize("forgotten", [*INPUTS, "all"])
+def test_every_result_is_there_again_after_a_run_that_forgot_it(calls: dict[str, int], forgotten: str) -> None:
+    """Of every stage, not of the last one alone; whatever comes in between."""
+    expected = list(Chain(source()).run(DEFAULT))
+    chain = Chain(source())
+    forget = tuple(INPUTS) if forgotten == "all" else (forgotten,)
+    assert len(list(chain.run(DEFAULT, forget=forget))) == 20
+    assert not any(chain.knows(DEFAULT, name) for name in forget)
+    calls.update(dict.fromkeys(calls, 0))
+    found = list(chain.run(DEFAULT))
+    for name in INPUTS:
+        assert [tick.get(name) for tick in found] == [tick.get(name) for tick in expected], name
+    assert calls == {name: 20 if name in forget else 0 for name in INPUTS}
+    assert all(chain.knows(DEFAULT, name) for name in INPUTS)
+
+
 def test_what_is_not_wanted_is_not_run_and_what_was_known_of_it_stays(calls: dict[str, int]) -> None:
     chain = Chain(source())
     whole = [tick.contrast for tick in Chain(source()).run(DEFAULT)]
