@@ -75,6 +75,17 @@ def flight(velocity_m_s: tuple[float, float, float]) -> Shot:
     return Shot(0, 100_000, t_us, state, 0 * state, t_us >= 0, 0, {"triplet": estimate}, "triplet")
 
 
+def test_a_shot_keeps_each_ticks_state_and_its_standard_deviations() -> None:
+    ticks = [tick(number, 4, x_px=100.0 + number) for number in range(3)]
+    for row in ticks:
+        row.balls[0].track.covariance = np.diag([0.01, 0.04, 100.0, 400.0, 0.25])
+    (shot,) = gathered(*ticks).shots
+    assert shot.state[:, 0].tolist() == [100.0, 101.0, 102.0]
+    assert shot.std == pytest.approx(np.tile([0.1, 0.2, 10.0, 20.0, 0.5], (3, 1)))
+    assert shot.measured.tolist() == [True, False, True]
+    assert shot.t_us.tolist() == [4900.0, 9900.0, 14_900.0]
+
+
 def test_velocity_is_the_flights() -> None:
     assert flight((1.0, 6.0, -0.5)).velocity_m_s(CAMERA, 0.02) == pytest.approx([1.0, 6.0, -0.5], abs=1e-6)
 

@@ -46,3 +46,44 @@ def test_methods_that_were_not_run_are_not_missed() -> None:
     assert trusted_method({"normal_flow": estimate("normal_flow", 1.0)}) == "normal_flow"
     assert trusted_method({"triplet": estimate("triplet", 0.1)}) is None
     assert trusted_method({}) is None
+
+
+def normal_flow(magnitude_rps: float, magnitude_std_rps: float, axis_std_deg: float) -> dict[str, SpinEstimate]:
+    """Normal flow's estimate alone, around an axis off the camera's, with these stated errors."""
+    axis = np.array([0.48, -0.64, 0.6])
+    along = np.outer(axis, axis)
+    each_rps2 = 0.5 * (np.radians(axis_std_deg) * magnitude_rps) ** 2
+    estimate = SpinEstimate(
+        "normal_flow", magnitude_rps * axis, magnitude_std_rps**2 * along + each_rps2 * (np.eye(3) - along), None
+    )
+    assert estimate.magnitude_std_rps == pytest.approx(magnitude_std_rps)
+    assert estimate.axis_std_deg == pytest.approx(axis_std_deg)
+    return {"normal_flow": estimate}
+
+
+@pytest.mark.parametrize(
+    ("magnitude_rps", "magnitude_std_rps", "axis_std_deg", "trusted"),
+    [
+        (50.0, 1.0, 6.9, True),
+        (50.0, 1.0, 7.1, False),
+        (10.0, 2.9, 1.0, True),  # 3 rps, however slow the spin
+        (10.0, 3.1, 1.0, False),
+        (100.0, 9.9, 1.0, True),  # a tenth, where that is more: neither their sum nor the smaller one
+        (100.0, 10.1, 1.0, False),
+        (31.0, 3.05, 1.0, True),
+        (29.0, 3.05, 1.0, False),
+        (100.0, 9.9, 6.9, True),
+        (10.0, 0.1, 20.0, False),
+    ],
+)
+def test_normal_flow_is_trusted_up_to_its_limits_and_no_further(
+    magnitude_rps: float, magnitude_std_rps: float, axis_std_deg: float, trusted: bool
+) -> None:
+    estimates = normal_flow(magnitude_rps, magnitude_std_rps, axis_std_deg)
+    assert trusted_method(estimates) == ("normal_flow" if trusted else None)
+
+
+def test_a_refusal_against_another_method_leaves_normal_flow_trusted() -> None:
+    refused = SpinEstimate.refused("contrast", "it says otherwise", against="triplet")
+    assert trusted_method({**normal_flow(50.0, 1.0, 2.0), "contrast": refused}) == "normal_flow"
+    assert trusted_method({"normal_flow": SpinEstimate("normal_flow", np.zeros(3), np.eye(3), None)}) is None
