@@ -1,0 +1,235 @@
+"""Each threshold of the tracker on both sides of it, and what its stated errors are made of."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.results import Packet
+from spinscope.pipeline.stages import track
+from spinscope.pipeline.stages.track import TrackParameters, TrackState
+from spinscope.pipeline.stages.track_kalman import BallFilter
+from spinscope.pipeline.stages.track_outline import Sighting
+from spinscope.pipeline.stages.track_search import Rivals, agree
+from tests.track_runs import PAPER_CONTEXT
+
+RING = np.array([600.0, 350.0, 3000.0, -4000.0, 17.0])
+SPREAD = np.diag([0.01, 0.02, 100.0**2, 120.0**2, 0.03])
+
+
+def sighting(**changes: object) -> Sighting:
+    """An outline that is beyond doubt, 5000 px/s fast."""
+    clear = Sighting(RING, SPREAD, 0.15, 80, ahead=0.95, behind=0.9, contrast=0.95, ahead_on=0.97, visible=1.0,
+                     clutter=0.05)  # fmt: skip
+    return dataclasses.replace(clear, **changes)
+
+
+def speed_known_to(share: float) -> np.ndarray:
+    """Covariance with this standard deviation of the speed, as a share of 5000 px/s, on both axes together."""
+    return np.diag([0.01, 0.01, 0.5 * (share * 5000.0) ** 2, 0.5 * (share * 5000.0) ** 2, 0.01])
+
+
+@pytest.mark.parametrize(
+    ("enough", "too_little"),
+    [
+        ({"ahead": 0.81}, {"ahead": 0.79}),
+        ({"behind": 0.61}, {"behind": 0.59}),
+        ({"contrast": 0.81}, {"contrast": 0.79}),
+        ({"contrast": -0.81}, {"contrast": -0.79}),
+        ({"visible": 0.61}, {"visible": 0.59}),
+        ({"clutter": 0.29}, {"clutter": 0.31}),
+        ({"covariance": speed_known_to(0.099)}, {"covariance": speed_known_to(0.101)}),
+    ],
+)
+def test_one_outline_is_trusted_only_with_every_sign_of_a_ball(
+    enough: dict[str, object], too_little: dict[str, object]
+) -> None:
+    assert sighting().trusted
+    assert sighting(**enough).trusted and not sighting(**too_little).trusted
+
+
+@pytest.mark.parametrize(
+    ("enough", "too_little"),
+    [
+        ({"ahead": 0.71}, {"ahead": 0.69}),
+        ({"ahead_on": 0.86}, {"ahead_on": 0.84}),
+        ({"ahead_on": 0.14}, {"ahead_on": 0.16}),
+        ({"clutter": 0.49}, {"clutter": 0.51}),
+    ],
+)
+def test_a_half_outline_is_promising_if_clear(enough: dict[str, object], too_little: dict[str, object]) -> None:
+    assert sighting(behind=0.0, **enough).promising and not sighting(behind=0.0, **too_little).promising
+
+
+@pytest.mark.parametrize(
+    ("near", "far"),
+    [
+        ([2.0 + 2.45, 0, 0, 0, 0], [2.0 + 2.55, 0, 0, 0, 0]),  # 2 px and a tenth of the way of 5 ms
+        ([0, -4.45, 0, 0, 0], [0, -4.55, 0, 0, 0]),
+        ([0, 0, 0, 0, 2.65], [0, 0, 0, 0, 2.75]),  # a pixel and a tenth of the radius
+        ([0, 0, 0, 0, -2.65], [0, 0, 0, 0, -2.75]),
+        ([0, 0, 1490, 0, 0], [0, 0, 1510, 0, 0]),  # three tenths of the speed
+    ],
+)
+def test_two_sightings_are_of_one_ball_if_it_moved_as_it_said(near: list[float], far: list[float]) -> None:
+    moved = RING + [15.0, -20.0, 0, 0, 0]
+    assert agree(sighting(), sighting(ring=moved + near), 5000)
+    assert not agree(sighting(), sighting(ring=moved + far), 5000)
+
+
+def test_other_balls_are_looked_for_every_10_ms() -> None:
+    rivals = Rivals(looked_us=50_000)
+    assert not rivals.due(59_999) and rivals.due(60_000)
+
+
+@pytest.mark.parametrize(
+    ("speed_m_s", "x_px", "trusted", "wait_us"),
+    [
+        (3.4, 640.0, True, 20_000),
+        (3.6, 640.0, True, 0),
+        (3.6, 640.0, False, 3000),
+        (2.0, 86.0, True, 20_000),  # five radii of 17 px from the border
+        (2.0, 84.0, True, 0),
+        (2.0, 1279.0 - 86.0, True, 20_000),
+        (2.0, 1279.0 - 84.0, False, 3000),
+    ],
+)
+def test_what_turns_up_slowly_in_the_middle_is_watched(
+    speed_m_s: float, x_px: float, trusted: bool, wait_us: int
+) -> None:
+    parameters = TrackParameters()
+    state = track.start(parameters, PAPER_CONTEXT)
+    speed_px_s = speed_m_s * 17.0 / 0.02
+    ring = np.array([x_px, 300.0, 0.6 * speed_px_s, 0.8 * speed_px_s, 17.0])
+    ahead = 0.95 if trusted else 0.75
+    seen = sighting(ring=ring, covariance=np.zeros((5, 5)), ahead=ahead)
+    assert seen.trusted == trusted
+    assert track._wait_us(parameters, state, seen) == wait_us
+
+
+def ball_filter() -> BallFilter:
+    return BallFilter(RING, SPREAD, 2e4, 100.0)
+
+
+def test_the_filter_takes_in_what_is_within_its_gate() -> None:
+    """Squared Mahalanobis distance of three independent offsets, each by its own variance."""
+    noise = np.diag([0.03, 0.07, 0.06])
+    sigmas = np.sqrt([0.01 + 0.03, 0.02 + 0.07, 0.03 + 0.06])
+    for distance, taken in ((4.9, True), (5.1, False)):
+        for towards in (np.array([1.0, 0, 0]), np.array([0, 0.6, -0.8]), np.array([2.0, -1.0, 2.0]) / 3):
+            ball = ball_filter()
+            observed = RING[[0, 1, 4]] + distance * sigmas * towards
+            assert ball.update(observed, noise, track.MOST_SURPRISE) == taken
+            assert np.array_equal(ball.mean, RING) != taken
+            assert np.array_equal(ball.covariance, SPREAD) != taken
+
+
+def test_the_filters_update_is_the_bayesian_one() -> None:
+    ball, noise = ball_filter(), np.diag([0.03, 0.07, 0.06])
+    observed = RING[[0, 1, 4]] + [0.1, -0.2, 0.05]
+    assert ball.update(observed, noise, 25.0)
+    pick = np.eye(5)[[0, 1, 4]]
+    information = np.linalg.inv(SPREAD) + pick.T @ np.linalg.inv(noise) @ pick
+    expected = np.linalg.solve(information, np.linalg.solve(SPREAD, RING) + pick.T @ np.linalg.solve(noise, observed))
+    np.testing.assert_allclose(ball.mean, expected, rtol=1e-9)
+    np.testing.assert_allclose(ball.covariance, np.linalg.inv(information), rtol=1e-6, atol=1e-12)
+
+
+def test_a_prediction_moves_the_ball_and_spreads_by_its_acceleration() -> None:
+    ball = ball_filter()
+    for _ in range(2):  # the second step with the same matrices, the third with others
+        ball.predict(0.005)
+    ball.predict(0.002)
+    np.testing.assert_allclose(ball.mean, RING + [36.0, -48.0, 0, 0, 0])
+    covariance = SPREAD
+    for dt in (0.005, 0.005, 0.002):
+        move, push = np.eye(5), np.zeros((5, 3))
+        move[0, 2] = move[1, 3] = dt
+        push[[0, 1], [0, 1]], push[[2, 3], [0, 1]], push[4, 2] = 2e4 * dt * dt / 2, 2e4 * dt, 100.0 * dt
+        covariance = move @ covariance @ move.T + push @ push.T
+    np.testing.assert_allclose(ball.covariance, covariance, rtol=1e-9)
+
+
+def updated(
+    monkeypatch: pytest.MonkeyPatch, seen: Sighting | None, tick_us: int = 5000
+) -> tuple[bool, TrackState, list[np.ndarray]]:
+    """(whether it was measured, the state, noise given to the filter) of one update with this sighting."""
+    parameters = TrackParameters()
+    state = track.start(parameters, PAPER_CONTEXT)
+    given: list[np.ndarray] = []
+
+    def update(observed: np.ndarray, noise: np.ndarray, most_surprise: float) -> bool:
+        given.append(noise)
+        return True
+
+    monkeypatch.setattr(track, "measure", lambda *arguments: seen)
+    packet = Packet(3, 3 * tick_us, 4 * tick_us, EventBatch.empty())
+    ball = SimpleNamespace(update=update)
+    measured = track._update(parameters, state, ball, packet, RING, np.full(5, 0.1))
+    return measured is not None, state, given
+
+
+def test_an_outline_must_show_some_of_its_half_ahead(monkeypatch: pytest.MonkeyPatch) -> None:
+    measured, state, _ = updated(monkeypatch, sighting(ahead=0.31))
+    assert measured and state.seen_us == 20_000
+    for seen in (sighting(ahead=0.29), None):
+        measured, state, given = updated(monkeypatch, seen)
+        assert not measured and state.seen_us == 0 and not given
+
+
+@pytest.mark.parametrize(("tick_us", "shared"), [(1000, 3.0), (2000, 1.5), (3000, 1.0), (5000, 1.0)])
+def test_events_shared_by_two_ticks_count_less(monkeypatch: pytest.MonkeyPatch, tick_us: int, shared: float) -> None:
+    """An outline reaches 3 ms back: at 1 kHz each event is in three of them."""
+    _, _, (noise,) = updated(monkeypatch, sighting(), tick_us)
+    np.testing.assert_allclose(noise, shared * (np.diag([0.01, 0.02, 0.03]) + 0.05**2 * np.eye(3)))
+
+
+def test_the_stated_error_holds_what_no_filtering_takes_away() -> None:
+    """12 us of latency along the flight, 0.06 px of place and 0.3 px of radius, beside the filter's own."""
+    late_px = np.array([3000.0, -4000.0]) * 12e-6
+    expected = SPREAD + np.diag([0.06**2, 0.06**2, 0.0, 0.0, 0.3**2])
+    expected[:2, :2] += np.outer(late_px, late_px)
+    ball = ball_filter()
+    np.testing.assert_allclose(track._total_covariance(ball), expected, rtol=1e-12)
+    np.testing.assert_array_equal(ball.covariance, SPREAD)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_ball_has_left_when_less_than_a_tenth_of_its_width_is_in_view(axis: int) -> None:
+    """Its centre 0.8 radii beyond the middle of the last pixel, on every side."""
+    for place, last in ((-0.8 * 17.0, -1), ((1279, 719)[axis] + 0.8 * 17.0, 1)):
+        for inwards, beyond in ((0.05, False), (-0.05, True)):
+            mean = RING.copy()
+            mean[axis] = place - last * inwards
+            assert track._beyond(mean, 1280, 720) == beyond
+
+
+def test_the_ball_is_smaller_than_its_outline_and_ahead_of_it() -> None:
+    """By 0.5 px, and by 0.1 px along the flight whatever the speed; there and back is nothing."""
+    edge = track._edge(TrackParameters())
+    shift = 0.1 * np.array([0.6, -0.8])
+    np.testing.assert_allclose(edge.ball(RING), RING + [*shift, 0, 0, -0.5])
+    np.testing.assert_allclose(edge.ball(edge.outline(RING)), RING)
+    still = RING * [1, 1, 0, 0, 1]
+    np.testing.assert_allclose(edge.outline(still), still + [0, 0, 0, 0, 0.5])
+
+
+def test_a_new_track_begins_with_the_sightings_spread_and_room_for_acceleration() -> None:
+    parameters = TrackParameters(outline_px=0.0, lag_px=0.0)
+    state = track.start(parameters, PAPER_CONTEXT)
+    state.shots, state.pending = 4, (0, sighting())
+    result = track._begin(parameters, state, Packet(1, 5000, 10_000, EventBatch.empty()), sighting(), None, 4)
+    assert state.ball is not None and state.pending is None
+    speed_std_px_s = 0.2 * 17.0 / 0.02
+    expected = SPREAD + np.diag([0.05**2, 0.05**2, speed_std_px_s**2, speed_std_px_s**2, 0.05**2])
+    np.testing.assert_allclose(state.ball.covariance, expected)
+    assert (result.shot, state.shots, state.seen_us, result.status) == (4, 5, 10_000, "tracking")
+    assert result.t_us == 10_000 - 40.0 and result.ball is not None and result.ball.latency_us == 40.0
+    state.ball.predict(1.0)
+    radius_std_px = math.sqrt(0.03 + 0.05**2 + (3.0 * 17.0 / 0.02 * 17.0 / 1646.09) ** 2)
+    assert math.sqrt(state.ball.covariance[4, 4]) == pytest.approx(radius_std_px, rel=1e-4)
