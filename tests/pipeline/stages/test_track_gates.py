@@ -77,7 +77,7 @@ def test_a_half_outline_is_promising_if_clear(enough: dict[str, object], too_lit
     ],
 )
 def test_two_sightings_are_of_one_ball_if_it_moved_as_it_said(near: list[float], far: list[float]) -> None:
-    moved = RING + [15.0, -20.0, 0, 0, 0]
+    moved = np.add(RING, [15.0, -20.0, 0, 0, 0])
     assert agree(sighting(), sighting(ring=moved + near), 5000)
     assert not agree(sighting(), sighting(ring=moved + far), 5000)
 
@@ -145,7 +145,7 @@ def test_a_prediction_moves_the_ball_and_spreads_by_its_acceleration() -> None:
     for _ in range(2):  # the second step with the same matrices, the third with others
         ball.predict(0.005)
     ball.predict(0.002)
-    np.testing.assert_allclose(ball.mean, RING + [36.0, -48.0, 0, 0, 0])
+    np.testing.assert_allclose(ball.mean, np.add(RING, [36.0, -48.0, 0, 0, 0]))
     covariance = SPREAD
     for dt in (0.005, 0.005, 0.002):
         move, push = np.eye(5), np.zeros((5, 3))
@@ -213,10 +213,10 @@ def test_the_ball_is_smaller_than_its_outline_and_ahead_of_it() -> None:
     """By 0.5 px, and by 0.1 px along the flight whatever the speed; there and back is nothing."""
     edge = track._edge(TrackParameters())
     shift = 0.1 * np.array([0.6, -0.8])
-    np.testing.assert_allclose(edge.ball(RING), RING + [*shift, 0, 0, -0.5])
+    np.testing.assert_allclose(edge.ball(RING), np.add(RING, [*shift, 0, 0, -0.5]))
     np.testing.assert_allclose(edge.ball(edge.outline(RING)), RING)
     still = RING * [1, 1, 0, 0, 1]
-    np.testing.assert_allclose(edge.outline(still), still + [0, 0, 0, 0, 0.5])
+    np.testing.assert_allclose(edge.outline(still), np.add(still, [0, 0, 0, 0, 0.5]))
 
 
 def test_a_new_track_begins_with_the_sightings_spread_and_room_for_acceleration() -> None:
