@@ -12,13 +12,15 @@ from typing import Any
 import numpy as np
 
 from spinscope.pipeline.recordings import open_recording
+from spinscope.pipeline.results import SpinEstimate
 from spinscope.pipeline.session import SAMPLES, Choices, Session
+from spinscope.pipeline.shots import Shot
 
 FILE = Path(__file__).with_name("samples.json")
 
 
 def numbers(path: Path) -> dict[str, Any]:
-    """What one sample gives, from its events to its spins, in a form that JSON holds."""
+    """Numbers of one sample, from its events to its spins and their stated errors, as JSON holds them."""
     truth = open_recording(path).truth
     assert truth is not None
     fixed = bool(np.ptp(truth.x_px) == 0)
@@ -37,15 +39,31 @@ def numbers(path: Path) -> dict[str, Any]:
                 "us": [shot.start_us, shot.end_us],
                 "logo_events": shot.logo_events,
                 "mean_state": np.round(shot.state.mean(axis=0), 3).tolist(),
+                "mean_std": np.round(shot.std.mean(axis=0), 4).tolist(),
+                "measured": int(shot.measured.sum()),
+                "velocity_m_s": _velocity_m_s(session, shot),
                 "spin_rps": {
                     name: None if one.vector_rps is None else np.round(one.vector_rps, 3).tolist()
                     for name, one in shot.estimates.items()
                 },
+                "spin_std": {name: _stated_errors(one) for name, one in shot.estimates.items()},
                 "best": shot.best,
             }
             for shot in result.shots
         ],
     }
+
+
+def _velocity_m_s(session: Session, shot: Shot) -> list[float] | None:
+    velocity = shot.velocity_m_s(session.camera, session.ball_radius_m)
+    return None if velocity is None else np.round(velocity, 3).tolist()
+
+
+def _stated_errors(estimate: SpinEstimate) -> list[float] | None:
+    """1 sigma of magnitude (rps) and axis (degrees); None where the method refused."""
+    if estimate.magnitude_std_rps is None or estimate.axis_std_deg is None:
+        return None
+    return [round(estimate.magnitude_std_rps, 4), round(estimate.axis_std_deg, 3)]
 
 
 def samples() -> list[Path]:

@@ -29,6 +29,11 @@ def test_a_sample_gives_its_golden_numbers(path: Path) -> None:
         assert shot["best"] == expected["best"]
         assert shot["logo_events"] == pytest.approx(expected["logo_events"], rel=0.01, abs=2)
         assert shot["mean_state"] == pytest.approx(expected["mean_state"], rel=1e-4, abs=0.02)
+        assert shot["mean_std"] == pytest.approx(expected["mean_std"], rel=0.01, abs=1e-3)
+        assert shot["measured"] == expected["measured"]
+        assert shot["velocity_m_s"] == pytest.approx(expected["velocity_m_s"], rel=1e-3, abs=5e-3)
+        for method, stated in expected["spin_std"].items():
+            assert shot["spin_std"][method] == pytest.approx(stated, rel=0.05, abs=0.02), method
         for method, spin in expected["spin_rps"].items():
             if spin is None:
                 assert shot["spin_rps"][method] is None

@@ -17,6 +17,7 @@ from spinscope.pipeline.chain import Chain, EventsInMemory, Tick
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.registry import STAGES, Parameters
 from spinscope.pipeline.stage import Stage
+from spinscope.pipeline.stages.track import TrackResult
 
 FIXED = Parameters().with_values(
     {"track": {"ball": "fixed", "fixed_x_px": 528.43, "fixed_y_px": 426.87, "fixed_radius_px": 16.49}}
@@ -161,3 +162,30 @@ def test_results_hold_no_state(ticks: list[Tick]) -> None:
                 for b in later:
                     if np.shares_memory(a, b):
                         assert not a.flags.writeable, name
+
+
+def test_a_shot_knows_nothing_of_the_one_before_it(
+    case: tuple[EventsInMemory, Parameters], ticks: list[Tick], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two shots without a gap: the second one's results are those of a recording in which there was no first."""
+    source, parameters = case
+    flown = [tick.packet.index for tick in ticks if tick.track.has_ball]
+    cut, tracker = flown[len(flown) // 3], STAGES["track"]
+
+    def chain_of(first_is_flown: bool) -> list[Tick]:
+        def step(group: Any, state: Any, packet: Any, *inputs: Any) -> TrackResult:
+            result = tracker.step(group, state, packet, *inputs)
+            if packet.index < cut and not first_is_flown:
+                return TrackResult("searching", "no ball", result.t_us, (), None)
+            number = int(packet.index >= cut)
+            return dataclasses.replace(result, balls=tuple(dataclasses.replace(b, shot=number) for b in result.balls))
+
+        monkeypatch.setitem(STAGES._entries, "track", dataclasses.replace(tracker, step=step))
+        return list(Chain(source).run(parameters))
+
+    after, fresh = chain_of(True), chain_of(False)
+    assert any(tick.balls for tick in after if tick.packet.index < cut)
+    judged = [(one, other) for one, other in zip(after, fresh, strict=True) if one.packet.index >= cut and one.balls]
+    assert len(judged) > 2
+    for one, other in judged:
+        assert_same(one.balls[0].results, other.balls[0].results)
