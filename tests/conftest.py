@@ -1,19 +1,76 @@
-"""What all tests share: the sample recordings and their truth."""
+"""Fixtures, options and workers of all tests.
+
+A run of everything has two workers. Numba keeps machine code beside the sources, so what one of them compiles the other
+one loads; a lock for each function has the second one wait for the first instead of compiling the same.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.dispatcher import Dispatcher
+
+try:
+    import fcntl
+except ImportError:  # Windows: the workers then compile some functions twice
+    fcntl = None  # type: ignore[assignment]
 
 settings.register_profile("spinscope", deadline=None)  # kernels compile inside the first example
 settings.load_profile("spinscope")
 
 SAMPLES = Path(__file__).parents[1] / "sample_recordings"
+WORKERS = 2
 
 
 @pytest.fixture(scope="session")
 def samples() -> Path:
     """The folder of the recordings that ship with the repository."""
     return SAMPLES
+
+
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """Two workers for a run of everything; none where files are named, so that a single test starts at once."""
+    if config.args_source == pytest.Config.ArgsSource.TESTPATHS and "slow" not in config.option.markexpr.split()[:1]:
+        return WORKERS
+    config.option.dist = "no"
+    return 0
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Let this worker wait for what the other one is compiling."""
+    if hasattr(config, "workerinput") and fcntl is not None:
+        _compile_once(Path(tempfile.gettempdir()) / f"spinscope-{config.workerinput['testrunuid']}")
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    """Say how to run what was left out."""
+    if any("slow" in item.keywords for item in terminalreporter.stats.get("deselected", ())):
+        terminalreporter.write_line("tests marked slow were left out: uv run pytest -m slow")
+
+
+def _compile_once(folder: Path) -> None:
+    folder.mkdir(exist_ok=True)
+    compile_here = Dispatcher.compile
+
+    @contextmanager
+    def locked(dispatcher: Dispatcher) -> Iterator[None]:
+        code = dispatcher.py_func.__code__
+        name = hashlib.sha1(f"{code.co_filename}:{code.co_firstlineno}".encode()).hexdigest()
+        with (folder / name).open("w") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            yield
+
+    def compile_locked(dispatcher: Dispatcher, signature: Any) -> Any:
+        # numba's own lock first: a thread that waits for it must not hold what the thread inside it needs.
+        with global_compiler_lock, locked(dispatcher):
+            return compile_here(dispatcher, signature)
+
+    Dispatcher.compile = compile_locked

@@ -1,0 +1,158 @@
+"""Planting of bugs, one at a time, in a copy of the tree, to see whether the tests that ought to notice do.
+
+`uv run pytest -m slow tests/mutants` does it for all of them; `uv run python -m tests.mutants.mutation WORD` for those
+whose file, text or tests hold the word.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Literal
+
+ROOT = Path(__file__).parents[2]
+LEFT_OUT = (".git", ".venv", ".hypothesis", ".benchmarks", ".pytest_cache", ".mypy_cache", ".ruff_cache")
+LONGEST_S = 240.0  # a test that takes longer hangs, which is noticed, too
+
+Verdict = Literal["caught", "survived", "invalid"]
+
+
+@dataclass(frozen=True, slots=True)
+class Mutant:
+    """One realistic bug.
+
+    Attributes
+    ----------
+    file : str
+        File of the tree, relative to its root.
+    old, new : str
+        Text that stands there exactly once, and what takes its place.
+    tests : str
+        Arguments of pytest, separated by blanks: what ought to notice.
+    """
+
+    file: str
+    old: str
+    new: str
+    tests: str
+
+    def __str__(self) -> str:
+        return f"{self.file}: {' '.join(self.old.split())}  ->  {' '.join(self.new.split()) or '(nothing)'}"
+
+    @property
+    def times_found(self) -> int:
+        """How often the old text stands in the file; 0 where there is no such file."""
+        path = ROOT / self.file
+        return path.read_text(encoding="utf-8").count(self.old) if path.exists() else 0
+
+
+class Copy:
+    """A copy of the tree in a folder of its own, with what numba has compiled already.
+
+    Numba keeps machine code beside the sources and looks at the time stamp of its own source file only. So what was
+    compiled of a changed module goes, and of all that import it, for callers hold the code of what they call.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.root = folder
+        shutil.copytree(ROOT, folder, symlinks=True, ignore=shutil.ignore_patterns(*LEFT_OUT))
+        self.environment = {
+            **{name: value for name, value in os.environ.items() if not name.startswith(("PYTEST_", "COV_"))},
+            "PYTHONPATH": str(folder / ".package"),
+            "PYTHONDONTWRITEBYTECODE": "1",  # stamps of a second are too coarse for changes that follow each other
+        }
+
+    def run(self, tests: str) -> subprocess.CompletedProcess[str]:
+        """Run some tests up to the first failure, in this process's place and without what other runs have left."""
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", *tests.split()]
+        return subprocess.run(
+            command, cwd=self.root, env=self.environment, capture_output=True, text=True, check=False, timeout=LONGEST_S
+        )
+
+    def verdict(self, mutant: Mutant) -> tuple[Verdict, str]:
+        """Whether the tests notice the bug, and the end of what they said."""
+        path = self.root / mutant.file
+        before = path.read_text(encoding="utf-8")
+        stale = list(self._compiled_with(path))
+        for file in stale:
+            file.unlink()
+        path.write_text(before.replace(mutant.old, mutant.new), encoding="utf-8")
+        try:
+            done = self.run(mutant.tests)
+        except subprocess.TimeoutExpired:
+            return "caught", f"no end within {LONGEST_S:g} s"
+        finally:
+            for file in self._compiled_with(path):
+                file.unlink()
+            shutil.copy2(ROOT / mutant.file, path)
+            for file in stale:
+                if (origin := ROOT / file.relative_to(self.root)).exists():
+                    shutil.copy2(origin, file)
+        verdicts: dict[int, Verdict] = {0: "survived", 1: "caught"}
+        return verdicts.get(done.returncode, "invalid"), done.stdout[-1500:] + done.stderr[-500:]
+
+    def _compiled_with(self, path: Path) -> Iterator[Path]:
+        """Files of machine code of a module and of all that import it, directly or through others."""
+        sources = {file: file.read_text(encoding="utf-8") for top in ("app", "pipeline") for file in self._modules(top)}
+        changed, names = {path}, {path.stem}
+        if "njit" not in sources.get(path, ""):
+            return
+        while names:
+            imports = re.compile(rf"^\s*(?:from|import)\b.*\b(?:{'|'.join(map(re.escape, names))})\b", re.MULTILINE)
+            found = {file for file, text in sources.items() if file not in changed and imports.search(text)}
+            found = {file for file in found if "njit" in sources[file]}
+            changed |= found
+            names = {file.stem for file in found}
+        for file in changed:
+            yield from (file.parent / "__pycache__").glob(f"{file.stem}.*.nb[ic]")
+
+    def _modules(self, top: str) -> Iterable[Path]:
+        return (self.root / top).rglob("*.py")
+
+
+def plant_all(mutants: Sequence[Mutant], workers: int) -> Iterator[tuple[Mutant, Verdict, str, float]]:
+    """Plant every mutant in one of several copies; yields each with its verdict, what was said, and seconds."""
+    with tempfile.TemporaryDirectory() as folder:
+        idle: SimpleQueue[Copy] = SimpleQueue()
+        for number in range(workers):
+            idle.put(Copy(Path(folder) / f"copy{number}"))
+
+        def judged(mutant: Mutant) -> tuple[Mutant, Verdict, str, float]:
+            copy, begin = idle.get(), time.perf_counter()
+            try:
+                return mutant, *copy.verdict(mutant), time.perf_counter() - begin
+            finally:
+                idle.put(copy)
+
+        with ThreadPoolExecutor(workers) as pool:
+            yield from pool.map(judged, mutants)
+
+
+def report(mutants: Sequence[Mutant], workers: int = 2) -> list[Mutant]:
+    """Print each mutant's verdict as it comes; the mutants that were not caught."""
+    others = []
+    for mutant, verdict, said, seconds in plant_all(mutants, workers):
+        print(f"{verdict:9s} {seconds:5.0f} s  {mutant}", flush=True)
+        if verdict != "caught":
+            others.append(mutant)
+        if verdict == "invalid":
+            print(said, flush=True)
+    print(f"{len(mutants) - len(others)} of {len(mutants)} caught")
+    return others
+
+
+if __name__ == "__main__":
+    from tests.mutants.bugs import MUTANTS
+
+    word = " ".join(sys.argv[1:])
+    report([mutant for mutant in MUTANTS if word in f"{mutant} {mutant.tests}"])
