@@ -39,6 +39,9 @@ def test_the_last_of_two_assignments_wins() -> None:
     ("assignment", "says"),
     [
         ("logo.pad_px=-1", "0 to 100 px"),
+        ("track.tick_us=199", "200 to 100000 us"),
+        ("track.tick_us=100001", "200 to 100000 us"),
+        ("camera.up=0,0,-1.5", "-1 to 1"),
         ("logo.pad_px=nan", "not a number"),
         ("logo.pad_px=inf", "not a number"),
         ("logo.pad_px=true", "not a number"),
@@ -86,3 +89,20 @@ def test_nan_is_refused_from_a_table_too() -> None:
         DEFAULT.with_values({"logo": {"pad_px": math.nan}})
     with pytest.raises(ParameterError, match="table"):
         DEFAULT.with_values({"logo": 3})
+
+
+def test_the_bounds_themselves_are_allowed() -> None:
+    for group, fields in DEFAULT.as_dict().items():
+        for name in fields:
+            declared = DEFAULT.group(group).tunables()[name]
+            if declared.kind in ("number", "whole number"):
+                for bound in (declared.low, declared.high):
+                    assert DEFAULT.with_values({group: {name: bound}}).value(f"{group}.{name}") == bound
+
+
+def test_former_names_are_read_with_a_notice() -> None:
+    notices: list[str] = []
+    changed = DEFAULT.with_values({"contrast": {"weakest": 0.4}}, notices.append)
+    assert changed.contrast.min_gain == 0.4
+    assert notices == ["contrast.weakest is now called contrast.min_gain"]
+    assert DEFAULT.with_assignments(["contrast.weakest=0.5"]).contrast.min_gain == 0.5

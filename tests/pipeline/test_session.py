@@ -74,3 +74,45 @@ def test_a_window_is_half_open_in_file_time(samples: Path) -> None:
 def test_an_empty_window_says_so(samples: Path) -> None:
     with pytest.raises(RecordingError, match="no events from 900000000 to 900000001"):
         Session.open(samples / "flight_back.h5", Choices(window_us=(900_000_000, 900_000_001)))
+
+
+def test_without_a_window_every_event_is_in_a_tick(samples: Path) -> None:
+    """From the first event's time to just after the last one's."""
+    session = Session.open(samples / "flight_back.h5")
+    t_us = session.source.events.t_us
+    assert (session.source.start_us, session.source.end_us) == (t_us[0], t_us[-1] + 1)
+    ticks = session.ticks(("filter",))
+    assert sum(len(tick.packet.events) for tick in ticks) == len(t_us)
+
+
+def test_windows_and_clips_of_one_recording_are_different_sources(samples: Path) -> None:
+    path = samples / "flight_back.h5"
+    windows = [None, (20_000, 30_000), (20_000, 40_000)]
+    sessions = [Session.open(path, Choices(window_us=window)) for window in windows]
+    clip = sessions[0].clip(20_000, 30_000)
+    identities = [session.source.identity for session in sessions]
+    assert len(set(identities)) == 3
+    assert clip.source.identity == identities[1], "the same events"
+    assert clip.chain is not sessions[0].chain and clip.chain.source is clip.source
+    assert len(clip.source.events) == len(sessions[1].source.events)
+
+
+def test_the_report_names_what_was_read(samples: Path) -> None:
+    session = Session.open(
+        samples / "flight_back.h5", Choices(window_us=(20_000, 31_000), assignments=("logo.pad_px=3",))
+    )
+    report = session.estimate("triplet").to_dict()
+    assert report["recording"] == {
+        "path": str(samples / "flight_back.h5"), "events": len(session.source.events), "duration_us": 11_000,
+        "width": 1280, "height": 720,
+    }  # fmt: skip
+    assert report["parameters"]["logo"]["pad_px"] == 3.0
+    seconds = report["seconds"]
+    assert seconds["read"] == session.read_seconds > 0
+    assert seconds["track"] > 0 and seconds["spin"] > 0
+    assert seconds["total"] == pytest.approx(seconds["read"] + seconds["track"] + seconds["spin"])
+
+
+def test_a_method_that_does_not_exist_is_refused_by_name(samples: Path) -> None:
+    with pytest.raises(ParameterError, match="'magic'"):
+        Session.open(samples / "flight_back.h5", Choices(window_us=(20_000, 30_000))).estimate("magic")

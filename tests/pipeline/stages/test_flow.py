@@ -68,6 +68,7 @@ def test_slices_follow_each_other_from_the_shots_start_and_belong_to_the_tick_th
 def test_a_slice_is_a_tenth_of_a_rotation() -> None:
     assert {r.t_acc_us for r in flows(turning(), t_acc_from="expected", expected_spin_rps=80.0)} == {1250}
     assert {r.t_acc_us for r in flows(turning(), t_acc_from="fixed", t_acc_us=700)} == {700}
+    assert flows(turning())[0].speed_bound_px_s == pytest.approx(2 * np.pi * 150.0 * turning()[0][1].mean[4])
     results = after_track(turning(), flow_parameters=FlowParameters(expected_spin_rps=80.0))
     for _, rate, flow, _ in results:
         assert flow.t_acc_us == (1250 if rate.spin_rps is None else round(1e5 / rate.spin_rps))

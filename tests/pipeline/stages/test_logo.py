@@ -190,3 +190,17 @@ def _points_m(session: Session, track: BallTrack, turning: TurningEvents) -> np.
         turning.centre_x_px, turning.centre_y_px, np.full(len(turning), track.mean[4]), session.ball_radius_m
     )
     return centre + session.ball_radius_m * turning.normals
+
+
+def test_how_well_the_ball_is_known_is_handed_on() -> None:
+    """1 sigma of one axis, from both; of the radius; and of the velocity along one axis."""
+    covariance = np.diag([0.09, 0.16, 900.0, 1600.0, 0.25])
+    result = logo_of(
+        Packet(1, 5000, 10_000, EventBatch.empty()), dataclasses.replace(known_ball(10_000), covariance=covariance)
+    )
+    assert result.position_std_px == pytest.approx(np.sqrt(0.125))
+    assert result.radius_std_px == pytest.approx(0.5)
+    assert result.velocity_std_px_s == pytest.approx(np.sqrt(1250.0))
+    assert (result.radius_px, result.pad_px) == (pytest.approx(known_ball(10_000).mean[4]), 1.0)
+    flying = logo_of(Packet(1, 5000, 10_000, EventBatch.empty()), known_ball(10_000, **FLIGHT))
+    assert flying.pad_px == 2.5

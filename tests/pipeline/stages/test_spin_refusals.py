@@ -357,3 +357,48 @@ def test_normal_flow_forgets_events_and_planes_before_its_window() -> None:
     method._forget(5000)
     assert method.t_us[0] == 5000 and {len(column) for column in (method.on, method.normals, method.deep)} == {30}
     assert method.plane_t_us.min() == 5000 and {len(method.plane_rows), len(method.plane_speeds)} == {10}
+
+
+def covariance_of(found: Any, position_std_px: float = 0.2, radius_std_px: float = 0.2) -> np.ndarray:
+    """What normal flow states of a fit on a ball of 17 px whose place is known so well, (rad/s)^2."""
+    rng = np.random.default_rng(6)
+    method = NormalFlowSpin(SpinParameters(), CONTEXT)
+    method.t_us = np.arange(60) * 1000
+    method.tracks = np.array([[17.0, position_std_px, radius_std_px, 50.0]])
+    normals = rng.normal(size=(60, 3)) - [0, 0, 3]
+    method.normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    method.sights = np.tile([0.0, 0.0, -1.0], (60, 1))
+    covariance = method._covariance(found)
+    assert covariance is not None
+    return covariance
+
+
+def test_normal_flows_stated_error_has_all_its_parts() -> None:
+    """Of constraints without scatter: those of the constraints, of the ball's place, and of bent strokes."""
+    least = covariance_of(fit())
+    inverse = np.linalg.inv(fit().matrix)
+    np.testing.assert_allclose(covariance_of(fit(overlap=5.0)) - least, 3.0 * inverse, rtol=1e-9)
+    np.testing.assert_allclose(covariance_of(fit(scale=0.5)), least)
+    np.testing.assert_allclose(covariance_of(fit(scale=1.5)), 2.25 * least)
+    np.testing.assert_allclose(covariance_of(fit(), 0.1, 0.05), least, err_msg="no place is known better than 0.2 px")
+    place, size = covariance_of(fit(), 0.4) - least, covariance_of(fit(), 0.2, 0.4) - least
+    assert np.trace(place) > 0.1 and np.trace(size) > 0.1
+    np.testing.assert_allclose(covariance_of(fit(), 0.6) - least, place * (0.36 - 0.04) / (0.16 - 0.04), rtol=1e-9)
+    bent = least - 2.0 * inverse - 0.04 / (0.16 - 0.04) * (place + size)
+    assert np.linalg.eigvalsh(bent).min() > -1e-9 and np.trace(bent) > 0.01
+
+
+def test_residuals_that_hang_together_count_by_the_radian_of_turning() -> None:
+    """The same residuals state more when all of a radian's have one sign."""
+    rows = np.tile(np.eye(3), (20, 1))
+    found = fit(rows=rows, speeds=rows @ fit().spin, matrix=rows.T @ rows)
+    radian = np.floor(np.arange(60) * 1000 * np.linalg.norm(found.spin) * 1e-6).astype(int)
+    together, mixed = np.where(radian % 2 == 0, 1.0, -1.0), np.where(np.arange(60) // 3 % 2 == 0, 1.0, -1.0)
+    least = np.trace(covariance_of(found))
+    scattered = [
+        np.trace(covariance_of(dataclasses.replace(found, speeds=found.speeds + 100.0 * signs))) - least
+        for signs in (together, mixed)
+    ]
+    assert scattered[0] > 2.0 * scattered[1]
+    sums = np.array([100.0 / 20.0 * together[radian == one] @ rows[radian == one] for one in np.unique(radian)])
+    assert scattered[0] == pytest.approx((sums**2).sum() * len(sums) / (len(sums) - 1), rel=0.2)
