@@ -1,0 +1,366 @@
+"""Realistic bugs, one at a time, each with the tests that ought to notice it."""
+
+from __future__ import annotations
+
+from tests.mutants.mutation import Mutant
+
+CHAIN = [
+    Mutant(
+        "pipeline/chain.py",
+        "keys[stage.name] = (stage.name, parameters.group(stage.group), read, inputs)",
+        "keys[stage.name] = (stage.name, parameters.group(stage.group), inputs)",
+        "tests/pipeline/test_cache_keys.py",
+    ),
+    Mutant(
+        "pipeline/chain.py",
+        "parameters.track.tick_us, parameters.camera, parameters.ball)",
+        "parameters.track.tick_us, parameters.ball)",
+        "tests/pipeline/test_cache_keys.py",
+    ),
+    Mutant(
+        "pipeline/chain.py",
+        "min((number + 1) * tick_us, self.source.end_us)",
+        "(number + 1) * tick_us",
+        "tests/pipeline/test_chain.py",
+    ),
+    Mutant("pipeline/chain.py", "column.fault = error", "pass", "tests/pipeline/test_chain.py"),
+    Mutant(
+        "pipeline/chain.py",
+        "len(shot.results) >= wanted[number] for",
+        "len(shot.results) > 0 for",
+        "tests/pipeline/test_chain.py",
+    ),
+    Mutant(
+        "pipeline/chain.py",
+        "key=lambda k: self._columns[k].last_use",
+        "key=lambda k: -self._columns[k].last_use",
+        "tests/pipeline/test_chain.py",
+    ),
+    Mutant(
+        "pipeline/chain.py",
+        "results.update(flying[0].results)",
+        "results.update(flying[-1].results)",
+        "tests/pipeline/test_chain.py",
+    ),
+    Mutant(
+        "pipeline/chain.py",
+        "if not self.source.growing and self.source.end_us % tick_us:",
+        "if self.source.end_us % tick_us:",
+        "tests/pipeline/test_chain.py",
+    ),
+    Mutant(
+        "pipeline/chain.py",
+        "chain, key = self._chain, (self._keys[stage.name], shot)",
+        "chain, key = self._chain, (self._keys[stage.name], None)",
+        "tests/pipeline/test_chain.py",
+    ),
+    Mutant(
+        "pipeline/registry.py",
+        "for method in reversed(methods()):",
+        "for method in methods():",
+        "tests/pipeline/test_trusted_method.py",
+    ),
+    Mutant(
+        "pipeline/registry.py",
+        '*(("ball",) if stage.scope == "ball" else ())',
+        "",
+        "tests/pipeline/test_chain.py",
+    ),
+    Mutant(
+        "pipeline/stage.py",
+        "return self.values[name]",
+        "return self.values.get(name)",
+        "tests/pipeline/test_cache_keys.py",
+    ),
+]
+
+VALUES = [
+    Mutant(
+        "pipeline/parameters.py",
+        "if not low <= value <= high:",
+        "if not low <= value:",
+        "tests/pipeline/test_parameters.py",
+    ),
+    Mutant(
+        "pipeline/parameters.py",
+        "new_name = self.renamed.get(name, name)",
+        "new_name = name",
+        "tests/pipeline/test_parameters.py",
+    ),
+    Mutant(
+        "pipeline/events.py",
+        "np.searchsorted(self.t_us, [start_us, end_us])",
+        'np.searchsorted(self.t_us, [start_us, end_us], side="right")',
+        "tests/pipeline/test_events.py",
+    ),
+    Mutant(
+        "pipeline/events.py", "int(column.max()) >= size", "int(column.max()) > size", "tests/pipeline/test_events.py"
+    ),
+    Mutant(
+        "pipeline/camera.py",
+        "(width_px - 1) / 2 if x is None",
+        "width_px / 2 if x is None",
+        "tests/pipeline/test_camera.py",
+    ),
+    Mutant(
+        "pipeline/camera.py", "stretch = cos2_theta / q", "stretch = np.ones_like(q)", "tests/pipeline/test_camera.py"
+    ),
+    Mutant(
+        "pipeline/camera.py",
+        "x * radial + 2 * p1 * x * y",
+        "x * radial - 2 * p1 * x * y",
+        "tests/pipeline/test_camera.py",
+    ),
+    Mutant(
+        "pipeline/camera.py", "x / (1 + u) * z_m, y / (1 + u)", "x * z_m, y / (1 + u)", "tests/pipeline/test_camera.py"
+    ),
+    Mutant(
+        "pipeline/results.py",
+        "across = float(np.trace(self.covariance_rps2) - axis @ self.covariance_rps2 @ axis)",
+        "across = float(np.trace(self.covariance_rps2))",
+        "tests/pipeline/test_results.py",
+    ),
+    Mutant(
+        "pipeline/results.py",
+        'return "refused" if self.vector_rps is None else "ok"',
+        'return "refused" if self.reason else "ok" if self.magnitude_rps else "refused"',
+        "tests/pipeline/test_results.py",
+    ),
+    Mutant(
+        "pipeline/shots.py",
+        "np.sqrt(np.diag(row.track.covariance))",
+        "np.diag(row.track.covariance)",
+        "tests/pipeline/test_shots.py",
+    ),
+    Mutant(
+        "pipeline/shots.py",
+        "estimates=rows[-1].estimates,",
+        "estimates=rows[0].estimates,",
+        "tests/pipeline/test_shots.py",
+    ),
+    Mutant(
+        "pipeline/shots.py",
+        "return sorted(self._ended, key=lambda shot: shot.start_us)",
+        "return list(self._ended)",
+        "tests/pipeline/test_shots.py",
+    ),
+    Mutant("pipeline/shots.py", "end_us=rows[-1].end_us", "end_us=rows[-1].start_us", "tests/pipeline/test_shots.py"),
+    Mutant(
+        "pipeline/shots.py",
+        '"y_std_px": std["y_px"]',
+        '"y_std_px": std["x_px"]',
+        "tests/pipeline/test_results.py",
+    ),
+    Mutant(
+        "pipeline/shots.py",
+        "np.clip(estimate.axis @ spin / magnitude, -1, 1)",
+        "np.clip(abs(estimate.axis @ spin) / magnitude, -1, 1)",
+        "tests/pipeline/test_shots.py",
+    ),
+    Mutant(
+        "pipeline/session.py",
+        "(int(events.t_us[0]), int(events.t_us[-1]) + 1)",
+        "(int(events.t_us[0]), int(events.t_us[-1]))",
+        "tests/pipeline/test_session.py",
+    ),
+    Mutant(
+        "pipeline/session.py",
+        "identity = (self.recording.identity(), (start_us, end_us))",
+        "identity = self.recording.identity()",
+        "tests/pipeline/test_session.py",
+    ),
+    Mutant(
+        "pipeline/session.py",
+        'f"camera.{name}" in attributes and f"camera.{name}" not in chosen',
+        'f"camera.{name}" in attributes',
+        "tests/pipeline/test_session.py",
+    ),
+]
+
+STAGES = [
+    Mutant(
+        "pipeline/stages/filter.py",
+        "(MODES[parameters.logo_mode], parameters.logo_threshold_us)",
+        "(MODES[parameters.logo_mode], parameters.threshold_us)",
+        "tests/pipeline/stages/test_filter.py",
+    ),
+    Mutant(
+        "pipeline/stages/surface.py",
+        "state.update(packet, filtered.surface_events)",
+        "state.update(packet, packet.events)",
+        "tests/pipeline/stages/test_surface.py",
+    ),
+    Mutant(
+        "pipeline/stages/surface.py",
+        '"accumulated": partial(LastEventSurface, is_linear=False)',
+        '"accumulated": partial(LastEventSurface, is_linear=True)',
+        "tests/pipeline/stages/test_surface.py",
+    ),
+    Mutant(
+        "pipeline/stages/logo.py",
+        "pad_px = parameters.pad_px if moving else parameters.fixed_pad_px",
+        "pad_px = parameters.pad_px",
+        "tests/pipeline/stages/test_logo.py",
+    ),
+    Mutant(
+        "pipeline/stages/logo.py",
+        "events.t_us.astype(np.float64) - parameters.delay_us",
+        "events.t_us.astype(np.float64) + parameters.delay_us",
+        "tests/pipeline/stages/test_logo.py",
+    ),
+    Mutant(
+        "pipeline/stages/logo.py",
+        "velocity_std_px_s=math.sqrt(0.5 * (",
+        "velocity_std_px_s=math.sqrt((",
+        "tests/pipeline/stages/test_logo.py",
+    ),
+    Mutant(
+        "pipeline/stages/logo.py",
+        "ball.centre_px(times_us - delay_us)",
+        "ball.centre_px(times_us)",
+        "tests/pipeline/stages/test_logo.py",
+    ),
+    Mutant(
+        "pipeline/stages/rate.py",
+        "(falling_crossings(smooth_hz) + 0.5) * parameters.bin_us",
+        "falling_crossings(smooth_hz) * parameters.bin_us",
+        "tests/pipeline/stages/test_rate.py",
+    ),
+    Mutant(
+        "pipeline/stages/rate.py",
+        "ended = packet.end_us // parameters.bin_us - first_bin",
+        "ended = -(-packet.end_us // parameters.bin_us) - first_bin",
+        "tests/pipeline/stages/test_rate.py",
+    ),
+    Mutant(
+        "pipeline/stages/rate.py",
+        "spread_s > IRREGULAR * mean_s",
+        "spread_s > 2 * IRREGULAR * mean_s",
+        "tests/pipeline/stages/test_spin_refusals.py",
+    ),
+    Mutant(
+        "pipeline/stages/rate.py",
+        "spread_s / mean_s**2 / math.sqrt(intervals_s.size)",
+        "spread_s / mean_s**2",
+        "tests/pipeline/stages/test_spin_refusals.py",
+    ),
+    Mutant(
+        "pipeline/stages/flow.py",
+        "bound_px_s = 2 * math.pi * state.max_spin_rps * logo.radius_px",
+        "bound_px_s = math.pi * state.max_spin_rps * logo.radius_px",
+        "tests/pipeline/stages/test_flow.py",
+    ),
+    Mutant(
+        "pipeline/stages/flow.py",
+        "state.slice_start_us += t_acc_us",
+        "state.slice_start_us = end_us",
+        "tests/pipeline/stages/test_flow.py",
+    ),
+    Mutant(
+        "pipeline/stages/flow.py",
+        "relative = absolute - along @ ball_px_s",
+        "relative = absolute",
+        "tests/pipeline/stages/test_flow.py",
+    ),
+    Mutant(
+        "pipeline/stages/track_kalman.py",
+        "push[4, 2] = self._growth_px_s * dt_s",
+        "push[4, 2] = self._growth_px_s",
+        "tests/pipeline/stages/test_track_gates.py",
+    ),
+    Mutant(
+        "pipeline/stages/track_kalman.py",
+        "if dt_s != self._dt_s:",
+        "if not self._dt_s:",
+        "tests/pipeline/stages/test_track_gates.py",
+    ),
+    Mutant(
+        "pipeline/stages/track_search.py",
+        "abs(now.ring[4] - before.ring[4]) <= 1.0 + 0.1 * before.ring[4]",
+        "now.ring[4] - before.ring[4] <= 1.0 + 0.1 * before.ring[4]",
+        "tests/pipeline/stages/test_track_gates.py",
+    ),
+    Mutant(
+        "pipeline/stages/track_search.py",
+        "key=lambda one: (one[0].trusted, one[0].speed_px_s), reverse=True",
+        "key=lambda one: (one[0].trusted, one[0].speed_px_s)",
+        "tests/pipeline/stages/test_track.py",
+    ),
+    Mutant(
+        "pipeline/stages/track_outline.py",
+        "radius + sign * self.outline_px",
+        "radius + self.outline_px",
+        "tests/pipeline/stages/test_track_gates.py",
+    ),
+    Mutant(
+        "pipeline/stages/track_outline.py",
+        "and abs(self.contrast) >= 0.8",
+        "and self.contrast >= 0.8",
+        "tests/pipeline/stages/test_track_gates.py",
+    ),
+    Mutant(
+        "pipeline/stages/track.py",
+        "packet.end_us - state.seen_us > parameters.coast_us",
+        "packet.end_us - state.seen_us >= parameters.coast_us",
+        "tests/pipeline/stages/test_track.py",
+    ),
+    Mutant(
+        "pipeline/stages/track.py",
+        "expected = _edge(parameters).outline(expected)",
+        "expected = _edge(parameters).ball(expected)",
+        "tests/pipeline/stages/test_track.py",
+    ),
+    Mutant(
+        "pipeline/stages/fixed_ball.py",
+        "radius_px = float(answer[2]) * (1 + short)",
+        "radius_px = float(answer[2])",
+        "tests/pipeline/stages/test_fixed_ball.py",
+    ),
+]
+
+METHODS = [
+    Mutant(
+        "pipeline/spin/triplet.py",
+        "np.cov(spins.T) / len(spins)",
+        "np.cov(spins.T)",
+        "tests/pipeline/stages/test_spin_refusals.py",
+    ),
+    Mutant(
+        "pipeline/spin/triplet.py",
+        "scaled = across @ covariance_rps2 @ across * (rate.spin_rps / length) ** 2",
+        "scaled = across @ covariance_rps2 @ across",
+        "tests/pipeline/stages/test_spin_refusals.py",
+    ),
+    Mutant(
+        "pipeline/spin/normal_flow.py",
+        "own = ~logo.of_outline",
+        "own = np.ones(len(logo.events), np.bool_)",
+        "tests/pipeline/stages/test_spin.py",
+    ),
+    Mutant(
+        "pipeline/spin/normal_flow.py",
+        "fit.overlap * inverse + place + bent",
+        "fit.overlap * inverse + bent",
+        "tests/pipeline/stages/test_spin_refusals.py",
+    ),
+    Mutant(
+        "pipeline/spin/normal_flow.py",
+        "max(fit.scale, 1.0) ** 2",
+        "max(fit.scale, 1.0)",
+        "tests/pipeline/stages/test_spin_refusals.py",
+    ),
+    Mutant(
+        "pipeline/spin/normal_flow.py",
+        "off_rps = rate.spin_rps + turned_rps - float(",
+        "off_rps = rate.spin_rps - float(",
+        "tests/pipeline/stages/test_spin_refusals.py",
+    ),
+    Mutant(
+        "pipeline/spin/normal_flow.py",
+        'any(other.against == "normal_flow" for other in estimates.values())',
+        "any(other.against for other in estimates.values())",
+        "tests/pipeline/test_trusted_method.py",
+    ),
+]
+
+MUTANTS = [*CHAIN, *VALUES, *STAGES, *METHODS]
