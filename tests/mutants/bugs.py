@@ -363,4 +363,205 @@ METHODS = [
     ),
 ]
 
-MUTANTS = [*CHAIN, *VALUES, *STAGES, *METHODS]
+RAW = "tests/pipeline/recordings/test_recordings_raw.py tests/pipeline/recordings/test_recordings_encodings.py"
+
+RECORDINGS = [
+    Mutant(
+        "pipeline/recordings/formats/prophesee_raw/evt3.py",
+        "state[LOW] = 0  # the new TIME_LOW comes right after",
+        "pass",
+        RAW,
+    ),
+    Mutant(
+        "pipeline/recordings/formats/prophesee_raw/evt2.py",
+        "(word >> 22) & LOW_MASK)\n            mask",
+        "(word >> 22) & 0xF)\n            mask",
+        RAW,
+    ),
+    Mutant(
+        "pipeline/recordings/formats/prophesee_raw/decoding.py",
+        "if ahead > turn >> 1 and high + ahead >= turn:",
+        "if high + ahead >= turn:",
+        RAW,
+    ),
+    Mutant(
+        "pipeline/recordings/formats/prophesee_raw/reader.py",
+        "self._rest = data[done * self._word_bytes :]",
+        'self._rest = b""',
+        RAW,
+    ),
+    Mutant(
+        "pipeline/recordings/formats/prophesee_raw/writer.py",
+        "if out.state[ROW] != y_px[i]:",
+        "if out.state[ROW] < y_px[i]:",
+        "tests/pipeline/recordings/test_recordings_writing.py",
+    ),
+    Mutant(
+        "pipeline/recordings/formats/prophesee_dat.py",
+        "turns = int(t[-1]), int(wraps[-1])",
+        "turns = int(t[-1]), 0",
+        RAW,
+    ),
+    Mutant(
+        "pipeline/recordings/formats/hdf5/ecf.py",
+        "(a & low) | ((b >> 2 * bits) << bits)",
+        "(a & low) | (b >> 2 * bits)",
+        "tests/pipeline/recordings/test_recordings_columns.py tests/pipeline/recordings/test_recordings_encodings.py",
+    ),
+    Mutant(
+        "pipeline/recordings/order.py",
+        "late = new.t_us < latest_us - MAX_DISORDER_US",
+        "late = new.t_us < latest_us",
+        "tests/pipeline/recordings/test_recordings_columns.py",
+    ),
+    Mutant(
+        "pipeline/recordings/column_types.py",
+        "~(on | (p == 0) | (p == -1))",
+        "~(on | (p == 0))",
+        "tests/pipeline/recordings/test_recordings_columns.py",
+    ),
+    Mutant(
+        "pipeline/recordings/recording.py",
+        "reading.damage.outside_events += int(np.count_nonzero(~mask))",
+        "pass",
+        "tests/pipeline/recordings/test_recordings_columns.py tests/pipeline/recordings/test_recordings_opening.py",
+    ),
+    Mutant(
+        "pipeline/recordings/sensor.py",
+        "min(fitting, key=lambda s: s[0] * s[1])",
+        "max(fitting, key=lambda s: s[0] * s[1])",
+        "tests/pipeline/recordings/test_recordings_opening.py",
+    ),
+    Mutant("pipeline/files.py", "os.replace(part, target)", "os.replace(part, path)", "tests/pipeline/test_files.py"),
+]
+
+SIMULATOR = [
+    Mutant(
+        "pipeline/simulator/motion.py",
+        "gx - brake * vx + lift * (wy * vz - wz * vy)",
+        "gx - brake * vx - lift * (wy * vz - wz * vy)",
+        "tests/pipeline/simulator/test_simulator_motion.py",
+    ),
+    Mutant(
+        "pipeline/simulator/motion.py",
+        "fade = math.exp(-flight.spin_decay_hz * h)",
+        "fade = math.exp(-flight.spin_decay_hz * STEP_S)",
+        "tests/pipeline/simulator/test_simulator_motion.py",
+    ),
+    Mutant(
+        "pipeline/simulator/kernels_pixel.py",
+        "tau = physics.tau_us + physics.dark_tau_us / intensity",
+        "tau = physics.tau_us + physics.dark_tau_us",
+        "tests/pipeline/simulator/test_simulator_pixel.py",
+    ),
+    Mutant(
+        "pipeline/simulator/kernels_pixel.py",
+        "logo = 1 if change_plain / change < 0.5 else 0",
+        "logo = 1 if change / change_plain < 0.5 else 0",
+        "tests/pipeline/simulator/test_simulator_pixel.py tests/pipeline/simulator/test_simulator_recordings.py",
+    ),
+    Mutant(
+        "pipeline/simulator/kernels_pixel.py",
+        "state[p, OFF_FROM] = when + physics.off_after_on_us",
+        "state[p, OFF_FROM] = when",
+        "tests/pipeline/simulator/test_simulator_pixel.py",
+    ),
+]
+
+CONTRAST = [
+    Mutant(
+        "pipeline/spin/contrast/stage.py",
+        "centre_std_px=max(math.hypot(position, flown), 0.01)",
+        "centre_std_px=max(position, 0.01)",
+        "tests/pipeline/stages/test_contrast_memory.py -k flies_on",
+    ),
+    Mutant(
+        "pipeline/spin/contrast/stage.py",
+        "against = FLOW_METHOD if answer.contrast < parameters.min_gain else None",
+        "against = FLOW_METHOD",
+        "tests/pipeline/stages/test_contrast_memory.py -k nothing_turns",
+    ),
+    Mutant(
+        "pipeline/spin/contrast/stage.py",
+        "np.linalg.solve(one.covariance_rps2 + other.covariance_rps2, off)",
+        "np.linalg.solve(one.covariance_rps2, off)",
+        "tests/pipeline/stages/test_contrast_memory.py -k heard_from",
+    ),
+    Mutant(
+        "pipeline/spin/contrast/stage.py",
+        "return refused and count >= MORE * state.tried",
+        "return refused",
+        "tests/pipeline/stages/test_contrast_memory.py -k are_due",
+    ),
+    Mutant(
+        "pipeline/spin/contrast/estimate.py",
+        "margins = gaps.sum(axis=1) / np.sqrt(",
+        "margins = 2.0 * gaps.sum(axis=1) / np.sqrt(",
+        "tests/pipeline/spin/test_contrast_score.py -k margins",
+    ),
+    Mutant(
+        "pipeline/spin/contrast/score.py",
+        "weight = (last - first - 1) / max(end - begin, 1)",
+        "weight = (last - first) / max(end - begin, 1)",
+        "tests/pipeline/spin/test_contrast_score.py -k twins",
+    ),
+]
+
+KERNELS = [
+    Mutant(
+        "pipeline/kernels/filter.py",
+        "if mode == STC:\n        return same & (pause_us <= threshold_us)",
+        "if mode == STC:\n        return same & (pause_us < threshold_us)",
+        "tests/pipeline/kernels/test_filter.py tests/pipeline/stages/test_filter.py",
+    ),
+    Mutant(
+        "pipeline/kernels/eros.py",
+        "while np.rint(falling[-1]) > 0:",
+        "while falling[-1] > 1:",
+        "tests/pipeline/kernels/test_eros.py",
+    ),
+    Mutant(
+        "pipeline/kernels/sphere.py",
+        "along = -(a * ex + b * ey) / (ex * rx + ey * ry + ez)",
+        "along = -(a * ex + b * ey) / ez",
+        "tests/pipeline/kernels/test_sphere.py",
+    ),
+    Mutant(
+        "pipeline/kernels/sphere.py",
+        "after = min(knot + 1, knots - 1)",
+        "after = knot",
+        "tests/pipeline/kernels/test_sphere.py",
+    ),
+    Mutant(
+        "pipeline/kernels/rate.py",
+        "np.sqrt(early * late)",
+        "early",
+        "tests/pipeline/kernels/test_rate.py",
+    ),
+    Mutant(
+        "pipeline/kernels/triplet.py",
+        "if dt_us <= 0 or on[j] != on[k]:",
+        "if dt_us <= 0:",
+        "tests/pipeline/kernels/test_triplet.py",
+    ),
+    Mutant(
+        "pipeline/kernels/spin.py",
+        "abs(determinant) < 1e-3 * size",
+        "determinant == 0.0",
+        "tests/pipeline/kernels/test_spin.py",
+    ),
+    Mutant(
+        "pipeline/kernels/logo.py",
+        "(ahead > 0.0) == on[i]",
+        "(ahead > 0.0) != on[i]",
+        "tests/pipeline/stages/test_logo.py",
+    ),
+    Mutant(
+        "pipeline/kernels/surfaces.py",
+        "if last[i] >= start_us:",
+        "if last[i] > start_us:",
+        "tests/pipeline/kernels/test_surfaces.py",
+    ),
+]
+
+MUTANTS = [*CHAIN, *VALUES, *STAGES, *METHODS, *CONTRAST, *KERNELS, *RECORDINGS, *SIMULATOR]

@@ -1,7 +1,7 @@
 """Planting of bugs, one at a time, in a copy of the tree, to see whether the tests that ought to notice do.
 
-`uv run pytest -m slow tests/mutants` does it for all of them; `uv run python -m tests.mutants.mutation WORD` for those
-whose file, text or tests hold the word.
+`uv run pytest -m slow tests/mutants` does it for all of them; `uv run python -m tests.mutants.mutation WORD ...` for
+those whose file, text or tests hold one of the words.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
@@ -22,7 +22,7 @@ from typing import Literal
 
 ROOT = Path(__file__).parents[2]
 LEFT_OUT = (".git", ".venv", ".hypothesis", ".benchmarks", ".pytest_cache", ".mypy_cache", ".ruff_cache")
-LONGEST_S = 240.0  # a test that takes longer hangs, which is noticed, too
+LONGEST_S = 180.0  # a test that takes longer hangs, which is noticed, too
 
 Verdict = Literal["caught", "survived", "invalid"]
 
@@ -73,7 +73,7 @@ class Copy:
         }
 
     def run(self, tests: str) -> subprocess.CompletedProcess[str]:
-        """Run some tests up to the first failure, in this process's place and without what other runs have left."""
+        """Run some tests up to the first failure."""
         command = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", *tests.split()]
         return subprocess.run(
             command, cwd=self.root, env=self.environment, capture_output=True, text=True, check=False, timeout=LONGEST_S
@@ -82,11 +82,11 @@ class Copy:
     def verdict(self, mutant: Mutant) -> tuple[Verdict, str]:
         """Whether the tests notice the bug, and the end of what they said."""
         path = self.root / mutant.file
-        before = path.read_text(encoding="utf-8")
-        stale = list(self._compiled_with(path))
-        for file in stale:
+        text, stamp = path.read_text(encoding="utf-8"), path.stat().st_mtime_ns
+        compiled = {file: file.read_bytes() for file in self._compiled_with(path)}
+        path.write_text(text.replace(mutant.old, mutant.new), encoding="utf-8")
+        for file in compiled:
             file.unlink()
-        path.write_text(before.replace(mutant.old, mutant.new), encoding="utf-8")
         try:
             done = self.run(mutant.tests)
         except subprocess.TimeoutExpired:
@@ -94,10 +94,10 @@ class Copy:
         finally:
             for file in self._compiled_with(path):
                 file.unlink()
-            shutil.copy2(ROOT / mutant.file, path)
-            for file in stale:
-                if (origin := ROOT / file.relative_to(self.root)).exists():
-                    shutil.copy2(origin, file)
+            path.write_text(text, encoding="utf-8")
+            os.utime(path, ns=(stamp, stamp))
+            for file, code in compiled.items():
+                file.write_bytes(code)
         verdicts: dict[int, Verdict] = {0: "survived", 1: "caught"}
         return verdicts.get(done.returncode, "invalid"), done.stdout[-1500:] + done.stderr[-500:]
 
@@ -135,7 +135,8 @@ def plant_all(mutants: Sequence[Mutant], workers: int) -> Iterator[tuple[Mutant,
                 idle.put(copy)
 
         with ThreadPoolExecutor(workers) as pool:
-            yield from pool.map(judged, mutants)
+            for done in as_completed([pool.submit(judged, mutant) for mutant in mutants]):
+                yield done.result()
 
 
 def report(mutants: Sequence[Mutant], workers: int = 2) -> list[Mutant]:
@@ -154,5 +155,5 @@ def report(mutants: Sequence[Mutant], workers: int = 2) -> list[Mutant]:
 if __name__ == "__main__":
     from tests.mutants.bugs import MUTANTS
 
-    word = " ".join(sys.argv[1:])
-    report([mutant for mutant in MUTANTS if word in f"{mutant} {mutant.tests}"])
+    words = sys.argv[1:] or [""]
+    report([mutant for mutant in MUTANTS if any(word in f"{mutant} {mutant.tests}" for word in words)])

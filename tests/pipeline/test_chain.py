@@ -239,6 +239,17 @@ def test_targets_run_with_what_they_need_and_nothing_else(calls: dict[str, int],
                 getattr(tick, name)
 
 
+def test_a_stage_of_one_ball_needs_the_tracker_whatever_its_inputs(toys: Toys) -> None:
+    toys.flying = lambda index: (3,) if index > 4 else ()
+    toy = dataclasses.replace(
+        toys.stages["logo"], name="toy", inputs=("packet",), step=lambda parameters, state, packet: packet.index
+    )
+    with STAGES.registered(toy):
+        ticks = list(Chain(source()).run(DEFAULT, ("toy",)))
+    assert toys.counts == {name: 20 if name in OF_RECORDING else 0 for name in INPUTS}
+    assert [tick.get("toy") for tick in ticks[4:7]] == [("logo", "no ball"), 5, 6]
+
+
 def test_an_unknown_target_is_refused(calls: dict[str, int]) -> None:
     with pytest.raises(ParameterError, match="did you mean contrast"):
         list(Chain(source()).run(DEFAULT, ("contrats",)))
