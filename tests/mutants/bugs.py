@@ -564,4 +564,79 @@ KERNELS = [
     ),
 ]
 
-MUTANTS = [*CHAIN, *VALUES, *STAGES, *METHODS, *CONTRAST, *KERNELS, *RECORDINGS, *SIMULATOR]
+EVALUATION = [
+    Mutant(
+        "pipeline/evaluation/uncertainty_calibration.py",
+        "met = met and (value >= limit if at_least else value <= limit)",
+        "met = value >= limit if at_least else value <= limit",
+        "tests/pipeline/evaluation/test_uncertainty_calibration.py",
+    ),
+    Mutant(
+        "pipeline/evaluation/uncertainty_calibration.py",
+        "both = sorted((float(s), float(e)) for s, e in pairs",
+        "both = sorted((float(e), float(e)) for s, e in pairs",
+        "tests/pipeline/evaluation/test_uncertainty_calibration.py",
+    ),
+    Mutant(
+        "pipeline/evaluation/uncertainty_calibration.py",
+        "(magnitude > GROSS_RPS or axis > GROSS_DEG)",
+        "(magnitude > GROSS_RPS and axis > GROSS_DEG)",
+        "tests/pipeline/evaluation/test_uncertainty_calibration.py",
+    ),
+    Mutant(
+        "pipeline/evaluation/tables.py",
+        "return cls(len(good), len(attempts), statistics",
+        "return cls(len(good), len(good), statistics",
+        "tests/pipeline/evaluation/test_tables.py",
+    ),
+    Mutant(
+        "pipeline/evaluation/tasks.py",
+        "return [row for number in range(len(tasks)) for row in rows[number]]",
+        "return [row for number in rows for row in rows[number]]",
+        "tests/pipeline/evaluation/test_tasks.py -k order",
+    ),
+    Mutant(
+        "pipeline/spin_terms.py",
+        "_degrees(abs(parts[main]) / magnitude)",
+        "_degrees(parts[main] / magnitude)",
+        "tests/pipeline/test_spin_terms.py",
+    ),
+    Mutant(
+        "pipeline/spin_terms.py", "if abs(value) >= WORTH", "if value >= WORTH", "tests/pipeline/test_spin_terms.py"
+    ),
+    Mutant(
+        "pipeline/biases.py",
+        'value["noise_on_factor"] * common * refractory,',
+        'value["noise_on_factor"] * common / refractory,',
+        "tests/pipeline/simulator/test_simulator_biases.py",
+    ),
+]
+
+COMMANDS = [
+    Mutant(
+        "app/analyze.py",
+        "report = session.estimate(method, on_progress).to_dict()",
+        "report = session.estimate(on_progress=on_progress).to_dict()",
+        "tests/app/test_analyze.py -k one_method_only",
+    ),
+    Mutant(
+        "app/cli.py",
+        "if window and window[0] >= window[1]:",
+        "if window and window[0] > window[1]:",
+        "tests/app/test_analyze.py -k wrong_input",
+    ),
+    Mutant(
+        "app/cli.py",
+        'if any("error" in report for report in reports):',
+        'if all("error" in report for report in reports):',
+        "tests/app/test_analyze.py -k bad_one",
+    ),
+    Mutant(
+        "app/cli.py",
+        "found = information(recording, sensor, bar)",
+        "found = information(recording, None, bar)",
+        "tests/app/test_info.py",
+    ),
+]
+
+MUTANTS = [*CHAIN, *VALUES, *STAGES, *METHODS, *CONTRAST, *KERNELS, *RECORDINGS, *SIMULATOR, *EVALUATION, *COMMANDS]

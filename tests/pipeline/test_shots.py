@@ -52,6 +52,8 @@ def test_shots_overlap_and_are_listed_by_their_start() -> None:
     log = gathered(tick(0, 7), tick(1, 7, 3), tick(2, 3, 7), tick(3, 3), tick(4))
     assert [(shot.start_us, shot.end_us) for shot in log.shots] == [(0, 15000), (5000, 20000)]
     assert [shot.logo_events for shot in log.shots] == [3, 6]
+    within = gathered(tick(0, 7), tick(1, 7, 3), tick(2, 3, 7), tick(3, 7), tick(4))
+    assert [(shot.start_us, shot.end_us) for shot in within.shots] == [(0, 20000), (5000, 15000)]
 
 
 def test_a_single_tick_of_several_is_no_shot() -> None:

@@ -64,6 +64,17 @@ def test_a_mixture_is_named_by_its_largest_part_and_says_the_rest():
     assert kind.sentence == "topspin with right sidespin (axis tilted 37° from pure topspin)"
 
 
+def test_a_mixture_of_opposites_says_both():
+    """Backspin with right sidespin and reverse corkscrew: names of negative parts, by size; small ones unsaid."""
+    kind = kind_of_spin(np.array([-25.0, 40.0, 30.0]), np.array([8.0, 0.0, 0.0]), LOOKING_DOWN)
+    assert kind.name == "backspin"
+    assert kind.off_deg == pytest.approx(np.degrees(np.arctan2(np.hypot(25, 30), 40)))
+    assert kind.sentence == "backspin with right sidespin and reverse corkscrew (44° off pure backspin)"
+    assert kind_of_spin(np.array([0.5, 40.0, 0.5]), np.array([8.0, 0.0, 0.0]), LOOKING_DOWN).sentence == (
+        "backspin (1° off pure backspin)"
+    )
+
+
 def test_another_up_direction_names_another_kind():
     """A camera that looks at the table from the side, with y down: up is -y."""
     spin, flight = np.array([0.0, 0.0, 50.0]), np.array([8.0, 0.0, 0.0])

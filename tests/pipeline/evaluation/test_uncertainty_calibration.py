@@ -59,22 +59,23 @@ def test_goals_met_and_missed() -> None:
         Goal("too few", rows, answered=0.8),
         Goal("too far", rows, deg=11.0),
         Goal("too gross", rows, gross=0.1),
+        Goal("too few but near", rows, answered=0.8, deg=13.0),
         Goal("should refuse", rows, answered=0.0, refuse=True),
         Goal("refuses", [row(None, None)], answered=0.0, refuse=True),
         Goal("nothing there", []),
     ]
     table = goals("t", asked, "")
-    assert [line[0] for line in table.rows] == ["met", "too few", "too far", "too gross", "should refuse", "refuses"]
-    assert [line[-1] for line in table.rows] == ["yes", "no", "no", "no", "no", "yes"]
+    assert [line[0] for line in table.rows] == [goal.what for goal in asked[:-1]]
+    assert [line[-1] for line in table.rows] == ["yes", "no", "no", "no", "no", "no", "yes"]
     assert table.rows[0][1:-1] == (4, "0.750", ">= 0.75", 2.0, "<= 2", 12.0, "<= 12", pytest.approx(1 / 3), "<= 0.4")
     assert all(len(line) == len(table.columns) for line in table.rows)
 
 
 def test_error_against_coverage_takes_the_surest_first() -> None:
-    rows = [row(3.0, 0.0, (0.3, 1.0)), row(1.0, 0.0, (0.1, 1.0)), row(None, None), row(2.0, 0.0, (0.2, 1.0))]
+    rows = [row(3.0, 0.0, (0.2, 1.0)), row(1.0, 0.0, (0.3, 1.0)), row(None, None), row(2.0, 0.0, (0.1, 1.0))]
     coverage, error = risk_coverage(rows, "magnitude_error_rps", "magnitude_std_rps")
     assert coverage.tolist() == [0.25, 0.5, 0.75]
-    assert error.tolist() == [1.0, 1.5, 2.0]
+    assert error.tolist() == [2.0, 2.5, 2.0]
 
 
 def test_refusals_are_counted_by_reason_where_the_logo_is_visible() -> None:

@@ -53,6 +53,18 @@ def test_ones_own_curves_replace_ours():
     assert physical(FACTORY).threshold_on < physical(PAPER).threshold_on
 
 
+def test_noise_rises_with_bandwidth_and_after_short_dead_times_on_more_than_off():
+    """The supplement's directions: each bias changed alone, from the paper's."""
+    paper = physical(PAPER)
+    assert (paper.noise_on, paper.noise_off) == pytest.approx((1.0, 1.0))
+    fast = physical(replace(PAPER, refr=200))
+    assert fast.noise_on > fast.noise_off > 1.0
+    assert fast.noise_on == pytest.approx(fast.noise_off**2)
+    for quieter in (replace(PAPER, fo=-20), replace(PAPER, hpf=60), replace(PAPER, diff_on=100, diff_off=100)):
+        assert physical(quieter).noise_on < 1.0 and physical(quieter).noise_off < 1.0
+    assert physical(replace(PAPER, diff_on=0)).noise_off == pytest.approx(1.0)
+
+
 def test_files_come_back(tmp_path: Path):
     file = tmp_path / "mine.bias"
     write_biases(PAPER, file)
