@@ -52,7 +52,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
     """Say how to run what was left out."""
-    if any("slow" in item.keywords for item in terminalreporter.stats.get("deselected", ())):
+    left_out = terminalreporter.stats.get("deselected", ())
+    if terminalreporter.config.option.markexpr == "not slow" and any("slow" in item.keywords for item in left_out):
         terminalreporter.write_line("tests marked slow were left out: uv run pytest -m slow")
 
 

@@ -22,9 +22,9 @@ from typing import Literal
 
 ROOT = Path(__file__).parents[2]
 LEFT_OUT = (".git", ".venv", ".hypothesis", ".benchmarks", ".pytest_cache", ".mypy_cache", ".ruff_cache")
-LONGEST_S = 180.0  # a test that takes longer hangs, which is noticed, too
+LONGEST_S = 300.0  # tests that take longer may hang by the bug or not: it does not count as caught
 
-Verdict = Literal["caught", "survived", "invalid"]
+Verdict = Literal["caught", "survived", "endless", "invalid"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,30 +57,30 @@ class Mutant:
 
 
 class Copy:
-    """A copy of the tree in a folder of its own, with what numba has compiled already.
+    """A copy of a tree in a folder of its own, with what numba has compiled already.
 
     Numba keeps machine code beside the sources and looks at the time stamp of its own source file only. So what was
     compiled of a changed module goes, and of all that import it, for callers hold the code of what they call.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, origin: Path = ROOT) -> None:
         self.root = folder
-        shutil.copytree(ROOT, folder, symlinks=True, ignore=shutil.ignore_patterns(*LEFT_OUT))
+        shutil.copytree(origin, folder, symlinks=True, ignore=shutil.ignore_patterns(*LEFT_OUT))
         self.environment = {
             **{name: value for name, value in os.environ.items() if not name.startswith(("PYTEST_", "COV_"))},
             "PYTHONPATH": str(folder / ".package"),
             "PYTHONDONTWRITEBYTECODE": "1",  # stamps of a second are too coarse for changes that follow each other
         }
 
-    def run(self, tests: str) -> subprocess.CompletedProcess[str]:
-        """Run some tests up to the first failure."""
+    def run(self, tests: str, longest_s: float = LONGEST_S) -> subprocess.CompletedProcess[str]:
+        """Run some tests up to the first failure; raises TimeoutExpired."""
         command = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", *tests.split()]
         return subprocess.run(
-            command, cwd=self.root, env=self.environment, capture_output=True, text=True, check=False, timeout=LONGEST_S
+            command, cwd=self.root, env=self.environment, capture_output=True, text=True, check=False, timeout=longest_s
         )
 
     def verdict(self, mutant: Mutant) -> tuple[Verdict, str]:
-        """Whether the tests notice the bug, and the end of what they said."""
+        """Plant the bug, run its tests and put the tree back; what came of it, and the end of what the tests said."""
         path = self.root / mutant.file
         text, stamp = path.read_text(encoding="utf-8"), path.stat().st_mtime_ns
         compiled = {file: file.read_bytes() for file in self._compiled_with(path)}
@@ -90,7 +90,7 @@ class Copy:
         try:
             done = self.run(mutant.tests)
         except subprocess.TimeoutExpired:
-            return "caught", f"no end within {LONGEST_S:g} s"
+            return "endless", f"no end within {LONGEST_S:g} s"
         finally:
             for file in self._compiled_with(path):
                 file.unlink()
@@ -120,12 +120,12 @@ class Copy:
         return (self.root / top).rglob("*.py")
 
 
-def plant_all(mutants: Sequence[Mutant], workers: int) -> Iterator[tuple[Mutant, Verdict, str, float]]:
+def plant_all(mutants: Sequence[Mutant], origin: Path, workers: int) -> Iterator[tuple[Mutant, Verdict, str, float]]:
     """Plant every mutant in one of several copies; yields each with its verdict, what was said, and seconds."""
     with tempfile.TemporaryDirectory() as folder:
         idle: SimpleQueue[Copy] = SimpleQueue()
         for number in range(workers):
-            idle.put(Copy(Path(folder) / f"copy{number}"))
+            idle.put(Copy(Path(folder) / f"copy{number}", origin))
 
         def judged(mutant: Mutant) -> tuple[Mutant, Verdict, str, float]:
             copy, begin = idle.get(), time.perf_counter()
@@ -139,10 +139,10 @@ def plant_all(mutants: Sequence[Mutant], workers: int) -> Iterator[tuple[Mutant,
                 yield done.result()
 
 
-def report(mutants: Sequence[Mutant], workers: int = 2) -> list[Mutant]:
-    """Print each mutant's verdict as it comes; the mutants that were not caught."""
+def report(mutants: Sequence[Mutant], origin: Path = ROOT, workers: int = 2) -> list[Mutant]:
+    """Print each mutant's verdict as it comes; returns the mutants that were not caught."""
     others = []
-    for mutant, verdict, said, seconds in plant_all(mutants, workers):
+    for mutant, verdict, said, seconds in plant_all(mutants, origin, workers):
         print(f"{verdict:9s} {seconds:5.0f} s  {mutant}", flush=True)
         if verdict != "caught":
             others.append(mutant)

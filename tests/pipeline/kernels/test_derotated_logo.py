@@ -191,6 +191,7 @@ def digest() -> list[float]:
     return [*sums, float(painted.sum())]
 
 
+@pytest.mark.nojit
 def test_without_the_jit_everything_is_the_same_and_nothing_overflows() -> None:
     code = (
         "import json, sys, warnings\n"

@@ -340,6 +340,7 @@ np.save("OUT", np.stack([found.events.t_us, found.events.x_px, found.events.y_px
 """
 
 
+@pytest.mark.nojit
 def test_kernels_say_the_same_without_the_compiler(tmp_path: Path):
     out = tmp_path / "events.npy"
     subprocess.run(

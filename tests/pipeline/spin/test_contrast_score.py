@@ -256,6 +256,7 @@ print(json.dumps([*spin, *offsets, value, *model.curvature.ravel(), *grid[0]]))
 """
 
 
+@pytest.mark.nojit
 def test_without_compilation_the_kernels_say_the_same() -> None:
     def numbers(**environment: str) -> list[float]:
         ran = subprocess.run(

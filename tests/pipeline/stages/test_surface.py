@@ -131,6 +131,7 @@ def digest() -> str:
     return shown.hexdigest()
 
 
+@pytest.mark.nojit
 def test_without_the_jit_everything_is_the_same_and_nothing_overflows() -> None:
     code = (
         "import warnings\n"
