@@ -36,7 +36,7 @@ PLANE_SHARE = 0.25  # speeds of planes are good to about a quarter
 # How far (rad) the ball may turn within the neighbourhood of an event: little while the guess may be wrong by a
 # quarter, which blurs lines by a quarter of the way turned; then far enough to see a line drift.
 FIRST_TURNS, NEXT_TURNS = (0.25, 0.5, 0.5), (0.5,)
-LONGEST_US = 10_000  # within which a line is looked for however slow the spin: a flight does not last much longer
+LONGEST_US = 10_000.0  # within which a line is looked for however slow the spin: a flight does not last much longer
 # Neighbourhood and width of a line: 3 px as for the planes; a pixel and its jitter. Lines rounder than this are blobs.
 REACH_PX, WIDTH_PX, SHARPEST = 3.0, 1.2, 0.35
 # Tracks are not known better than this, and neither is the speed of strokes that are curved and blurred.

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from spinscope.pipeline.kernels import eros
+from tests.columns import read_only
 from tests.reference.surface import NaiveEros
 
 SAMPLES = sorted((Path(__file__).parents[3] / "sample_recordings").glob("*.h5"))
@@ -25,7 +26,7 @@ class Fast:
         self.levels, self.table = eros.empty_levels(width_px, height_px), eros.value_table(k_px)
 
     def draw(self, x_px: NDArray[np.uint16], y_px: NDArray[np.uint16]) -> None:
-        eros.update(self.levels, self.width_px, self.k_px, len(self.table) - 1, x_px, y_px)
+        eros.update(self.levels, self.width_px, self.k_px, len(self.table) - 1, *read_only(x_px, y_px))
 
     def read(self) -> NDArray[np.uint8]:
         values = np.zeros((self.height_px, self.width_px), np.uint8)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from spinscope.pipeline.kernels import filter as kernels
 from spinscope.pipeline.kernels.take_events import take_events
+from tests.columns import read_only
 from tests.reference.filter import NaiveFilter
 
 MODES = ("off", "stc", "trail", "stc_cut_trail")
@@ -28,10 +29,7 @@ def passed_rows(
     rows, logo_rows = kernels.filter_events(
         last,
         WIDTH,
-        t.astype(np.int64),
-        x.astype(np.uint16),
-        y.astype(np.uint16),
-        on.astype(np.bool_),
+        *read_only(t.astype(np.int64), x.astype(np.uint16), y.astype(np.uint16), on.astype(np.bool_)),
         MODES.index(one[0]),
         one[1],
         MODES.index(other[0]),

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from spinscope.pipeline.kernels import hough
+from tests.columns import read_only
 from tests.reference import hough as reference
 
 
@@ -82,7 +83,7 @@ def test_active_cells_equal_the_twin(height: int, width: int, cell: int, events:
     values = rng.integers(0, 256, (height, width)).astype(np.uint8)
     x = rng.integers(0, width, events).astype(np.uint16)
     y = rng.integers(0, height, events).astype(np.uint16)
-    columns, rows = hough.active_cells(values, x, y, 100, cell)
+    columns, rows = hough.active_cells(*read_only(values, x, y), 100, cell)
     assert list(zip(columns, rows, strict=True)) == reference.active_cells(values, x, y, 100, cell)
 
 

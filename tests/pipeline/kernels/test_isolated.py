@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from spinscope.pipeline.kernels import isolated
+from tests.columns import read_only
 from tests.reference.surface import cleaned
 
 RULES = ("isolated", "printed")
@@ -17,7 +18,7 @@ RULES = ("isolated", "printed")
 
 def window_of(values: NDArray[np.uint8], x0: int, y0: int, x1: int, y1: int, rule: str) -> NDArray[np.uint8]:
     window = np.full((y1 - y0, x1 - x0), 77, np.uint8)
-    isolated.copy_cleaned(window, values, x0, y0, rule == "printed")
+    isolated.copy_cleaned(window, *read_only(values), x0, y0, rule == "printed")
     return window
 
 

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spinscope.pipeline.kernels.logo import logo_rows, outline_like
+from tests.columns import read_only
 from tests.reference.spin import naive_logo_rows
 
 
@@ -21,7 +22,7 @@ def test_equals_its_twin(seed: int, velocity: tuple[float, float], radius: float
     rng = np.random.default_rng(seed)
     t = start_us + np.sort(rng.integers(0, 5000, 100))
     x, y = (rng.integers(0, 90, 100).astype(np.uint16) for _ in range(2))
-    events = (t, x, y, rng.random(100) < 0.5)
+    events = read_only(t, x, y, rng.random(100) < 0.5)
     circle = (float(start_us + 4900), (45.3, 44.6), velocity, radius, radius + rim_px, (radius + 4.0, radius + 9.0))
     rows, inside, *polarities = logo_rows(*events, *circle)
     assert (rows.tolist(), inside.tolist(), *polarities) == naive_logo_rows(*events, *circle)
@@ -30,7 +31,7 @@ def test_equals_its_twin(seed: int, velocity: tuple[float, float], radius: float
 def test_the_outline_itself_is_outside() -> None:
     x, y = np.array([13, 10, 12], np.uint16), np.array([14, 15, 14], np.uint16)
     t, on = np.zeros(3, np.int64), np.ones(3, np.bool_)
-    rows, _, _, _ = logo_rows(t, x, y, on, 0.0, (10.0, 10.0), (0.0, 0.0), 5.0, 0.0, (0.0, 0.0))
+    rows, _, _, _ = logo_rows(*read_only(t, x, y, on), 0.0, (10.0, 10.0), (0.0, 0.0), 5.0, 0.0, (0.0, 0.0))
     assert rows.tolist() == [2]
 
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from spinscope.pipeline.kernels import moving_circle, outline
+from tests.columns import read_only
 from tests.reference import hough as reference
 
 ROUND = np.zeros(2)
@@ -79,6 +80,7 @@ def test_choices_of_events_equal_the_twins(seed: int, gate: float, most: int, ah
     t_us = np.rint(tau * 1e6).astype(np.int64) + 7_000_000
     columns = [np.clip(np.rint(column), 0, 1000).astype(np.uint16) for column in (x, y)]
     exact = [(t_us - 7_000_000) * 1e-6, *(column.astype(np.float64) for column in columns)]
+    t_us, *columns = read_only(t_us, *columns)
     near = moving_circle.near_outline(ring, t_us, *columns, 7_000_000, gate, most, ahead_only)
     assert np.array_equal(near, reference.near_outline(ring, *exact, gate, most, ahead_only))
     clear = moving_circle.outside_circle(ring, t_us, *columns, 7_000_000, margin)
@@ -160,7 +162,7 @@ def test_an_oval_outline_is_known() -> None:
 
 
 def test_squares_hold_their_border() -> None:
-    x, y = np.array([0, 5, 10, 11, 5], np.uint16), np.array([5, 5, 10, 5, 11], np.uint16)
+    x, y = read_only(np.array([0, 5, 10, 11, 5], np.uint16), np.array([5, 5, 10, 5, 11], np.uint16))
     assert outline.in_square(x, y, 5.0, 5.0, 5.0).tolist() == [0, 1, 2]
 
 
@@ -171,7 +173,7 @@ def test_a_moving_ring_is_measured_from_a_place_alone(bright: bool) -> None:
     tau, x, y, on = on_ring(ring, 600, np.random.default_rng(3))
     columns = np.round(tau * 1e6).astype(np.int64), np.round(x).astype(np.uint16), np.round(y).astype(np.uint16)
     recent = tau > -1.5e-3
-    events = (*(column[recent] for column in columns), (on if bright else ~on)[recent])
+    events = read_only(*(column[recent] for column in columns), (on if bright else ~on)[recent])
     start, gate = outline.find_moving_circle(60.8, 49.0, 15.5, *events, 0, 1.5e-3, 12_000.0)
     assert np.hypot(*(start - ring)[2:4]) < 1500
     fitted, covariance, scatter, found = outline.fit_outline(start, FREE, ROUND, *events, 0, 1.5 * gate, 1280, 720)
