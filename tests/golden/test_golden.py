@@ -33,7 +33,8 @@ def test_a_sample_gives_its_golden_numbers(path: Path) -> None:
         assert shot["measured"] == expected["measured"]
         assert shot["velocity_m_s"] == pytest.approx(expected["velocity_m_s"], rel=1e-3, abs=5e-3)
         for method, stated in expected["spin_std"].items():
-            assert shot["spin_std"][method] == pytest.approx(stated, rel=0.05, abs=0.02), method
+            found_std = shot["spin_std"][method]
+            assert found_std is stated or found_std == pytest.approx(stated, rel=0.05, abs=0.02), method
         for method, spin in expected["spin_rps"].items():
             if spin is None:
                 assert shot["spin_rps"][method] is None

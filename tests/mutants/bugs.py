@@ -614,29 +614,80 @@ EVALUATION = [
 
 COMMANDS = [
     Mutant(
-        "app/analyze.py",
+        "app/commands/analyze.py",
         "report = session.estimate(method, on_progress).to_dict()",
         "report = session.estimate(on_progress=on_progress).to_dict()",
         "tests/app/test_analyze.py -k one_method_only",
     ),
     Mutant(
-        "app/cli.py",
+        "app/commands/options.py",
         "if window and window[0] >= window[1]:",
         "if window and window[0] > window[1]:",
         "tests/app/test_analyze.py -k wrong_input",
     ),
     Mutant(
-        "app/cli.py",
+        "app/commands/analyze.py",
         'if any("error" in report for report in reports):',
         'if all("error" in report for report in reports):',
         "tests/app/test_analyze.py -k bad_one",
     ),
     Mutant(
-        "app/cli.py",
+        "app/commands/info.py",
         "found = information(recording, sensor, bar)",
         "found = information(recording, None, bar)",
         "tests/app/test_info.py",
     ),
 ]
 
-MUTANTS = [*CHAIN, *VALUES, *STAGES, *METHODS, *CONTRAST, *KERNELS, *RECORDINGS, *SIMULATOR, *EVALUATION, *COMMANDS]
+VIEWER = [
+    Mutant(
+        "app/viewer/score.py",
+        "right = np.where(axes[:, 2] < 0, 0,",
+        "right = np.where(axes[:, 2] > 0, 0,",
+        "tests/app/viewer/test_score.py -k axes_lie",
+    ),
+    Mutant(
+        "app/viewer/score.py",
+        "mark.height * y.max(initial=0.0)",
+        "abs(mark.height) * y.max(initial=0.0)",
+        "tests/app/viewer/test_score.py -k rivals_stand",
+    ),
+    Mutant(
+        "app/viewer/ball_projections.py",
+        "front * [-1, 1, -1]",
+        "front * [1, 1, -1]",
+        "tests/app/viewer/test_ball_projections.py",
+    ),
+    Mutant(
+        "app/viewer/ball_projections.py",
+        "np.stack([out, np.cross(pole, out), pole])",
+        "np.stack([out, np.cross(out, pole), pole])",
+        "tests/app/viewer/test_ball_projections.py",
+    ),
+    Mutant(
+        "app/viewer/derotated_logo.py",
+        "(start_us - t_us) * 1e-6",
+        "(t_us - start_us) * 1e-6",
+        "tests/app/viewer/test_derotated_logo.py tests/app/viewer/test_ball.py",
+    ),
+    Mutant(
+        "app/viewer/summary.py",
+        "if self.answer is None or not self.answer[2]:",
+        "if self.answer is None:",
+        "tests/app/viewer/test_summary.py -k doubt",
+    ),
+]
+
+MUTANTS = [
+    *CHAIN,
+    *VALUES,
+    *STAGES,
+    *METHODS,
+    *CONTRAST,
+    *KERNELS,
+    *RECORDINGS,
+    *SIMULATOR,
+    *EVALUATION,
+    *COMMANDS,
+    *VIEWER,
+]

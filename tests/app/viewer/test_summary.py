@@ -12,6 +12,7 @@ import pytest
 from spinscope.app.viewer import entities
 from spinscope.app.viewer.rrd import write_rrd
 from spinscope.app.viewer.run import ViewedRun
+from spinscope.app.viewer.summary import _TickState
 from spinscope.pipeline.registry import STAGES
 from spinscope.pipeline.results import MethodResult
 from spinscope.pipeline.spin_terms import kind_of_spin
@@ -101,6 +102,8 @@ def test_doubt_and_warnings_are_said(flight: ViewedRun, tmp_path: Path) -> None:
     text = said(logged_by(doubtful, tmp_path), flight.ticks[12].packet.end_us)
     assert "no method is trusted" in text
     assert "seven hot pixels" in text
+    card = _TickState(doubtful, ticks[12], None, None).card()
+    assert (card[0][0], card[2][0]) == ("-", "Spin not known"), "big numbers are trusted ones"
 
 
 def block(logged: dict[str, Rows], number: int, t_us: int) -> np.ndarray:

@@ -15,7 +15,7 @@ from spinscope.pipeline.stages import track
 from spinscope.pipeline.stages.track import TrackParameters, TrackState
 from spinscope.pipeline.stages.track_kalman import BallFilter
 from spinscope.pipeline.stages.track_outline import Sighting
-from spinscope.pipeline.stages.track_search import Rivals, agree
+from spinscope.pipeline.stages.track_search import OtherBalls, agree
 from tests.track_runs import PAPER_CONTEXT
 
 RING = np.array([600.0, 350.0, 3000.0, -4000.0, 17.0])
@@ -83,8 +83,8 @@ def test_two_sightings_are_of_one_ball_if_it_moved_as_it_said(near: list[float],
 
 
 def test_other_balls_are_looked_for_every_10_ms() -> None:
-    rivals = Rivals(looked_us=50_000)
-    assert not rivals.due(59_999) and rivals.due(60_000)
+    others = OtherBalls(looked_us=50_000)
+    assert not others.due(59_999) and others.due(60_000)
 
 
 @pytest.mark.parametrize(
