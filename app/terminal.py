@@ -34,6 +34,7 @@ class ProgressBar:
             self._bar.stop()
 
     def __call__(self, share: float, what: str) -> None:
+        """Show the share done (0..1) and what is being done."""
         if self._bar is None:
             if time.perf_counter() - self._begin < PATIENCE_S or not sys.stderr.isatty():
                 return

@@ -75,14 +75,17 @@ class SpinEstimate(ReadOnlyArrays):
 
     @classmethod
     def refused(cls, method: str, reason: str, events: int = 0, against: str | None = None) -> SpinEstimate:
+        """Refusal with its reason."""
         return cls(method, None, None, reason, events, against)
 
     @property
     def status(self) -> Literal["ok", "refused"]:
+        """Whether there is an answer."""
         return "refused" if self.vector_rps is None else "ok"
 
     @property
     def magnitude_rps(self) -> float | None:
+        """Length of the vector, rps; None when refused."""
         return None if self.vector_rps is None else math.sqrt(self.vector_rps @ self.vector_rps)
 
     @property

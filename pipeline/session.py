@@ -172,7 +172,7 @@ class Session:
         return Result.of(self, self.ticks(on_progress=on_progress))
 
     def clip_for_viewing(self, on_progress: Progress | None = None) -> Session:
-        """This session, or for a long recording one of its first shot, with a warning that says so."""
+        """Return this session, or for a long recording one of its first shot, with a warning that says so."""
         frame_bytes = self.source.width_px * self.source.height_px
         if self.chain.tick_count(self.parameters) * frame_bytes <= FRAMES_BYTES:
             return self

@@ -20,6 +20,7 @@ class SensorSize(click.ParamType[tuple[int, int]]):
     name = "WxH"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        """Value of the option; fails with what is allowed."""
         width, _, height = str(value).lower().partition("x")
         if not (width.isdecimal() and height.isdecimal() and 1 <= int(width) <= 65536 and 1 <= int(height) <= 65536):
             self.fail(f"{value!r} is not a sensor size: write WIDTHxHEIGHT in pixels, like 1280x720", param, ctx)
@@ -34,6 +35,7 @@ class FixedBall(click.ParamType[tuple[float, float, float] | str]):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[float, float, float] | str:
+        """Value of the option; fails with what is allowed."""
         if value == "auto":
             return "auto"
         try:
@@ -58,9 +60,11 @@ class RegisteredName(click.ParamType[str]):
         self._names = names
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Value of the option; fails with what is allowed."""
         return click.Choice(self._names()).convert(value, param, ctx)
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str | None:
+        """Choices, for the help text."""
         return click.Choice(self._names()).get_metavar(param, ctx)
 
 
@@ -80,6 +84,7 @@ class ListingCommand(click.Command):
         self._title, self._entries = title, entries
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the entries below the options."""
         with formatter.section(self._title):
             formatter.write_dl(list(self._entries().items()))
 

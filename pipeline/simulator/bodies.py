@@ -44,6 +44,7 @@ class BallBody:
 
     @cached_property
     def trajectories(self) -> list[Trajectory]:
+        """Trajectories of the ball, one a motion."""
         return [trajectory(motion, self.ball, self.scene) for motion in self.ball.motions]
 
     def visible(self, camera: Camera, end_s: float) -> Spans:
@@ -79,6 +80,7 @@ class BallBody:
         return outline, surface
 
     def distance_m(self, time_s: Floats) -> float:
+        """Distance from the camera in the middle of these times, m."""
         one = self._trajectory_at(float(time_s[time_s.size // 2]))
         return float(one.at(time_s[time_s.size // 2 : time_s.size // 2 + 1]).position_m[0, 2])
 
@@ -152,6 +154,7 @@ class ArmBody:
         return 0.0, speed
 
     def distance_m(self, time_s: Floats) -> float:
+        """Distance from the camera in the middle of these times, m."""
         elbow, hand = arm_ends(self.arm, time_s[time_s.size // 2 : time_s.size // 2 + 1])
         return float(elbow[0, 2] + hand[0, 2]) / 2
 

@@ -168,6 +168,7 @@ def _rotation_vector(random: np.random.Generator) -> Floats:
 
 
 def vector(name: str, value: Sequence[float]) -> Floats:
+    """(3,) float64 of a list of three finite numbers; raises ParameterError for any other."""
     vector = np.asarray(value, np.float64)
     if vector.shape != (3,) or not np.all(np.isfinite(vector)):
         raise ParameterError(f"{name} = {value!r} is not a list of 3 numbers")
@@ -175,5 +176,6 @@ def vector(name: str, value: Sequence[float]) -> Floats:
 
 
 def triple(vector: Floats) -> Vector3:
+    """Vector (3,) as three numbers."""
     x, y, z = (float(v) for v in vector)
     return x, y, z

@@ -31,10 +31,12 @@ class Trajectory:
 
     @property
     def start_s(self) -> float:
+        """Time of the first state, s."""
         return float(self.time_s[0])
 
     @property
     def end_s(self) -> float:
+        """Time of the last state, s."""
         return float(self.time_s[-1])
 
     def at(self, time_s: ArrayLike) -> Trajectory:

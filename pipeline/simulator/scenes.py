@@ -161,8 +161,10 @@ def flight(
 
 
 def _second(draw: FlightSampler, speed_m_s: float, heading_deg: float) -> tuple[Flight, float]:
-    """A second ball's flight and the time of its middle; one so slow that it would fall before it has crossed the
-    image is taken faster."""
+    """A second ball's flight and the time of its middle.
+
+    One so slow that it would fall before it has crossed the image is taken faster.
+    """
     while True:
         try:
             return draw.shot("mixed", 20.0, None, speed_m_s, heading_deg, None, False)[:2]

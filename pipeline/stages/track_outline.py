@@ -97,6 +97,7 @@ class Sighting:
 
     @property
     def speed_px_s(self) -> float:
+        """Speed of the outline, px/s."""
         return math.hypot(self.ring[2], self.ring[3])
 
     @property

@@ -74,8 +74,10 @@ def measure(context: TaskContext, scene: str, speed_m_s: float, seed: int) -> li
 
 
 class HoughKalman:
-    """The paper's filter, which takes the Hough circle as it is; it starts with the first circle of a track, and
-    again where it has lost the ball."""
+    """The paper's filter, which takes the Hough circle as it is.
+
+    It starts with the first circle of a track, and again where it has lost the ball.
+    """
 
     def __init__(self, ball: BallParameters, focal_px: float) -> None:
         self.radius_m = ball.diameter_mm / 2000.0
