@@ -1,1 +1,1 @@
-"""What people see of Spinscope: the command line, the viewer and the reports."""
+"""User interfaces: command line, viewer, web application, tuning."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import sys
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
@@ -171,7 +172,7 @@ class ParameterGroup:
         }
 
 
-class ParameterSet:
+class ParameterSet(ABC):
     """Immutable base of a whole program's parameters: one ParameterGroup for each name of `group_types`.
 
     Groups are attributes: `parameters.track.tick_us`. Compared and hashed by value.
@@ -183,9 +184,9 @@ class ParameterSet:
         self._groups = {name: groups.get(name) or made() for name, made in self.group_types().items()}
 
     @classmethod
+    @abstractmethod
     def group_types(cls) -> dict[str, type[ParameterGroup]]:
         """Class of each group by name, in the order in which people see them."""
-        raise NotImplementedError
 
     @classmethod
     def _type_of(cls, name: str) -> type[ParameterGroup]:

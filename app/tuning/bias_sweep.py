@@ -32,7 +32,7 @@ BESIDE_PX = 3.0
 
 @dataclass(frozen=True, slots=True)
 class SweptBias:
-    """What one sweep varies: one bias, or several together."""
+    """Subject of one sweep: one bias, or several together."""
 
     name: str
     label: str

@@ -68,7 +68,7 @@ def declaration(parameters: Parameters, name: str) -> Tunable:
 
 
 def scale_of(declared: Tunable) -> Scale:
-    """How a parameter's range is spread: linear, logarithmic or cubic; none where the range is open."""
+    """Scale of a parameter's range: linear, logarithmic or cubic; none where the range is open."""
     low, high = declared.low, declared.high
     if declared.kind not in ("number", "whole number") or low is None or high is None:
         return "none"

@@ -153,7 +153,7 @@ def _magnitude_curves(run: ViewedRun) -> list[Curve]:
 
 
 def _magnitude_range(run: ViewedRun) -> Range:
-    """From zero to beyond all but the highest magnitudes, and the truth."""
+    """Range from zero to beyond all but the highest magnitudes, and the truth."""
     curves = {curve.name: curve.values for curve in _magnitude_curves(run)}
     truth = curves.pop("truth", np.empty(0))
     known = np.concatenate([np.empty(0), *curves.values()])

@@ -124,7 +124,7 @@ class OpenRecording:
             return clip
 
     def first_clip_us(self) -> tuple[int, int]:
-        """Where work starts: all of a short recording, the busiest part of a long one, which mostly is a shot."""
+        """First clip to work on: all of a short recording, the busiest part of a long one, which mostly is a shot."""
         start_us, end_us = self.window_us
         if not self.is_long:
             return start_us, end_us

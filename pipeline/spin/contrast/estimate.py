@@ -1,4 +1,4 @@
-"""From logo events to a spin: grid search, alias scan, refinement with the ball's place, and uncertainty."""
+"""Estimate of the spin from logo events: grid search, alias scan, refinement with the ball's place, and uncertainty."""
 
 from __future__ import annotations
 
