@@ -151,7 +151,7 @@ class ShotLog:
 
     @property
     def no_shot_reason(self) -> str | None:
-        """Why there are no shots, in words; None when there are some."""
+        """Reason why there are no shots, in words; None when there are some."""
         return None if self._ended else self._last_reason or "no ball, because there are no events"
 
     def _end(self, shot: int) -> None:

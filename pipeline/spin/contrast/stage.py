@@ -285,7 +285,7 @@ def _settled(parameters: ContrastParameters, state: ContrastState) -> bool:
 
 
 def _doubt(parameters: ContrastParameters, answer: ContrastEstimate) -> str | None:
-    """Why an answer is not to be trusted, in words; None if it is."""
+    """Reason why an answer is not to be trusted, in words; None if it is."""
     if answer.spin_rps is None:
         return f"the logo was not seen: {answer.events} logo events, {parameters.fewest_events} are needed"
     if answer.contrast < parameters.min_gain:
