@@ -22,8 +22,6 @@ from rerun.chunk import Chunk as Chunk  # for the stages
 
 from .entities import APPLICATION, TIMELINE, Colour
 
-VERSION: str = rr.__version__
-
 
 class _NoPandas:
     """Finder of modules that finds no pandas."""
@@ -181,33 +179,6 @@ def place_playhead(host: str, port: int, t_us: int) -> bool:
     except (RuntimeError, OSError, ValueError):
         return False
     return True
-
-
-def playhead_request(t_us: int) -> bytes:
-    """The web viewer's request to put the playhead there, paused (`ViewerControlRequest` as protobuf).
-
-    A blueprint cannot say where the playhead is, and the address of the page does so for Rerun's servers only.
-    Field numbers of Rerun 0.41; a viewer that does not know them leaves the playhead at the start.
-    """
-    timeline = _field(1, TIMELINE.encode())
-    time = bytes([1 << 3]) + _varint(t_us * 1000)
-    cursor = _field(2, timeline) + _field(3, time) + bytes([5 << 3, 1])
-    return _field(6, cursor)
-
-
-def _field(number: int, content: bytes) -> bytes:
-    """A protobuf field of bytes, text or a message."""
-    return bytes([number << 3 | 2]) + _varint(len(content)) + content
-
-
-def _varint(value: int) -> bytes:
-    """A protobuf integer: seven bits a byte, lowest first, negative ones as 64 bits."""
-    value &= (1 << 64) - 1
-    digits = []
-    while value > 0x7F:
-        digits.append(value & 0x7F | 0x80)
-        value >>= 7
-    return bytes([*digits, value])
 
 
 def program() -> str:
