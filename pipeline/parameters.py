@@ -189,6 +189,12 @@ class ParameterSet(ABC):
         """Class of each group by name, in the order in which people see them."""
 
     @classmethod
+    def renamed(cls) -> dict[str, str]:
+        """Present `group.field` of every former one."""
+        groups = cls.group_types().items()
+        return {f"{name}.{old}": f"{name}.{new}" for name, group in groups for old, new in group.renamed.items()}
+
+    @classmethod
     def _type_of(cls, name: str) -> type[ParameterGroup]:
         types = cls.group_types()
         if name not in types:

@@ -52,6 +52,7 @@ def opening(state: AppState, session: ClientSession) -> Opening:
         suggested=list(SUGGESTED),
         colours={"on": _css(entities.ON), "off": _css(entities.OFF), "plain": _css(entities.KALMAN_COLOUR)},
         presets=presets.built_in(opened),
+        renamed=opened.renamed(),
         biases=bias_state(recording.session.recording),
     )
 

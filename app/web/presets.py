@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -28,8 +29,10 @@ def built_in(opened: Parameters) -> dict[str, Values]:
     return found
 
 
-def applied(text: str, opened: Parameters) -> Parameters:
+def applied(text: str, opened: Parameters, on_rename: Callable[[str], None] | None = None) -> Parameters:
     """Parameters of a TOML preset; what belongs to the set-up is kept unless the preset names it.
+
+    `on_rename` is told of every parameter under a former name.
 
     Raises ParameterError that says what is wrong with the preset.
     """
@@ -37,7 +40,7 @@ def applied(text: str, opened: Parameters) -> Parameters:
         values = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ParameterError(f"the preset is no TOML: {error}") from None
-    return Parameters().with_values(setup_of(opened)).with_values(values)
+    return Parameters().with_values(setup_of(opened)).with_values(values, on_rename)
 
 
 def as_toml(parameters: Parameters) -> str:

@@ -205,6 +205,7 @@ class Opening(Response):
     suggested: list[str]
     colours: dict[str, str]
     presets: dict[str, Values]
+    renamed: dict[str, str]
     biases: BiasState
 
 
@@ -216,9 +217,10 @@ class Reopened(Response):
 
 
 class PresetValues(Response):
-    """Parameters read from a preset."""
+    """Parameters read from a preset, and notices of former names in it."""
 
     parameters: Values
+    notices: list[str]
 
 
 class WrittenSettings(Response):

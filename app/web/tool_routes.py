@@ -50,7 +50,9 @@ def _add_presets(app: FastAPI, session_of: SessionOf) -> None:
     @app.post("/api/sessions/{session_id}/presets/read")
     async def read_preset(session_id: str, request: schemas.TextRequest) -> schemas.PresetValues:
         opened = session_of(session_id).runner.recording.session.parameters
-        return schemas.PresetValues(parameters=presets.applied(request.text, opened).as_dict())
+        notices: list[str] = []
+        parameters = presets.applied(request.text, opened, notices.append)
+        return schemas.PresetValues(parameters=parameters.as_dict(), notices=notices)
 
     @app.post("/api/sessions/{session_id}/presets/write")
     async def write_preset(session_id: str, request: schemas.SettingsRequest) -> schemas.WrittenSettings:

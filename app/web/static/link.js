@@ -1,5 +1,7 @@
 // The page's address: recording, what differs from how it was opened, biases, clip, playhead and tab.
 
+import { notice } from "./elements.js";
+
 /** @import { Opening } from "./messages.d.ts" */
 /** @import { Settings, Values } from "./settings.js" */
 
@@ -39,8 +41,8 @@ export function linked() {
     time_us: Number(words.get("t")) || null,
     tab: words.get("tab"),
     biases: Object.fromEntries(biases.map(([name, value]) => [name, Number(value)])),
-    parameters: (/** @type {Values} */ opened) => applied(opened, words.getAll("set")),
-    pinned: (/** @type {Values} */ opened) => (words.get("pinned") ? applied(opened, words.getAll("a")) : null),
+    parameters: (/** @type {Opening} */ opening) => applied(opening, words.getAll("set")),
+    pinned: (/** @type {Opening} */ opening) => (words.get("pinned") ? applied(opening, words.getAll("a")) : null),
   };
 }
 
@@ -52,11 +54,13 @@ function assignments(/** @type {Values} */ values, /** @type {Values} */ others)
   );
 }
 
-function applied(/** @type {Values} */ opened, /** @type {string[]} */ texts) {
-  const values = structuredClone(opened);
+function applied(/** @type {Opening} */ { presets, renamed }, /** @type {string[]} */ texts) {
+  const values = structuredClone(presets.opened);
   for (const text of texts) {
-    const [, group, name, value] = text.match(/^(\w+)\.(\w+)=(.*)$/) ?? [];
-    if (!(name in (values[group] ?? {}))) continue;
+    const [, given, value] = text.match(/^(\w+\.\w+)=(.*)$/) ?? [];
+    if (given in renamed) notice(`${given} is now called ${renamed[given]}`, "info", 12);
+    const [group, name] = (renamed[given] ?? given ?? "").split(".");
+    if (!Object.hasOwn(values, group) || !Object.hasOwn(values[group], name)) continue;
     try {
       values[group][name] = JSON.parse(value);
     } catch {

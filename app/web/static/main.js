@@ -48,8 +48,8 @@ async function start() {
   const { recording, presets } = opening;
   const values = presets.opened;
   settings.start({
-    parameters: link.parameters(values),
-    pinned: link.pinned(values),
+    parameters: link.parameters(opening),
+    pinned: link.pinned(opening),
     clip: link.clip ?? recording.clip_us,
     preset: { name: "opened", values },
   });

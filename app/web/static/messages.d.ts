@@ -38,7 +38,7 @@ export type MetricInfo = { name: string; label: string; unit: string };
 /** Open a session on a recording of the folder; None for the one the program was started with. */
 export type OpenRequest = { recording?: string | null };
 /** Everything that the page needs to know at first; without `tools` it shows the viewer alone, `tab` in front. */
-export type Opening = { session: string; viewer_version: string; tools: boolean; tab: string; recording: RecordingDescription; recordings: string[]; sections: SectionInfo[]; stages: Choice[]; methods: MethodInfo[]; run_metrics: MetricInfo[]; shot_metrics: MetricInfo[]; estimate_metrics: MetricInfo[]; tabs: Choice[]; exports: Choice[]; objectives: Choice[]; suggested: string[]; colours: Record<string, string>; presets: Record<string, Record<string, Record<string, any>>>; biases: BiasState };
+export type Opening = { session: string; viewer_version: string; tools: boolean; tab: string; recording: RecordingDescription; recordings: string[]; sections: SectionInfo[]; stages: Choice[]; methods: MethodInfo[]; run_metrics: MetricInfo[]; shot_metrics: MetricInfo[]; estimate_metrics: MetricInfo[]; tabs: Choice[]; exports: Choice[]; objectives: Choice[]; suggested: string[]; colours: Record<string, string>; presets: Record<string, Record<string, Record<string, any>>>; renamed: Record<string, string>; biases: BiasState };
 /** The trials of an optimization so far. */
 export type Optimization = { objective: string; total: number; trials: number[]; best: number | null; values: Record<string, boolean | number | string | null> };
 /** Progress of an optimization. */
@@ -49,8 +49,8 @@ export type OptimizationRequest = { parameters: Record<string, Record<string, an
 export type ParameterSweep = { name: string; total: number; points: SweepPoint[] };
 /** An .rrd picture that is ready to be fetched. */
 export type Picture = { id: string; size_bytes: number; start_us: number; end_us: number; opening_us: number };
-/** Parameters read from a preset. */
-export type PresetValues = { parameters: Record<string, Record<string, any>> };
+/** Parameters read from a preset, and notices of former names in it. */
+export type PresetValues = { parameters: Record<string, Record<string, any>>; notices: string[] };
 /** The opened recording, worked on shot by shot if it is long; `clip_us` is the first clip, [start, end). */
 export type RecordingDescription = { name: string; events: number; width_px: number; height_px: number; start_us: number; end_us: number; longest_us: number; is_long: boolean; clip_us: [number, number]; margin_us: number; has_truth: boolean; warnings: string[]; rate: EventRate };
 /** The recording after its scene was simulated again. */
@@ -77,7 +77,7 @@ export type SweepMessage = { kind: "sweep"; state: "running" | "done" | "cancell
 export type SweepPoint = { value: boolean | number | string; error: string | null; tracked_share: number | null; residual_px: number | null; jitter_px: number | null; logo_events: number | null; best: string | null; spin: Record<string, EstimateMetrics> };
 /** Sweep one parameter; without low and high over its whole range. */
 export type SweepRequest = { parameters: Record<string, Record<string, any>>; start_us?: number | null; end_us?: number | null; name: string; low?: number | null; high?: number | null; points?: number };
-/** What one sweep varies: one bias, or several together. */
+/** Subject of one sweep: one bias, or several together. */
 export type SweptBias = { name: string; label: string; biases: string[] };
 /** A preset (TOML) or a .bias file to read. */
 export type TextRequest = { text: string };

@@ -71,7 +71,8 @@ export class Saving {
     if (!file) return;
     const { connection, settings, opening } = this.app;
     try {
-      const { parameters } = await connection.post("presets/read", { text: await file.text() });
+      const { parameters, notices } = await connection.post("presets/read", { text: await file.text() });
+      for (const text of notices) notice(text, "info", 12);
       const plain = file.name.replace(/\.toml$/, "");
       const name = this.builtIn.includes(plain) ? file.name : plain;
       opening.presets[name] = parameters;

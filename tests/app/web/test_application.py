@@ -255,6 +255,10 @@ def test_presets_go_out_as_toml_and_come_back(client: Client) -> None:
     for text in ("[logo\npad_px = 1", "[logo]\npad_px = 1e9", "[nothing]\na = 1", "logo = 3"):
         answer = client.post("presets/read", text=text)
         assert answer.status_code == 400 and answer.json()["error"]
+    old = client.post("presets/read", text="[contrast]\nweakest = 0.3\n").json()
+    assert old["parameters"]["contrast"]["min_gain"] == 0.3
+    assert old["notices"] == ["contrast.weakest is now called contrast.min_gain"]
+    assert client.opening["renamed"]["contrast.weakest"] == "contrast.min_gain"
     assert client.post("presets/read", text="#" * 200_000).status_code in (413, 422)
 
 

@@ -477,6 +477,11 @@ def test_two_tabs_and_a_reload(browser: Any, tab: Tab, server: Served) -> None:
     other.page.wait_for_timeout(300)
     other.settled()
     assert other.value("logo.pad_px") == mine  # a mangled link opens the recording all the same
+    other.page.goto("about:blank")
+    other.open(f"{server.address}#set=contrast.weakest=0.3&set=__proto__.weakest=1")
+    other.settled()
+    assert other.value("contrast.min_gain") == 0.3  # a link with a parameter's former name
+    assert "contrast.weakest is now called contrast.min_gain" in other.page.inner_text("#notices")
     other.page.context.close()
 
 
