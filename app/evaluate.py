@@ -8,25 +8,25 @@ import io
 import json
 import os
 import platform
+import re
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import platformdirs
+from joblib import cpu_count
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table as ScreenTable
 
-from spinscope.pipeline.errors import RecordingError
-from spinscope.pipeline.evaluation import SUITES, Report, Row, TaskContext, evaluate, executor
+from spinscope.pipeline.evaluation import SUITES, Report, TaskContext, evaluate, executor
 from spinscope.pipeline.evaluation.plots import draw
-from spinscope.pipeline.evaluation.tasks import write_whole
-from spinscope.pipeline.registry import Parameters
+from spinscope.pipeline.evaluation.tasks import Progress, write_whole
 
-Progress = Callable[[float, str], None]
 WIDE = ("picture",)  # columns that no table of text should hold
 
 
@@ -37,12 +37,8 @@ class Evaluation:
     Attributes
     ----------
     report : Report
-    date : str
-        ISO 8601, UTC.
-    machine : str
-        Processor, cores and system.
-    version : str
-        Of Spinscope.
+    date, machine, version : str
+        ISO 8601 (UTC); processor, cores and system; of Spinscope.
     seconds : float
         Wall-clock time of this run; kept results make it short.
     """
@@ -55,63 +51,42 @@ class Evaluation:
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
-        about = {
-            "date": self.date,
-            "machine": self.machine,
-            "version": self.version,
-            "seconds": round(self.seconds, 1),
-        }
-        return {**about, **self.report.as_dict()}
+        about = {"date": self.date, "machine": self.machine, "version": self.version, "seconds": round(self.seconds, 1)}
+        return about | self.report.as_dict()
 
 
 def evaluate_suite(
     name: str,
     *,
     quick: bool = False,
-    parameters: Parameters | None = None,
     workers: int | None = None,
     cluster: str | None = None,
     cache: Path | None = None,
     on_progress: Progress | None = None,
 ) -> Evaluation:
-    """Run a suite.
+    """Run a suite with the default parameters; see `pipeline.evaluation.evaluate`.
 
     Parameters
     ----------
     name : str
-        Of a registered suite.
     quick : bool
-        Whether to thin the suite to about ten seconds.
-    parameters : Parameters or None
-        Of the pipeline under evaluation; None = the defaults.
     workers : int or None
         Processes on this machine; None = one a core.
     cluster : str or None
-        Address of a Dask scheduler whose workers run the tasks instead.
+        Address of a Dask scheduler whose workers run the tasks instead; raises ParameterError when none answers.
     cache : Path or None
-        Folder of recordings and results; None = the user's own cache folder.
+        Folder of the recordings and results kept between runs; None = in the user's cache folder.
     on_progress : callable or None
-        Called with the share done (0..1) and what is being done.
-
-    Raises
-    ------
-    SpinscopeError
-        For an unknown suite, no cluster, a cache that cannot be written.
     """
     if SUITES[name].timed:
         workers, cluster = 1, None
-    context = TaskContext(cache or default_cache(), parameters or Parameters())
+    context = TaskContext(cache or platformdirs.user_cache_path("spinscope") / "evaluation")
     begin = time.perf_counter()
-    with executor(_cores() if workers is None else workers, cluster) as parallel:
+    with executor(cpu_count() if workers is None else workers, cluster) as parallel:
         report = evaluate(name, context, quick=quick, parallel=parallel, on_progress=on_progress)
     seconds = time.perf_counter() - begin
     today = datetime.datetime.now(datetime.UTC).date().isoformat()
-    return Evaluation(report, today, _machine(), _version(), seconds)
-
-
-def default_cache() -> Path:
-    """Folder of the recordings and results kept between runs."""
-    return Path(platformdirs.user_cache_dir("spinscope")) / "evaluation"
+    return Evaluation(report, today, _machine(), version("spinscope"), seconds)
 
 
 def suite_list() -> str:
@@ -137,13 +112,12 @@ def print_evaluation(evaluation: Evaluation, console: Console | None = None) -> 
 
 def write_json(evaluations: Sequence[Evaluation], path: Path) -> None:
     """Write one JSON object a suite and line; raises RecordingError."""
-    text = "".join(json.dumps(one.as_dict(), allow_nan=False) + "\n" for one in evaluations)
-    write_whole(path, text)
+    write_whole(path, "".join(json.dumps(one.as_dict(), allow_nan=False) + "\n" for one in evaluations))
 
 
 def write_csv(evaluation: Evaluation, path: Path) -> None:
     """Write the rows as measured, a column a quantity; raises RecordingError."""
-    rows: list[Row] = evaluation.report.rows
+    rows = evaluation.report.rows
     names = [name for name in dict.fromkeys(name for row in rows for name in row) if name not in WIDE]
     text = io.StringIO(newline="")
     writer = csv.DictWriter(text, names, extrasaction="ignore", lineterminator="\n")
@@ -154,8 +128,6 @@ def write_csv(evaluation: Evaluation, path: Path) -> None:
 
 def write_figures(evaluation: Evaluation, folder: Path) -> list[Path]:
     """Write the suite's figures and its rows as CSV into a folder; returns their paths; raises RecordingError."""
-    if (folder.exists() and not folder.is_dir()) or not os.access(_existing(folder), os.W_OK):
-        raise RecordingError(f"figures cannot be written, this is no folder that may be written to: {folder}")
     paths = draw(evaluation.report, folder)
     rows = folder / f"{evaluation.report.suite.name}.csv"
     write_csv(evaluation, rows)
@@ -176,15 +148,9 @@ errors. `triplet` is the paper's method, `best` the answer that the program itse
 
 
 def write_page(evaluations: Sequence[Evaluation], path: Path, pictures: Sequence[Path] = ()) -> None:
-    """Write the tables of these suites as one page of Markdown; raises RecordingError.
+    """Write the tables of these suites, with their figures from `write_figures`, as one page of Markdown.
 
-    Parameters
-    ----------
-    evaluations : sequence of Evaluation
-    path : Path
-        The page.
-    pictures : sequence of Path
-        The suites' figures as `write_figures` names them, shown under their suite.
+    Raises RecordingError.
     """
     lines = [ABOUT]
     for one in evaluations:
@@ -206,29 +172,11 @@ def _how_made(one: Evaluation) -> str:
     return f"{one.date}, Spinscope {one.version}, {one.machine}{thinned}."
 
 
-def _existing(folder: Path) -> Path:
-    """The folder, or the nearest one above it that is there."""
-    return folder if folder.exists() else _existing(folder.absolute().parent)
-
-
-def _cores() -> int:
-    return max(1, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
-
-
 def _machine() -> str:
     """Processor, cores and system, as far as the system tells."""
     name = platform.processor() or platform.machine()
-    cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists():
-        for line in cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines():
-            if line.startswith("model name"):
-                name = line.partition(":")[2].strip()
-                break
-    return f"{name}, {_cores()} cores, {platform.system()}, Python {platform.python_version()}"
-
-
-def _version() -> str:
-    try:
-        return version("spinscope")
-    except PackageNotFoundError:  # run from its folder without being installed
-        return "unknown"
+    with suppress(OSError):  # only Linux has it
+        cpuinfo = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
+        if model := re.search(r"^model name\s*:\s*(.+?)\s*$", cpuinfo, re.MULTILINE):
+            name = model[1]
+    return f"{name}, {cpu_count()} cores, {platform.system()}, Python {platform.python_version()}"

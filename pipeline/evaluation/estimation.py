@@ -4,30 +4,41 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..api import estimate
+from ..chain import Chain, EventsInMemory
 from ..recordings.in_memory import RecordingInMemory
 from ..registry import Parameters, methods
 from ..results import Truth
 from ..session import Result
 from ..shots import Shot
+from ..simulator import SimulatedRecording
 from ..simulator.sensor import LOGO
-from .rendering import RenderedRecording
-from .tables import Cell, Row, share, summary, where
-from .uncertainty_calibration import is_answer
+from .tables import Cell, Row, distinct, share, summary, where
+from .uncertainty_calibration import ERRORS, STATED, is_answer
 
 Floats = NDArray[np.float64]
 
 BEST = "best"  # what the program itself trusts
 
 
-def estimated(recording: RenderedRecording, parameters: Parameters, window_us: tuple[int, int] | None = None) -> Result:
+def estimated(
+    recording: SimulatedRecording, parameters: Parameters, window_us: tuple[int, int] | None = None
+) -> Result:
     """The shots that the pipeline finds in the recording, or in a window of it, and their spins."""
     in_memory = RecordingInMemory(recording.events, recording.width_px, recording.height_px)
     return estimate(in_memory, parameters, window_us=window_us or (0, recording.duration_us))
+
+
+def chain_over(recording: SimulatedRecording, end_us: int | None = None, **options: Any) -> Chain:
+    """A chain over all events of the recording, or up to a time."""
+    end_us = recording.duration_us if end_us is None else end_us
+    size = recording.width_px, recording.height_px
+    return Chain(EventsInMemory("simulation", recording.events, *size, 0, end_us), **options)
 
 
 def longest(result: Result) -> Shot | None:
@@ -35,7 +46,7 @@ def longest(result: Result) -> Shot | None:
     return max(result.shots, key=lambda shot: shot.t_us.size, default=None)
 
 
-def logo_events(recording: RenderedRecording, window_us: tuple[int, int] | None = None) -> int:
+def logo_events(recording: SimulatedRecording, window_us: tuple[int, int] | None = None) -> int:
     """Number of events of the logo according to the truth."""
     first, last = np.searchsorted(recording.events.t_us, window_us or (0, recording.duration_us))
     return int(np.count_nonzero(recording.truth.label[first:last] == LOGO))
@@ -46,24 +57,17 @@ def estimate_rows(result: Result, truth: Truth, about: Row) -> list[Row]:
     shot = longest(result)
     rows: list[Row] = []
     for name in (*([method.name for method in methods()] if shot is None else shot.estimates), BEST):
-        method = name if name != BEST else None if shot is None else shot.best
         row: Row = {**about, "method": name, "shots": len(result.shots)}
-        errors = None if shot is None or method is None else shot.error_against(truth, method)
-        row |= {
-            "magnitude_error_rps": None if errors is None else errors[0],
-            "axis_error_deg": None if errors is None else errors[1],
-            "magnitude_std_rps": None,
-            "axis_std_deg": None,
-            "reason": None,
-        }
-        if shot is not None and method is not None:
-            estimate = shot.estimates[method]
-            row["magnitude_std_rps"], row["axis_std_deg"] = estimate.magnitude_std_rps, estimate.axis_std_deg
-            row["reason"] = estimate.reason
-        elif shot is None:
+        row |= dict.fromkeys((*ERRORS, *STATED, "reason"))
+        method = name if name != BEST or shot is None else shot.best
+        if shot is None:
             row["reason"] = result.no_shot_reason
-        else:
+        elif method is None:
             row["reason"] = "no method is trusted"
+        else:
+            found = shot.estimates[method]
+            row |= zip(ERRORS, shot.error_against(truth, method) or (None, None), strict=True)
+            row |= zip((*STATED, "reason"), (found.magnitude_std_rps, found.axis_std_deg, found.reason), strict=True)
         rows.append(row)
     return rows
 
@@ -78,14 +82,12 @@ def spin_errors(found_rps: Floats, true_rps: Floats) -> tuple[float, float]:
 COLUMNS = ("method", "n", "success", "of those with logo", "magnitude error [rps]", "axis error [deg]")
 
 
-def method_line(rows: Sequence[Row], label: str) -> tuple[Cell, ...]:
-    """One method's line under COLUMNS."""
-    seen = where(rows, visible=True)
-    return (
-        label,
-        len(rows),
-        summary(rows, "axis_error_deg").success,
-        share(seen, is_answer),
-        summary(rows, "magnitude_error_rps"),
-        summary(rows, "axis_error_deg"),
-    )
+def method_lines(rows: Sequence[Row], *labels: Cell) -> list[tuple[Cell, ...]]:
+    """One line a method under these labels and COLUMNS."""
+    lines: list[tuple[Cell, ...]] = []
+    for method in distinct(rows, "method"):
+        part = where(rows, method=method)
+        magnitude, axis = (summary(part, name) for name in ERRORS)
+        seen = share(where(part, visible=True), is_answer)
+        lines.append((*labels, method, len(part), axis.success, seen, magnitude, axis))
+    return lines

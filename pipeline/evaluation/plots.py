@@ -5,44 +5,36 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from ..errors import RecordingError
-from ..files import atomic_file
 from .estimation import BEST
 from .tables import Row, distinct, summary, where
-from .uncertainty_calibration import risk_coverage
+from .tasks import write_whole
+from .uncertainty_calibration import ERRORS, STATED, risk_coverage
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .suite import Report
 
+Figures: TypeAlias = "dict[str, Figure]"  # by name
+
 WIDTH_IN, HEIGHT_IN, DPI = 5.0, 3.4, 120  # of one panel
 BIN_RPS = 20.0  # errors against the spin are averaged over so much of it
 LEAST = 1e-3  # errors below are drawn there, for the logarithm
-ERRORS = (("magnitude_error_rps", "magnitude error [rps]"), ("axis_error_deg", "axis error [deg]"))
+LABELS = ("magnitude error [rps]", "axis error [deg]")  # of ERRORS
 
 
 def draw(report: Report, folder: Path) -> list[Path]:
-    """Write a suite's figures into a folder, which is made if needed; returns their paths.
-
-    Raises RecordingError when they cannot be written.
-    """
+    """Write a suite's figures into a folder, which is made if needed; returns their paths; raises RecordingError."""
     paths = []
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, figure in report.suite.figures(report.rows).items():
-            content = io.BytesIO()
-            _legend(figure).savefig(content, format="png", dpi=DPI)
-            path = folder / f"{report.suite.name}_{name}.png"
-            with atomic_file(path, "figure") as part:
-                part.write_bytes(content.getvalue())
-            paths.append(path)
-    except OSError as error:
-        raise RecordingError(f"figures cannot be written ({error.strerror}): {folder}") from error
+    for name, figure in report.suite.figures(report.rows).items():
+        content = io.BytesIO()
+        _legend(figure).savefig(content, format="png", dpi=DPI)
+        paths.append(folder / f"{report.suite.name}_{name}.png")
+        write_whole(paths[-1], content.getvalue())
     return paths
 
 
@@ -55,31 +47,9 @@ def panels(rows: int, columns: int) -> tuple[Figure, Any]:
 
 
 def curve(
-    axes: Any,
-    rows: Sequence[Row],
-    x: str,
-    y: str,
-    label: str,
-    style: str = "-",
-    color: int = 0,
-    band: bool = True,
+    axes: Any, rows: Sequence[Row], x: str, y: str, label: str, style: str = "-", color: int = 0, band: bool = True
 ) -> None:
-    """Draw the mean of y at each x, with a band of one standard deviation as in the paper's figures.
-
-    Parameters
-    ----------
-    axes : matplotlib Axes
-    rows : sequence of dict
-        Rows of one curve.
-    x, y : str
-        Columns of the rows.
-    label, style : str
-        Entry of the legend and line style.
-    color : int
-        Position in matplotlib's cycle of colours.
-    band : bool
-        Whether to draw the standard deviation.
-    """
+    """Draw the mean of column y at each value of x, with a band of one standard deviation as in the paper's figures."""
     points = [(value, summary(where(rows, **{x: value}), y)) for value in sorted(distinct(rows, x))]
     points = [(value, errors) for value, errors in points if errors.mean is not None]
     if not points:
@@ -88,11 +58,10 @@ def curve(
     mean = np.array([errors.mean for _, errors in points])
     sd = np.array([errors.sd or 0.0 for _, errors in points])
     axes.plot(place, mean, style, color=f"C{color}", marker="o", markersize=3, label=label)
-    if not band:
-        return
-    # As far down as up on a logarithmic axis: a standard deviation may be larger than the mean.
-    below = mean**2 / np.maximum(mean + sd, LEAST)
-    axes.fill_between(place, below, mean + sd, color=f"C{color}", alpha=0.12)
+    if band:
+        # As far down as up on a logarithmic axis: a standard deviation may be larger than the mean.
+        below = mean**2 / np.maximum(mean + sd, LEAST)
+        axes.fill_between(place, below, mean + sd, color=f"C{color}", alpha=0.12)
 
 
 def method_colors(rows: Sequence[Row]) -> list[tuple[int, str]]:
@@ -103,24 +72,25 @@ def method_colors(rows: Sequence[Row]) -> list[tuple[int, str]]:
 def coverage_figure(groups: Sequence[tuple[str, Sequence[Row]]]) -> Figure:
     """Mean error when only the answers with the smallest stated errors are given, against the share given."""
     figure, axes = panels(len(groups), len(ERRORS))
-    for line, (what, rows) in enumerate(groups):
-        for column, (name, label) in enumerate(ERRORS):
+    for line, (what, rows) in zip(axes, groups, strict=True):
+        for panel, name, std, label in zip(line, ERRORS, STATED, LABELS, strict=True):
             for color, method in method_colors(rows):
-                coverage, error = risk_coverage(where(rows, method=method), name, name.replace("_error_", "_std_"))
+                coverage, error = risk_coverage(where(rows, method=method), name, std)
                 if coverage.size:
-                    axes[line, column].plot(coverage, np.maximum(error, LEAST), color=f"C{color}", label=method)
-            axes[line, column].set_yscale("log")
-            axes[line, column].set_xlim(0.0, 1.0)
-            label_axes(axes[line, column], what, "share answered, the surest first", f"mean {label}")
+                    panel.plot(coverage, np.maximum(error, LEAST), color=f"C{color}", label=method)
+            panel.set_xlim(0.0, 1.0)
+            label_axes(panel, what, "share answered, the surest first", f"mean {label}", log=True)
     return figure
 
 
-def label_axes(axes: Any, title: str, x: str, y: str) -> None:
-    """Set title, axis labels and grid of a panel."""
+def label_axes(axes: Any, title: str, x: str, y: str, log: bool = False) -> None:
+    """Set title, axis labels and grid of a panel, and whether y is logarithmic."""
     axes.set_title(title, fontsize=10)
     axes.set_xlabel(x)
     axes.set_ylabel(y)
     axes.grid(alpha=0.3)
+    if log:
+        axes.set_yscale("log")
 
 
 def _legend(figure: Figure) -> Figure:
@@ -134,7 +104,7 @@ def _legend(figure: Figure) -> Figure:
     return figure
 
 
-def flight_figure(rows: Sequence[Row]) -> dict[str, Figure]:
+def flight_figure(rows: Sequence[Row]) -> Figures:
     """Errors against the spin, and the success rate (the paper's figure of the thrower)."""
     binned = [
         row | {"bin_rps": (row["rps"] // BIN_RPS + 0.5) * BIN_RPS} for row in rows if isinstance(row["rps"], float)
@@ -142,14 +112,12 @@ def flight_figure(rows: Sequence[Row]) -> dict[str, Figure]:
     figure, axes = panels(1, 3)
     for color, method in method_colors(rows):
         part = where(binned, method=method)
-        for column, (name, _) in enumerate(ERRORS):
-            curve(axes[0, column], part, "bin_rps", name, method, color=color)
+        for panel, name in zip(axes[0], ERRORS, strict=False):
+            curve(panel, part, "bin_rps", name, method, color=color)
         bins = sorted(distinct(part, "bin_rps"))
         success = [summary(where(part, bin_rps=b), "axis_error_deg").success for b in bins]
         axes[0, 2].plot(bins, success, color=f"C{color}", marker="o", markersize=3, label=method)
     axes[0, 2].set_ylim(0.0, 1.05)
-    for column in range(len(ERRORS)):
-        axes[0, column].set_yscale("log")
-    for column, (_, label) in enumerate((*ERRORS, ("success", "success rate"))):
-        label_axes(axes[0, column], "flying balls", "spin [rps]", label)
+    for panel, label in zip(axes[0], (*LABELS, "success rate"), strict=True):
+        label_axes(panel, "flying balls", "spin [rps]", label, log=label in LABELS)
     return {"errors": figure}

@@ -4,36 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from joblib import Parallel
 
 from ..extensions import Registry
+from .plots import Figures
 from .tables import ResultTable, Row
 from .tasks import Progress, Task, TaskContext, run
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure  # loaded when the first one is drawn
 
 
 @dataclass(frozen=True, kw_only=True)
 class Suite:
-    """One experiment of the evaluation; a module of `suites` registers it.
+    """One experiment of the evaluation, from a module of `suites`.
 
     Attributes
     ----------
-    name : str
-        As users type it.
-    label : str
-        Heading of its results.
-    help : str
-        One line on what it measures.
+    name, label, help : str
+        As users type it, heading of its results, and one line on what it measures.
     tasks : callable
         Tasks of the full or (argument True) the thinned suite.
-    tables : callable
-        Tables that summarise the rows of all tasks.
-    figures : callable
-        Matplotlib figures of the rows by name.
+    tables, figures : callable
+        Tables that summarise the rows of all tasks, and matplotlib figures of them by name.
     timed : bool
         Whether the tasks measure run times, so that they run one by one in this process.
     """
@@ -43,7 +35,7 @@ class Suite:
     help: str
     tasks: Callable[[bool], list[Task]]
     tables: Callable[[Sequence[Row]], list[ResultTable]]
-    figures: Callable[[Sequence[Row]], dict[str, Figure]]
+    figures: Callable[[Sequence[Row]], Figures]
     timed: bool = False
 
 
@@ -52,18 +44,7 @@ SUITES: Registry[Suite] = Registry("suite")
 
 @dataclass(frozen=True)
 class Report:
-    """Results of a suite.
-
-    Attributes
-    ----------
-    suite : Suite
-    quick : bool
-        Whether the suite was thinned.
-    rows : list of dict
-        One measurement each.
-    tables : list of ResultTable
-        Summaries of the rows.
-    """
+    """Results of a suite, thinned or not: one measurement a row, and tables that summarise them."""
 
     suite: Suite
     quick: bool
@@ -89,14 +70,12 @@ def evaluate(
     parallel: Parallel | None = None,
     on_progress: Progress | None = None,
 ) -> Report:
-    """Run a suite.
+    """Run the registered suite of this name.
 
     Parameters
     ----------
     name : str
-        Of a registered suite.
     context : TaskContext
-        Cache and parameters.
     quick : bool
         Whether to thin the suite to about ten seconds.
     parallel : joblib.Parallel or None
@@ -106,10 +85,8 @@ def evaluate(
 
     Raises
     ------
-    ParameterError
-        For an unknown suite.
-    RecordingError
-        When the cache cannot be written.
+    SpinscopeError
+        For an unknown suite, or a cache that cannot be written.
     """
     suite = SUITES[name]
     rows = run(suite.tasks(quick), context, None if suite.timed else parallel, on_progress)

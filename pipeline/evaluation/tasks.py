@@ -99,10 +99,7 @@ def executor(workers: int = 1, cluster: str | None = None) -> Iterator[Parallel]
 
 
 def run(
-    tasks: Sequence[Task],
-    context: TaskContext,
-    parallel: Parallel | None = None,
-    on_progress: Progress | None = None,
+    tasks: Sequence[Task], context: TaskContext, parallel: Parallel | None = None, on_progress: Progress | None = None
 ) -> list[Row]:
     """All tasks' rows in the tasks' order, run by an `executor` (None: by this process) unless kept by an earlier run.
 
@@ -168,12 +165,17 @@ def text_digest(part: str) -> str:
     return hashed.hexdigest()
 
 
-def write_whole(path: Path, content: str) -> None:
+def write_whole(path: Path, content: str | bytes) -> None:
     """Write a file that is there whole or not at all; raises RecordingError when it cannot be written."""
-    with suppress(OSError):  # the message comes from the writing
-        path.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(path.parent)
     with atomic_file(path, "results") as part:
-        part.write_text(content, encoding="utf-8")
+        part.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it, as far as they can be made: the message comes from the writing."""
+    with suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
 
 
 def _limit_cache(cache: Path) -> None:

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from .tables import Cell, ResultTable, Row, share, where
 
 GROSS_RPS, GROSS_DEG = 10.0, 20.0  # an error beyond one of these is gross
-PAIRS = (("magnitude_error_rps", "magnitude_std_rps"), ("axis_error_deg", "axis_std_deg"))
+ERRORS = ("magnitude_error_rps", "axis_error_deg")  # columns of the rows
+STATED = ("magnitude_std_rps", "axis_std_deg")
 
 
 def is_answer(row: Row) -> bool:
@@ -36,7 +37,7 @@ def calibration_table(groups: Sequence[tuple[str, Sequence[Row]]], methods: Sequ
             if not answers:
                 continue
             cells: list[Cell] = [label, method, len(answers), share(answers, is_gross)]
-            for error, std in PAIRS:
+            for error, std in zip(ERRORS, STATED, strict=True):
                 ratio = ratios(answers, error, std)
                 cells += [float(np.mean(ratio <= limit)) if ratio.size else None for limit in (1, 2)]
                 cells.append(float(np.median(ratio)) if ratio.size else None)

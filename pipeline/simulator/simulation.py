@@ -59,6 +59,11 @@ class SimulatedRecording:
     scene: Scene
     description: dict[str, Any]
 
+    @property
+    def duration_us(self) -> int:
+        """Length of the scene."""
+        return round(self.scene.duration_s * 1e6)
+
 
 def default_camera(width_px: int = 1280, height_px: int = 720) -> Camera:
     """The paper's camera."""

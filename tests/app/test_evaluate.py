@@ -93,7 +93,7 @@ def test_nonsense(evaluation: Evaluation, tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="there is no suite 'spiner'"):
         evaluate_suite("spiner", workers=1, cache=tmp_path)
     (tmp_path / "file").write_text("")
-    with pytest.raises(RecordingError, match="no folder"):
+    with pytest.raises(RecordingError, match="cannot be written"):
         write_figures(evaluation, tmp_path / "file")
     with pytest.raises(RecordingError, match="cannot be written"):
         write_json([evaluation], tmp_path / "file" / "all.json")

@@ -1,7 +1,20 @@
-"""The suites, one module each: a module in this folder is found and registers its suite."""
+"""The suites: every module of this folder is one, of its own name, and is found and registered here."""
 
 from importlib import import_module
 from pkgutil import iter_modules
 
-for _module in iter_modules(__path__):
-    import_module(f"{__name__}.{_module.name}")
+from ..suite import SUITES, Suite
+
+for _found in iter_modules(__path__):
+    _module = import_module(f"{__name__}.{_found.name}")
+    SUITES.register(
+        Suite(
+            name=_found.name,
+            label=_module.LABEL,
+            help=_module.HELP,
+            tasks=_module.tasks,
+            tables=_module.tables,
+            figures=_module.figures,
+            timed=getattr(_module, "TIMED", False),
+        )
+    )

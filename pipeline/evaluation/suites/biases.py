@@ -5,22 +5,19 @@ from __future__ import annotations
 import base64
 import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...biases import PAPER, BiasParameters
-from ...results import Truth
-from ...simulator import Background, Scene, flight, simulate_scene
+from ...simulator import Background, Scene, SimulatedRecording, flight, simulate_scene
 from ...simulator.sensor import LOGO
-from ..plots import curve, label_axes, panels
-from ..suite import SUITES, Suite
+from ..plots import Figures, curve, label_axes, panels
 from ..tables import Cell, ResultTable, Row, distinct, summary, where
 from ..tasks import Task, TaskContext
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+LABEL = "Biases: event rates and pictures of the logo"
+HELP = "Event rates of noise and ball against each bias, and pictures of the logo (supplement)."
 
 SEED = 74_000
 FLIGHTS = 5  # the paper averages over 5 samples
@@ -46,20 +43,16 @@ PICTURE_PX = 64  # side of a picture; the ball has a radius of about 17 px
 
 def tasks(quick: bool) -> list[Task]:
     """One setting and scene a task."""
-    flights = 1 if quick else FLIGHTS
-    duration_ms = 25 if quick else None  # the ball's way in is enough to see the bias work
+    duration = {"duration_ms": 25 if quick else None}  # the ball's way in is enough to see the bias work
     every: list[Task] = []
     for sweep, (_, values, few) in SWEEPS.items():
         for value in few if quick else values:
-            common = {"sweep": sweep, "value": value}
-            every.append(Task(measure_noise, {**common, "seed": SEED}, needs=NEEDS))
-            for number in range(flights):
-                arguments = {**common, "seed": SEED + number, "duration_ms": duration_ms}
-                every.append(Task(measure_ball, arguments, needs=NEEDS))
-    pictures = [(sweep, value) for sweep, (shown, _) in PICTURES.items() for value in shown]
-    for sweep, value in pictures[-2:] if quick else pictures:
-        arguments = {"sweep": sweep, "value": value, "duration_ms": duration_ms}
-        every.append(Task(take_picture, arguments, needs=NEEDS))
+            setting = {"sweep": sweep, "value": value}
+            every.append(Task(measure_noise, {**setting, "seed": SEED}, needs=NEEDS))
+            for seed in range(SEED, SEED + (1 if quick else FLIGHTS)):
+                every.append(Task(measure_ball, {**setting, "seed": seed, **duration}, needs=NEEDS))
+    pictures = [{"sweep": sweep, "value": value} for sweep, (shown, _) in PICTURES.items() for value in shown]
+    every += [Task(take_picture, picture | duration, needs=NEEDS) for picture in pictures[-2 if quick else 0 :]]
     return every
 
 
@@ -67,36 +60,36 @@ def _set(sweep: str, value: int) -> BiasParameters:
     return PAPER.with_values(dict.fromkeys(SWEEPS[sweep][0], value))
 
 
-def _row(what: str, sweep: str, value: int, seed: int) -> Row:
+def _row(what: str, sweep: str, value: int, seed: int, made: SimulatedRecording | None = None) -> Row:
+    """The columns of every row; the rates are those of the recording, None without one."""
     paper = all(getattr(PAPER, name) == value for name in SWEEPS[sweep][0])
-    return {"what": what, "sweep": sweep, "value": value, "paper": paper, "seed": seed}
+    row: Row = {"what": what, "sweep": sweep, "value": value, "paper": paper, "seed": seed}
+    row |= dict.fromkeys(("on_hz", "off_hz", "logo_hz"))
+    if made is not None:
+        on, seconds = made.events.on, made.scene.duration_s
+        row |= {"on_hz": float(on.sum()) / seconds, "off_hz": float((~on).sum()) / seconds}
+    return row
 
 
 def measure_noise(context: TaskContext, sweep: str, value: int, seed: int) -> list[Row]:
     """Events a second of a scene in which nothing moves."""
     scene = Scene(STATIC_S, (), background=Background())
-    on = simulate_scene(scene, sensor=_set(sweep, value), seed=seed).events.on
-    row = _row("noise", sweep, value, seed)
-    row |= {"on_hz": float(on.sum()) / STATIC_S, "off_hz": float((~on).sum()) / STATIC_S, "logo_hz": None}
-    return [row]
+    made = simulate_scene(scene, sensor=_set(sweep, value), seed=seed)
+    return [_row("noise", sweep, value, seed, made)]
 
 
 def _flying(seed: int, duration_ms: int | None) -> Scene:
     scene = flight(kind="top", magnitude_rps=SPIN_RPS, speed_m_s=SPEED_M_S, seed=seed)
-    if duration_ms is None:
-        return scene
-    return dataclasses.replace(scene, duration_s=min(scene.duration_s, duration_ms / 1000))
+    duration_s = scene.duration_s if duration_ms is None else min(scene.duration_s, duration_ms / 1000)
+    return dataclasses.replace(scene, duration_s=duration_s)
 
 
 def measure_ball(context: TaskContext, sweep: str, value: int, seed: int, duration_ms: int | None) -> list[Row]:
     """Events a second of everything while a ball flies through, as the supplement counts them, and of its logo."""
     scene = _flying(seed, duration_ms)
     made = simulate_scene(scene, sensor=_set(sweep, value), seed=seed)
-    on, seconds = made.events.on, scene.duration_s
-    row = _row("ball", sweep, value, seed)
-    row |= {"on_hz": float(on.sum()) / seconds, "off_hz": float((~on).sum()) / seconds}
-    row["logo_hz"] = float(np.count_nonzero(made.truth.label == LOGO)) / seconds
-    return [row]
+    logo_hz = float(np.count_nonzero(made.truth.label == LOGO)) / scene.duration_s
+    return [_row("ball", sweep, value, seed, made) | {"logo_hz": logo_hz}]
 
 
 def take_picture(context: TaskContext, sweep: str, value: int, duration_ms: int | None) -> list[Row]:
@@ -106,16 +99,18 @@ def take_picture(context: TaskContext, sweep: str, value: int, duration_ms: int 
     at_us = _busiest(scene, span_us)
     made = simulate_scene(scene, sensor=_set(sweep, value), seed=SEED)
     shown = made.events.between(at_us - span_us, at_us)
-    corner = [round(float(np.interp(at_us, made.truth.t_us, c)) - PICTURE_PX / 2) for c in _centre(made.truth)]
-    x, y = shown.x_px.astype(np.int64) - corner[0], shown.y_px.astype(np.int64) - corner[1]
+    truth = made.truth
+    x, y = (
+        column.astype(np.int64) - round(float(np.interp(at_us, truth.t_us, centre)) - PICTURE_PX / 2)
+        for column, centre in ((shown.x_px, truth.x_px), (shown.y_px, truth.y_px))
+    )
     inside = (x >= 0) & (y >= 0) & (x < PICTURE_PX) & (y < PICTURE_PX)
     sign = np.where(shown.on, 1.0, -1.0)
     if sweep == "fo":  # linear time surface: the latest event counts, the older the less
         sign = sign * (1 - (at_us - shown.t_us) / span_us)
     picture = np.zeros((PICTURE_PX, PICTURE_PX))
     picture[y[inside], x[inside]] = sign[inside]
-    row = _row("picture", sweep, value, SEED)
-    row |= {"on_hz": None, "off_hz": None, "logo_hz": None, "span_us": span_us}
+    row = _row("picture", sweep, value, SEED) | {"span_us": span_us}
     row["picture"] = base64.b64encode(np.rint(127 * picture).astype(np.int8).tobytes()).decode("ascii")
     return [row]
 
@@ -129,17 +124,12 @@ def picture_of(row: Row) -> NDArray[np.float64]:
 def _busiest(scene: Scene, span_us: int) -> int:
     """End of the span with most logo events, the whole ball being in view."""
     made = simulate_scene(scene, sensor=PAPER, seed=SEED)
-    x, y = _centre(made.truth)
-    half = PICTURE_PX / 2
+    x, y, half = made.truth.x_px, made.truth.y_px, PICTURE_PX / 2
     seen = (x > half) & (x < made.width_px - half) & (y > half) & (y < made.height_px - half)
     ends = made.truth.t_us[seen & (made.truth.t_us >= span_us)]
     logo_us = made.events.t_us[made.truth.label == LOGO]
     counts = np.searchsorted(logo_us, ends) - np.searchsorted(logo_us, ends - span_us)
     return int(ends[np.argmax(counts)])
-
-
-def _centre(truth: Truth) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    return truth.x_px, truth.y_px
 
 
 def tables(rows: Sequence[Row]) -> list[ResultTable]:
@@ -166,19 +156,19 @@ EXPECTED = {
 }
 
 
-def figures(rows: Sequence[Row]) -> dict[str, Figure]:
+def figures(rows: Sequence[Row]) -> Figures:
     """Event rates against each bias, and the logo's pictures (the supplement's figures)."""
     sweeps = distinct(rows, "sweep")
     figure, axes = panels(2, len(sweeps))
-    for column, sweep in enumerate(sweeps):
-        for line, what in enumerate(("noise", "ball")):
+    for line, what in zip(axes, ("noise", "ball"), strict=True):
+        for panel, sweep in zip(line, sweeps, strict=True):
             part = where(rows, sweep=sweep, what=what)
             for color, (name, label) in enumerate((("on_hz", "ON"), ("off_hz", "OFF"))):
-                curve(axes[line, column], part, "value", name, label, color=color)
+                curve(panel, part, "value", name, label, color=color)
             for paper in sorted(distinct(where(part, paper=True), "value")):
-                axes[line, column].axvline(paper, color="green", linewidth=1)
-            label_axes(axes[line, column], f"{what}, bias_{sweep}", "bias (green: the paper's)", "events [1/s]")
-        axes[0, column].set_yscale("log")
+                panel.axvline(paper, color="green", linewidth=1)
+            title = f"{what}, bias_{sweep}"
+            label_axes(panel, title, "bias (green: the paper's)", "events [1/s]", log=what == "noise")
     result = {"rates": figure}
     pictures = where(rows, what="picture")
     if pictures:
@@ -191,15 +181,3 @@ def figures(rows: Sequence[Row]) -> dict[str, Figure]:
             panel.set_title(f"bias_{row['sweep']}: {row['value']} ({row['span_us']} us)", fontsize=10)
         result["pictures"] = figure
     return result
-
-
-SUITES.register(
-    Suite(
-        name="biases",
-        label="Biases: event rates and pictures of the logo",
-        help="Event rates of noise and ball against each bias, and pictures of the logo (supplement).",
-        tasks=tasks,
-        tables=tables,
-        figures=figures,
-    )
-)

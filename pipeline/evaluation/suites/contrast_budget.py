@@ -4,25 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...chain import Chain, EventsInMemory
 from ...registry import STAGES, Parameters
 from ...results import MethodResult, SpinEstimate
 from ...simulator import Scene, SensorModel, SimulatedRecording, flight, human_shot, simulate_scene, spinner, thrown
 from ...stages.track import BallTrack
-from ..estimation import spin_errors
-from ..plots import coverage_figure
-from ..suite import SUITES, Suite
+from ..estimation import chain_over, spin_errors
+from ..plots import Figures, coverage_figure
 from ..tables import Cell, ResultTable, Row, distinct, summary, where
 from ..tasks import Task, TaskContext
-from ..uncertainty_calibration import calibration_table, is_answer, is_gross
+from ..uncertainty_calibration import ERRORS, STATED, calibration_table, is_answer, is_gross
 from .spinner import known_circle
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+LABEL = "Error budget of contrast"
+HELP = "Errors of `contrast` with one source of error after the other taken away."
 
 SEED = 61_000  # of this suite alone
 COUNTS = {"flight": 16, "spinner": 14}
@@ -71,25 +68,24 @@ def measure(context: TaskContext, kind: str, number: int) -> list[Row]:
         if kind == "spinner":
             parameters = parameters.with_values({"track": known_circle(recording.truth, seed)})
         row: Row = {"kind": kind, "number": number, "seed": seed, "case": case, "method": METHOD}
-        row |= dict.fromkeys(("magnitude_error_rps", "axis_error_deg", "magnitude_std_rps", "axis_std_deg"))
-        found = _last_estimate(case, recording, parameters)
-        if found is not None and found[0].vector_rps is not None:
-            estimate, end_us = found
-            row |= {"magnitude_std_rps": estimate.magnitude_std_rps, "axis_std_deg": estimate.axis_std_deg}
+        row |= dict.fromkeys((*ERRORS, *STATED))
+        estimate, end_us = _last_estimate(case, recording, parameters)
+        if estimate is not None and estimate.vector_rps is not None:
             truth = recording.truth
             true = np.array([np.interp(end_us, truth.t_us, truth.spin_rps[:, axis]) for axis in range(3)])
-            row["magnitude_error_rps"], row["axis_error_deg"] = spin_errors(found[0].vector_rps, true)
+            row |= zip(ERRORS, spin_errors(estimate.vector_rps, true), strict=True)
+            row |= zip(STATED, (estimate.magnitude_std_rps, estimate.axis_std_deg), strict=True)
         rows.append(row)
     return rows
 
 
-def _last_estimate(case: str, recording: SimulatedRecording, parameters: Parameters) -> tuple[SpinEstimate, int] | None:
-    """The estimate of `contrast` in the last tick with a ball and that tick's end, None without a ball."""
+def _last_estimate(case: str, recording: SimulatedRecording, parameters: Parameters) -> tuple[SpinEstimate | None, int]:
+    """The estimate of `contrast` in the last tick with a ball, None without one, and that tick's end."""
     truth = recording.truth
-    source = EventsInMemory(case, recording.events, recording.width_px, recording.height_px, 0, int(truth.t_us[-1]))
-    chain = Chain(source)
+    chain = chain_over(recording, int(truth.t_us[-1]))
     stage, mask_stage = STAGES[METHOD], STAGES["logo"]
-    state, found = chain.start(parameters, stage), None
+    state = chain.start(parameters, stage)
+    estimate, end_us = None, 0
     for tick in chain.run(parameters, ("logo", "normal_flow"), forget=("surface",)):
         ball, events, normal_flow = tick.track.ball, tick.logo, tick.normal_flow
         if ball is None:
@@ -102,9 +98,9 @@ def _last_estimate(case: str, recording: SimulatedRecording, parameters: Paramet
             ball = _true_ball(ball, tick.packet.end_us, recording, ball.latency_us if late else 0.0)
             mask = parameters.logo if late else replace(parameters.logo, delay_us=0.0)
             events = mask_stage.step(mask, chain.start(parameters, mask_stage), tick.packet, tick.filter, ball)
-        result = stage.step(parameters.contrast, state, tick.packet, ball, events, normal_flow)
-        found = result.estimate, tick.packet.end_us
-    return found
+        estimate = stage.step(parameters.contrast, state, tick.packet, ball, events, normal_flow).estimate
+        end_us = tick.packet.end_us
+    return estimate, end_us
 
 
 def _true_ball(ball: BallTrack, end_us: int, recording: SimulatedRecording, latency_us: float) -> BallTrack:
@@ -127,30 +123,17 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
         bad = {row["number"] for row in own if not is_answer(row) or is_gross(row)}
         part = [row for row in own if row["number"] not in bad]
         lines: list[tuple[Cell, ...]] = [
-            (case, *(summary(where(part, case=case), name) for name in ("magnitude_error_rps", "axis_error_deg")))
-            for case in CASES
+            (case, *(summary(where(part, case=case), name) for name in ERRORS)) for case in CASES
         ]
         title = f"Error of `contrast`: {len(distinct(part, 'number'))} {kind}s"
         result.append(ResultTable(title, ("case", "magnitude error [rps]", "axis error [deg]"), lines))
     return [*result, calibration_table(_as_it_is(rows), [METHOD])]
 
 
-def figures(rows: Sequence[Row]) -> dict[str, Figure]:
+def figures(rows: Sequence[Row]) -> Figures:
     """Error against coverage, as it is."""
     return {"coverage": coverage_figure(_as_it_is(rows))}
 
 
 def _as_it_is(rows: Sequence[Row]) -> list[tuple[str, list[Row]]]:
     return [(f"{kind}s", where(rows, kind=kind, case=CASES[0])) for kind in distinct(rows, "kind")]
-
-
-SUITES.register(
-    Suite(
-        name="contrast_budget",
-        label="Error budget of contrast",
-        help="Errors of `contrast` with one source of error after the other taken away.",
-        tasks=tasks,
-        tables=tables,
-        figures=figures,
-    )
-)

@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...camera import BallParameters
-from ...chain import Chain, Tick
-from ...results import Circle, Truth
-from ...simulator import flight
+from ...chain import Tick
+from ...results import Circle
+from ...simulator import SimulatedRecording, flight
 from ...stages.track_kalman import OBSERVED, BallFilter
 from .. import paper
-from ..plots import curve, label_axes, panels
-from ..rendering import RenderedRecording, render
-from ..suite import SUITES, Suite
+from ..estimation import chain_over
+from ..plots import Figures, curve, label_axes, panels
+from ..rendering import render
 from ..tables import Cell, ResultTable, Row, Summary, distinct, share, summary, where
 from ..tasks import Task, TaskContext
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+LABEL = "Ball detector: error against speed"
+HELP = "Errors of the ball's place, size and velocity against its speed (section 4.2)."
 
 SEED = 73_000  # of this suite alone
 SPEEDS_M_S = tuple(float(speed) for speed in range(4, 21, 2))
@@ -51,19 +50,12 @@ def tasks(quick: bool) -> list[Task]:
 
 def measure(context: TaskContext, scene: str, speed_m_s: float, seed: int) -> list[Row]:
     """Every stage's errors in every tick in which all of the ball is in view."""
-    shown = flight(
-        kind="top",
-        magnitude_rps=40.0,
-        speed_m_s=speed_m_s,
-        second_ball=scene == "two balls",
-        arm=scene == "arm",
-        seed=seed,
-    )
+    two, arm = scene == "two balls", scene == "arm"
+    shown = flight(kind="top", magnitude_rps=40.0, speed_m_s=speed_m_s, second_ball=two, arm=arm, seed=seed)
     recording = render(context, shown, seed=seed)
     about: Row = {"scene": scene, "speed_m_s": speed_m_s, "seed": seed}
-    chain = Chain(recording.source)
-    focal_px = chain.camera(context.parameters).focal_px
-    follower = HoughKalman(context.parameters.ball, focal_px)
+    chain = chain_over(recording)
+    follower = HoughKalman(context.parameters.ball, chain.camera(context.parameters).focal_px)
     rows: list[Row] = []
     for tick in chain.run(context.parameters, ("track",), forget=("surface",)):
         found = _found(tick, follower)
@@ -128,23 +120,18 @@ def _ball_state(circle: Circle | None) -> BallState | None:
     return None if circle is None else np.array([circle.x_px, circle.y_px, np.nan, np.nan, circle.radius_px])
 
 
-def _truth_at(recording: RenderedRecording, t_us: float) -> BallState | None:
+def _truth_at(recording: SimulatedRecording, t_us: float) -> BallState | None:
     """The true ball at a time; None unless all of it is in the image, and for a while on both sides."""
     truth = recording.truth
     around = np.array([t_us - ASIDE_US, t_us, t_us + ASIDE_US])
     if around[0] < truth.t_us[0] or around[2] > truth.t_us[-1]:
         return None
-    x, y, radius = (np.interp(around, truth.t_us, column) for column in _silhouette(truth))
-    if min(x.min(), y.min()) < radius.max() or x.max() > recording.width_px - radius.max():
-        return None
-    if y.max() > recording.height_px - radius.max():
+    x, y, radius = (np.interp(around, truth.t_us, column) for column in (truth.x_px, truth.y_px, truth.radius_px))
+    most = radius.max()
+    if min(x.min(), y.min()) < most or x.max() > recording.width_px - most or y.max() > recording.height_px - most:
         return None
     slope = 1e6 / (2 * ASIDE_US)
     return np.array([x[1], y[1], (x[2] - x[0]) * slope, (y[2] - y[0]) * slope, radius[1]])
-
-
-def _silhouette(truth: Truth) -> tuple[BallState, BallState, BallState]:
-    return truth.x_px, truth.y_px, truth.radius_px
 
 
 def _row(about: Row, stage: str, found: BallState | None, truth: BallState) -> Row:
@@ -154,14 +141,14 @@ def _row(about: Row, stage: str, found: BallState | None, truth: BallState) -> R
     if found is None or np.hypot(*(found[:2] - truth[:2])) > truth[4]:
         return row
     offset, motion = found[:2] - truth[:2], truth[2:4] / np.hypot(*truth[2:4])
-    row["found"] = True
-    row["centre_error_px"] = float(np.hypot(*offset))
-    row["along_px"] = float(offset @ motion)
-    row["across_px"] = float(offset[0] * -motion[1] + offset[1] * motion[0])
-    row["radius_error_px"] = float(abs(found[4] - truth[4]))
-    if not np.isnan(found[2]):
-        row["velocity_error_px_s"] = float(np.hypot(*(found[2:4] - truth[2:4])))
-    return row
+    return row | {
+        "found": True,
+        "centre_error_px": float(np.hypot(*offset)),
+        "along_px": float(offset @ motion),
+        "across_px": float(offset[0] * -motion[1] + offset[1] * motion[0]),
+        "radius_error_px": float(abs(found[4] - truth[4])),
+        "velocity_error_px_s": None if np.isnan(found[2]) else float(np.hypot(*(found[2:4] - truth[2:4]))),
+    }
 
 
 def tables(rows: Sequence[Row]) -> list[ResultTable]:
@@ -169,7 +156,7 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
     scenes, speeds = distinct(rows, "scene"), distinct(rows, "speed_m_s")
     columns = ("stage", "ticks", "found", "centre [px]", "along the motion [px]", "radius [px]", "velocity [px/s]")
     by_scene: list[tuple[Cell, ...]] = [
-        (f"paper ({scene})", "hough + kalman", None, None, paper.DETECTOR, None, None, None) for scene in scenes[:1]
+        (f"paper ({scenes[0]})", "hough + kalman", None, None, paper.DETECTOR, None, None, None)
     ]
     by_scene += [(scene, *_line(where(rows, scene=scene, stage=stage), stage)) for scene in scenes for stage in STAGES]
     by_speed = [
@@ -196,43 +183,23 @@ NOTE_OF_TWO = (
 
 
 def _line(part: Sequence[Row], stage: str) -> tuple[Cell, ...]:
-    return (
-        stage,
-        len(part),
-        share(part, lambda row: bool(row["found"])),
-        summary(part, "centre_error_px"),
-        summary(part, "along_px"),
-        summary(part, "radius_error_px"),
-        summary(part, "velocity_error_px_s") if "kalman" in stage else Summary.over([]),
-    )
+    errors = (summary(part, name) for name in ("centre_error_px", "along_px", "radius_error_px"))
+    velocity = summary(part, "velocity_error_px_s") if "kalman" in stage else Summary.over([])
+    return stage, len(part), share(part, lambda row: bool(row["found"])), *errors, velocity
 
 
-def figures(rows: Sequence[Row]) -> dict[str, Figure]:
+def figures(rows: Sequence[Row]) -> Figures:
     """Errors against the speed (the paper's figure of the detector)."""
     scenes = distinct(rows, "scene")
-    names = (
-        ("centre_error_px", "centre error [px]"),
-        ("radius_error_px", "radius error [px]"),
-        ("velocity_error_px_s", "velocity error [px/s]"),
-    )
-    figure, axes = panels(len(scenes), len(names))
-    for line, scene in enumerate(scenes):
-        for column, (name, label) in enumerate(names):
+    labels = {
+        "centre_error_px": "centre error [px]",
+        "radius_error_px": "radius error [px]",
+        "velocity_error_px_s": "velocity error [px/s]",
+    }
+    figure, axes = panels(len(scenes), len(labels))
+    for line, scene in zip(axes, scenes, strict=True):
+        for panel, (name, label) in zip(line, labels.items(), strict=True):
             for color, stage in enumerate(STAGES):
-                part = where(rows, scene=scene, stage=stage)
-                curve(axes[line, column], part, "speed_m_s", name, stage, color=color)
-            axes[line, column].set_yscale("log")
-            label_axes(axes[line, column], scene, "speed [m/s]", label)
+                curve(panel, where(rows, scene=scene, stage=stage), "speed_m_s", name, stage, color=color)
+            label_axes(panel, scene, "speed [m/s]", label, log=True)
     return {"errors": figure}
-
-
-SUITES.register(
-    Suite(
-        name="detector",
-        label="Ball detector: error against speed",
-        help="Errors of the ball's place, size and velocity against its speed (section 4.2).",
-        tasks=tasks,
-        tables=tables,
-        figures=figures,
-    )
-)

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...chain import Chain
 from ...events import EventBatch
 from ...registry import STAGES
 from ...results import Packet
-from ..estimation import COLUMNS, estimate_rows, estimated, method_line
-from ..plots import ERRORS, curve, label_axes, panels
-from ..suite import SUITES, Suite
+from ..estimation import COLUMNS, chain_over, estimate_rows, estimated, method_lines
+from ..plots import LABELS, Figures, curve, label_axes, panels
 from ..tables import Cell, ResultTable, Row, distinct, summary, where
 from ..tasks import Task, TaskContext
+from ..uncertainty_calibration import ERRORS
 from .thrower import flight_of, flights
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+LABEL = "Filters: events kept, and the spin"
+HELP = "Events that each filter keeps, and what that does to the spin (supplement)."
 
 FILTERS = ("stc", "trail", "stc_cut_trail")
 THRESHOLDS_US = (100, 200, 500, 1000, 2000, 5000, 10_000, 20_000)
@@ -54,7 +53,7 @@ def measure_kept(context: TaskContext, **flight: Any) -> list[Row]:
                 {"mode": mode, "threshold_us": threshold_us, "logo_mode": mode, "logo_threshold_us": threshold_us}
             )
             stage = STAGES["filter"]
-            state = Chain(recording.source).start(context.parameters.with_groups(filter=parameters), stage)
+            state = chain_over(recording).start(context.parameters.with_groups(filter=parameters), stage)
             passed = stage.step(parameters, state, packet).surface_events
             kept = np.isin(_keys(recording.events), _keys(passed))
             row: Row = {"question": "kept", "seed": about["seed"], "mode": mode, "threshold_us": threshold_us}
@@ -93,12 +92,13 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
         if (part := where(kept, mode=mode, threshold_us=threshold_us))
     ]
     spin = where(rows, question="spin")
-    of_spin: list[tuple[Cell, ...]] = [
-        (mode, None if mode == "off" else threshold_us, *method_line(where(part, method=method), method))
+    of_spin = [
+        line
         for mode in ("off", *FILTERS)
         for threshold_us in sorted(distinct(spin, "threshold_us"))
-        if (part := where(spin, mode=mode, threshold_us=threshold_us))
-        for method in distinct(part, "method")
+        for line in method_lines(
+            where(spin, mode=mode, threshold_us=threshold_us), mode, None if mode == "off" else threshold_us
+        )
     ]
     return [
         ResultTable(
@@ -112,7 +112,7 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
     ]
 
 
-def figures(rows: Sequence[Row]) -> dict[str, Figure]:
+def figures(rows: Sequence[Row]) -> Figures:
     """Events kept against the threshold (the supplement's figure), and the spin's errors."""
     figure, axes = panels(1, 3)
     kept, spin = where(rows, question="kept"), where(rows, question="spin")
@@ -120,24 +120,11 @@ def figures(rows: Sequence[Row]) -> dict[str, Figure]:
         for name, style in (("kept_ball", "-"), ("kept_noise", ":")):
             label = f"{mode}, {name.removeprefix('kept_')}"
             curve(axes[0, 0], where(kept, mode=mode), "threshold_us", name, label, style, color)
-        for column, (name, _) in enumerate(ERRORS, start=1):
+        for panel, name in zip(axes[0, 1:], ERRORS, strict=True):
             for method, style in (("contrast", "-"), ("triplet", "--")):
                 part = where(spin, mode=mode, method=method)
-                curve(axes[0, column], part, "threshold_us", name, f"{mode}, {method}", style, color, band=False)
-            axes[0, column].set_yscale("log")
-    for column, label in enumerate(("share of events kept", *(label for _, label in ERRORS))):
-        axes[0, column].set_xscale("log")
-        label_axes(axes[0, column], "flying ball", "threshold [us]", label)
+                curve(panel, part, "threshold_us", name, f"{mode}, {method}", style, color, band=False)
+    for panel, label in zip(axes[0], ("share of events kept", *LABELS), strict=True):
+        panel.set_xscale("log")
+        label_axes(panel, "flying ball", "threshold [us]", label, log=label in LABELS)
     return {"thresholds": figure}
-
-
-SUITES.register(
-    Suite(
-        name="filters",
-        label="Filters: events kept, and the spin",
-        help="Events that each filter keeps, and what that does to the spin (supplement).",
-        tasks=tasks,
-        tables=tables,
-        figures=figures,
-    )
-)

@@ -6,14 +6,16 @@ from collections.abc import Sequence
 
 from ...simulator import thrown
 from .. import paper
-from ..estimation import COLUMNS, method_line, spin_errors
+from ..estimation import COLUMNS, method_lines, spin_errors
 from ..frame_camera import FrameCamera, frames
 from ..frame_matching import spin_from_frames
 from ..plots import flight_figure
-from ..suite import SUITES, Suite
-from ..tables import Cell, ResultTable, Row, distinct, where
+from ..tables import Cell, ResultTable, Row
 from ..tasks import Task, TaskContext
 from . import thrower
+
+LABEL = "Frame camera against event camera: the paper's table 2"
+HELP = "A frame camera beside the event camera on the same flights (table 2)."
 
 FRAME = "frame"  # the rival among the methods
 # What the rival's results depend on: nothing of the event camera's pipeline.
@@ -47,20 +49,13 @@ def measure(context: TaskContext, velocity: int, spin: int, side: bool, seed: in
 
 def tables(rows: Sequence[Row]) -> list[ResultTable]:
     """Frame against event as in table 2, and by spin."""
-    methods = sorted(distinct(rows, "method"), key=lambda method: method != FRAME)
-    lines: list[tuple[Cell, ...]] = [
-        (f"paper, {name}", None, success, None, magnitude, axis)
-        for name, (success, magnitude, axis) in paper.TABLE_2.items()
-    ]
-    lines += [method_line(where(rows, method=method), method) for method in methods]
+    rows = sorted(rows, key=lambda row: row["method"] != FRAME)
     by_spin: list[tuple[Cell, ...]] = []
     for low, high in BINS_RPS:
         part = [row for row in rows if isinstance(row["rps"], float) and low <= row["rps"] < high]
-        by_spin += [
-            (f"{low} to {high}", *method_line(where(part, method=m), m)) for m in methods if where(part, method=m)
-        ]
+        by_spin += method_lines(part, f"{low} to {high}")
     return [
-        ResultTable("Frame against event: flying balls", COLUMNS, lines, NOTE),
+        ResultTable("Frame against event: flying balls", COLUMNS, [*paper.TABLE_2, *method_lines(rows)], NOTE),
         ResultTable("Frame against event by spin", ("spin [rps]", *COLUMNS), by_spin),
     ]
 
@@ -72,14 +67,4 @@ NOTE = (
     "where Tebbe's matches the logo of neighbouring frames."
 )
 
-
-SUITES.register(
-    Suite(
-        name="frames",
-        label="Frame camera against event camera: the paper's table 2",
-        help="A frame camera beside the event camera on the same flights (table 2).",
-        tasks=tasks,
-        tables=tables,
-        figures=flight_figure,
-    )
-)
+figures = flight_figure

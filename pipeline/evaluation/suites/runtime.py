@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ...chain import Chain
 from ...registry import STAGES as REGISTERED
 from .. import paper
-from ..plots import label_axes, panels
-from ..suite import SUITES, Suite
+from ..estimation import chain_over
+from ..plots import Figures, label_axes, panels
 from ..tables import Cell, ResultTable, Row, distinct, summary, where
 from ..tasks import Task, TaskContext
 from .thrower import flight_of, flights
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+LABEL = "Run times"
+HELP = "Latency up to the logo's events, and processing time over recording time (section 4.4)."
+TIMED = True  # its tasks measure run times
 
 # The paper's "from the moment the events are received": up to the logo's events; the rest is spin estimation.
 STAGES = REGISTERED.names
@@ -39,15 +39,14 @@ def measure(context: TaskContext, tick_us: int, **flight: Any) -> list[Row]:
     """Milliseconds of every stage in every tick, the kernels being loaded before."""
     recording, about = flight_of(context, **flight)
     parameters = context.parameters.with_values({"track": {"tick_us": tick_us}})
-    for _ in Chain(recording.source).run(parameters, forget=STAGES):
+    for _ in chain_over(recording).run(parameters, forget=STAGES):
         pass
-    chain = Chain(recording.source, clock=time.thread_time)  # other work of the machine does not count
+    chain = chain_over(recording, clock=time.thread_time)  # other work of the machine does not count
     rows: list[Row] = []
     before = dict.fromkeys(STAGES, 0.0)
     for tick in chain.run(parameters, forget=STAGES):
         taken_ms = {name: (chain.seconds[name] - before[name]) * 1e3 for name in STAGES}
         before = dict(chain.seconds)
-        latency_ms = sum(taken_ms[name] for name in LATENCY_STAGES)
         row: Row = {
             "tick_us": tick_us,
             "seed": about["seed"],
@@ -55,7 +54,7 @@ def measure(context: TaskContext, tick_us: int, **flight: Any) -> list[Row]:
             "tick_ms": (tick.packet.end_us - tick.packet.start_us) / 1e3,
             "events": len(tick.packet.events),
             "has_ball": tick.track.has_ball,
-            "latency_ms": latency_ms,
+            "latency_ms": sum(taken_ms[name] for name in LATENCY_STAGES),
         }
         rows.append(row | {f"{name}_ms": value for name, value in taken_ms.items()})
     return rows
@@ -70,16 +69,10 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
     for tick_us in lengths:
         part = where(rows, tick_us=tick_us)
         flown = where(part, has_ball=True)
+        most_ms = max((row["latency_ms"] for row in flown if isinstance(row["latency_ms"], float)), default=None)
         flights = [_of_recording(where(part, seed=seed)) for seed in distinct(part, "seed")]
-        totals.append(
-            (
-                f"{tick_us} us",
-                len(part),
-                summary(flown, "latency_ms"),
-                max((row["latency_ms"] for row in flown if isinstance(row["latency_ms"], float)), default=None),
-                *(summary(flights, name) for name in ("spin_share", "contrast_share", "all_share")),
-            )
-        )
+        shares = (summary(flights, f"{what}_share") for what in SHARES)
+        totals.append((f"{tick_us} us", len(part), summary(flown, "latency_ms"), most_ms, *shares))
     stages: list[tuple[Cell, ...]] = [
         (f"{tick_us} us", name, summary(where(rows, tick_us=tick_us, has_ball=True), f"{name}_ms"))
         for tick_us in lengths
@@ -113,7 +106,7 @@ def _of_recording(rows: Sequence[Row]) -> Row:
     }
 
 
-def figures(rows: Sequence[Row]) -> dict[str, Figure]:
+def figures(rows: Sequence[Row]) -> Figures:
     """The latency's distribution, and its parts."""
     lengths = sorted(distinct(rows, "tick_us"), reverse=True)
     figure, axes = panels(1, 2)
@@ -131,16 +124,3 @@ def figures(rows: Sequence[Row]) -> dict[str, Figure]:
     label_axes(axes[0, 0], "events to logo", "latency [ms]", "share of ticks")
     label_axes(axes[0, 1], "stages, ticks with a ball", "tick", "mean time [ms]")
     return {"times": figure}
-
-
-SUITES.register(
-    Suite(
-        name="runtime",
-        label="Run times",
-        help="Latency up to the logo's events, and processing time over recording time (section 4.4).",
-        tasks=tasks,
-        tables=tables,
-        figures=figures,
-        timed=True,
-    )
-)

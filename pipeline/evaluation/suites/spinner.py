@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...results import Truth
 from ...simulator import spinner
 from .. import paper
-from ..estimation import COLUMNS, estimate_rows, estimated, logo_events, method_line
-from ..plots import ERRORS, coverage_figure, curve, label_axes, method_colors, panels
+from ..estimation import COLUMNS, estimate_rows, estimated, logo_events, method_lines
+from ..plots import LABELS, Figures, coverage_figure, curve, label_axes, method_colors, panels
 from ..rendering import render
-from ..suite import SUITES, Suite
 from ..tables import Cell, ResultTable, Row, distinct, summary, where
 from ..tasks import Task, TaskContext
-from ..uncertainty_calibration import Goal, calibration_table, goals, refusals
+from ..uncertainty_calibration import ERRORS, Goal, calibration_table, goals, refusals
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+LABEL = "Ball spinner: the paper's table 1"
+HELP = "Spin of a mounted ball: 7 logos, 10 to 100 rps, windows of 10 and 100 ms (table 1)."
 
 SEED = 71_000  # of this suite alone
 CENTRE_STD_PX = 0.3  # how well the place of a mounted ball is known, for centre and radius
@@ -34,12 +33,8 @@ def tasks(quick: bool) -> list[Task]:
     if quick:
         chosen = [(1, "top", 50.0), (2, "side", 50.0), (4, "back", 80.0)]
     else:
-        chosen = [
-            (ball, kind, 10.0 * step)
-            for ball in range(1, 8)
-            for kind in ("top", "back", "side")
-            for step in range(1, 11)
-        ]
+        steps = [10.0 * step for step in range(1, 11)]
+        chosen = list(itertools.product(range(1, 8), ("top", "back", "side"), steps))
     return [
         Task(measure, {"ball": ball, "kind": kind, "rps": rps, "seed": SEED + number})
         for number, (ball, kind, rps) in enumerate(chosen)
@@ -92,12 +87,7 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
         ResultTable(
             "All balls together",
             ("window", "spin", *COLUMNS),
-            [
-                (f"{window_ms} ms", group, *method_line(part, method))
-                for window_ms, group, part_of_group in _groups(rows)
-                for method in methods
-                if (part := where(part_of_group, method=method))
-            ],
+            [line for ms, group, part in _groups(rows) for line in method_lines(part, f"{ms} ms", group)],
             "Success counts answers over recordings; 'of those with logo' leaves out windows with fewer than 1,000 "
             "(100 ms) or 100 (10 ms) logo events.",
         ),
@@ -156,30 +146,17 @@ def _table_1(rows: Sequence[Row], column: str | None, title: str, of_paper: int 
     return ResultTable(title, ("window", "spin", "method", *(f"ball {ball}" for ball in balls)), lines)
 
 
-def figures(rows: Sequence[Row]) -> dict[str, Figure]:
+def figures(rows: Sequence[Row]) -> Figures:
     """Errors against rps (the paper's figure): top/back with balls 1, 6, 7, side with 2, 3, 4."""
     windows = sorted(distinct(rows, "window_ms"))
     figure, axes = panels(2, len(windows))
     chosen = [row for row in rows if row["ball"] in ((2, 3, 4) if group_of(row) == "side" else (1, 6, 7))]
-    for column, window_ms in enumerate(windows):
-        for line, (name, label) in enumerate(ERRORS):
+    for line, name, label in zip(axes, ERRORS, LABELS, strict=True):
+        for panel, window_ms in zip(line, windows, strict=True):
             for group, style in (("top/back", "-"), ("side", "--")):
                 for color, method in method_colors(rows):
                     part = [r for r in where(chosen, window_ms=window_ms, method=method) if group_of(r) == group]
-                    curve(axes[line, column], part, "rps", name, f"{method}, {group}", style, color)
-            axes[line, column].set_yscale("log")
-            label_axes(axes[line, column], f"ball spinner, {window_ms} ms", "spin [rps]", label)
+                    curve(panel, part, "rps", name, f"{method}, {group}", style, color)
+            label_axes(panel, f"ball spinner, {window_ms} ms", "spin [rps]", label, log=True)
     groups = [(f"ball spinner, {window_ms} ms", where(rows, window_ms=window_ms)) for window_ms in windows]
     return {"errors": figure, "coverage": coverage_figure(groups)}
-
-
-SUITES.register(
-    Suite(
-        name="spinner",
-        label="Ball spinner: the paper's table 1",
-        help="Spin of a mounted ball: 7 logos, 10 to 100 rps, windows of 10 and 100 ms (table 1).",
-        tasks=tasks,
-        tables=tables,
-        figures=figures,
-    )
-)

@@ -7,23 +7,22 @@ that people play.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ...simulator import human_shot, thrown
+from ...simulator import SimulatedRecording, human_shot, thrown
 from ...simulator.thrower import THROWER_BACKTOP_RPS, THROWER_SIDE_RPS, THROWER_SPEED_M_S
 from .. import paper
-from ..estimation import COLUMNS, estimate_rows, estimated, logo_events, longest, method_line
-from ..plots import coverage_figure, flight_figure
-from ..rendering import RenderedRecording, render
-from ..suite import SUITES, Suite
-from ..tables import Cell, ResultTable, Row, distinct, where
+from ..estimation import COLUMNS, estimate_rows, estimated, logo_events, longest, method_lines
+from ..plots import Figures, coverage_figure, flight_figure
+from ..rendering import render
+from ..tables import ResultTable, Row, distinct, where
 from ..tasks import Task, TaskContext
 from ..uncertainty_calibration import Goal, calibration_table, goals, refusals
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+LABEL = "Ball thrower: the paper's table 2"
+HELP = "Spin of flying balls: the thrower's settings and shots as people play them (table 2)."
 
 SEED = 72_000  # of this suite alone
 HUMAN_SEED = 72_500
@@ -70,25 +69,15 @@ def measure_human(context: TaskContext, seed: int) -> list[Row]:
     return _measured(context, recording, about | _visibility(recording))
 
 
-def _measured(context: TaskContext, recording: RenderedRecording, about: Row) -> list[Row]:
+def _measured(context: TaskContext, recording: SimulatedRecording, about: Row) -> list[Row]:
     result = estimated(recording, context.parameters)
     shot = longest(result)
     about["tracked_ms"] = 0.0 if shot is None else (shot.end_us - shot.start_us) / 1000
     return estimate_rows(result, recording.truth, about)
 
 
-def flight_of(context: TaskContext, velocity: int, spin: int, side: bool, seed: int) -> tuple[RenderedRecording, Row]:
-    """The recording of a flight, and the columns that tell flights apart.
-
-    Parameters
-    ----------
-    context : TaskContext
-    velocity, spin : int
-        Settings of the thrower.
-    side : bool
-        Whether it gives sidespin rather than back- or topspin.
-    seed : int
-    """
+def flight_of(context: TaskContext, velocity: int, spin: int, side: bool, seed: int) -> tuple[SimulatedRecording, Row]:
+    """The recording of a flight at these settings of the thrower, and the columns that tell flights apart."""
     recording = render(context, thrown(velocity, spin, side=side, seed=seed), seed=seed)
     about: Row = {
         "velocity_setting": velocity,
@@ -102,7 +91,7 @@ def flight_of(context: TaskContext, velocity: int, spin: int, side: bool, seed: 
     return recording, about | _visibility(recording)
 
 
-def _visibility(recording: RenderedRecording) -> Row:
+def _visibility(recording: SimulatedRecording) -> Row:
     seen = logo_events(recording)
     return {"duration_ms": recording.duration_us / 1000, "logo_events": seen, "visible": seen >= VISIBLE}
 
@@ -112,18 +101,14 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
     methods = distinct(rows, "method")
     human, both, rows = where(rows, by=HUMAN), rows, where(rows, by=THROWER)
     players = [(who, part) for who in (THROWER, HUMAN) if (part := where(both, by=who))]
-    lines: list[tuple[Cell, ...]] = []
-    for name, (success, magnitude, axis) in paper.TABLE_2.items():
-        lines.append((f"paper, {name}", None, success, None, magnitude, axis))
-    lines += [method_line(where(rows, method=method), method) for method in methods]
     return [
-        ResultTable("Table 2: flying balls", COLUMNS, lines, NOTE),
+        ResultTable("Table 2: flying balls", COLUMNS, [*paper.TABLE_2, *method_lines(rows)], NOTE),
         _by(rows, "speed [m/s]", "speed_m_s", {speed: str(speed) for speed in THROWER_SPEED_M_S.values()}),
         _by(rows, "spin", "side", {True: "side", False: "top/back"}),
         ResultTable(
             "Flying balls as people play them",
             COLUMNS,
-            [method_line(where(human, method=method), method) for method in methods],
+            method_lines(human),
             "Log-normal speeds and spins with the published quantiles: spin median 46, 95 % below 120 rps; speed "
             "median 9, 95 % below 20 m/s; top, back and mixed.",
         ),
@@ -142,10 +127,8 @@ def _goals(own: Sequence[Row]) -> ResultTable:
         ("people", where(own, by=HUMAN)),
         ("all flights", own),
     ):
-        asked.append(Goal(what, part, answered=0.81, rps=1.0, deg=5.0, gross=0.02))
-        asked.append(
-            Goal(f"{what}, logo visible", where(part, visible=True), answered=0.9, rps=1.0, deg=5.0, gross=0.02)
-        )
+        for name, some, answered in ((what, part, 0.81), (f"{what}, logo visible", where(part, visible=True), 0.9)):
+            asked.append(Goal(name, some, answered=answered, rps=1.0, deg=5.0, gross=0.02))
     asked.append(Goal("logo never seen", where(own, logo_events=0), answered=0.0, refuse=True))
     return goals("`contrast` beside its goals", asked, "Mean absolute errors of the answers.")
 
@@ -158,25 +141,10 @@ NOTE = (
 
 def _by(rows: Sequence[Row], header: str, column: str, labels: Mapping[Any, str]) -> ResultTable:
     """The methods' lines apart by one column."""
-    lines: list[tuple[Cell, ...]] = []
-    for value, label in labels.items():
-        part = where(rows, **{column: value})
-        lines += [(label, *method_line(where(part, method=m), m)) for m in distinct(part, "method")]
+    lines = [line for value, label in labels.items() for line in method_lines(where(rows, **{column: value}), label)]
     return ResultTable(f"Flying balls by {header}", (header, *COLUMNS), lines)
 
 
-def figures(rows: Sequence[Row]) -> dict[str, Figure]:
+def figures(rows: Sequence[Row]) -> Figures:
     """The paper's figure of the thrower's flights, and error against coverage of all flights."""
     return flight_figure(where(rows, by=THROWER)) | {"coverage": coverage_figure([("flying balls", rows)])}
-
-
-SUITES.register(
-    Suite(
-        name="thrower",
-        label="Ball thrower: the paper's table 2",
-        help="Spin of flying balls: the thrower's settings and shots as people play them (table 2).",
-        tasks=tasks,
-        tables=tables,
-        figures=figures,
-    )
-)
