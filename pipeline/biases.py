@@ -2,7 +2,7 @@
 
 The biases are offsets from the factory setting (0). The maker publishes their direction and their range, not
 what they are in per cent, hertz or microseconds. `CURVES` is therefore a model: monotone, in one place,
-marked as not calibrated, to be replaced by one's own measurements (`physical(biases, curves=...)`).
+marked as not calibrated, to be replaced by one's own measurements (`SensorModel.of(biases, curves)`).
 """
 
 from __future__ import annotations
@@ -42,161 +42,61 @@ class BiasCurve:
     ----------
     bias : str
         Field of BiasParameters.
-    unit : str
-        Unit of the quantity.
     points : tuple of (float, float)
         Bias value, rising over the whole range, and quantity > 0, monotone. A quantity may be 0 at one end; then it is
         interpolated itself.
-    source : str
-        Origin of the points.
     calibrated : bool
-        Whether they were measured.
+        Whether the points were measured.
     """
 
     bias: str
-    unit: str
     points: tuple[tuple[float, float], ...]
-    source: str
     calibrated: bool = False
 
     def at(self, value: float) -> float:
         """Interpolate the quantity at a bias value; outside the points it is that of the nearest end."""
-        bias = np.array([point[0] for point in self.points])
-        quantity = np.array([point[1] for point in self.points])
+        bias, quantity = np.array(self.points).T
         if not np.all(quantity > 0):  # a quantity that can be switched off goes linearly
             return float(np.interp(value, bias, quantity))
         return float(np.exp(np.interp(value, bias, np.log(quantity))))
 
 
-_MODEL = "model, not calibrated: "
-
+# Quantities by name, with the reasons for the model's points; factors are on the noise rate, 1 at the paper's biases.
 CURVES: Mapping[str, BiasCurve] = MappingProxyType(
     {
-        "threshold_on": BiasCurve(
-            "diff_on",
-            "log intensity",
-            ((-85, 0.10), (0, 0.19), (40, 0.27), (60, 0.33), (140, 0.62)),
-            _MODEL + "25 % nominal contrast (log 0.22) near the factory setting, the supplement's ball keeps its "
-            "outline and loses most of the logo at 140",
-        ),
+        # 25 % nominal contrast (log 0.22) near the factory setting; the supplement's ball keeps its outline and loses
+        # most of the logo at 140.
+        "threshold_on": BiasCurve("diff_on", ((-85, 0.10), (0, 0.19), (40, 0.27), (60, 0.33), (140, 0.62))),
+        # As threshold_on from 0 to 60; steeper above, where the supplement sees the ball's ON and OFF events part
+        # (which of them gets rarer is our choice).
         "threshold_off": BiasCurve(
-            "diff_off",
-            "log intensity",
-            ((-35, 0.14), (0, 0.19), (40, 0.27), (60, 0.33), (90, 0.55), (140, 1.50), (190, 1.90)),
-            _MODEL + "as threshold_on from 0 to 60; steeper above, where the supplement sees the ball's ON and OFF "
-            "events part (which of them gets rarer is our choice)",
+            "diff_off", ((-35, 0.14), (0, 0.19), (40, 0.27), (60, 0.33), (90, 0.55), (140, 1.50), (190, 1.90))
         ),
-        "cutoff_hz": BiasCurve(
-            "fo",
-            "Hz",
-            ((-35, 60.0), (-20, 120.0), (-10, 400.0), (0, 3000.0), (55, 8000.0)),
-            _MODEL + "the supplement: only values below 0 change the ball's event rate, there late events of the "
-            "edge lie inside the ball; the lowest setting is in use against lamps that flicker with 100 Hz",
-        ),
-        "highpass_hz": BiasCurve(
-            "hpf",
-            "Hz",
-            ((0, 0.0), (20, 5.0), (60, 40.0), (120, 300.0)),
-            _MODEL + "0 filters nothing that matters (supplement), above it slow motion fades first",
-        ),
-        "refractory_us": BiasCurve(
-            "refr",
-            "us",
-            ((-20, 900.0), (0, 450.0), (80, 150.0), (120, 90.0), (235, 20.0)),
-            _MODEL + "the supplement: at 80 a pixel is free again when a 6,000 px/s edge has left it (170 us)",
-        ),
-        "noise_on_factor": BiasCurve(
-            "diff_on",
-            "1",
-            ((-85, 300.0), (0, 6.0), (40, 1.0), (140, 0.15)),
-            _MODEL + "the supplement: noise falls steeply to an acceptable level at 40, little above",
-        ),
-        "noise_off_factor": BiasCurve(
-            "diff_off",
-            "1",
-            ((-35, 40.0), (0, 6.0), (40, 1.0), (190, 0.1)),
-            _MODEL + "as noise_on_factor",
-        ),
-        "noise_bandwidth_factor": BiasCurve(
-            "fo",
-            "1",
-            ((-35, 0.3), (0, 0.9), (55, 1.0)),
-            _MODEL + "a lower cut-off lets less noise through; flat above 0 (supplement)",
-        ),
-        "noise_highpass_factor": BiasCurve(
-            "hpf",
-            "1",
-            ((0, 1.0), (60, 0.4), (120, 0.1)),
-            _MODEL + "a high-pass takes slow noise and leak away",
-        ),
-        "noise_refractory_factor": BiasCurve(
-            "refr",
-            "1",
-            ((-20, 0.6), (0, 0.75), (80, 1.0), (120, 1.6), (235, 6.0)),
-            _MODEL + "the supplement: noise keeps rising above 80, ON more than OFF",
-        ),
+        # The supplement: only values below 0 change the ball's event rate, there late events of the edge lie inside
+        # the ball; the lowest setting is in use against lamps that flicker with 100 Hz.
+        "cutoff_hz": BiasCurve("fo", ((-35, 60.0), (-20, 120.0), (-10, 400.0), (0, 3000.0), (55, 8000.0))),
+        # 0 filters nothing that matters (supplement), above it slow motion fades first.
+        "highpass_hz": BiasCurve("hpf", ((0, 0.0), (20, 5.0), (60, 40.0), (120, 300.0))),
+        # The supplement: at 80 a pixel is free again when a 6,000 px/s edge has left it (170 us).
+        "refractory_us": BiasCurve("refr", ((-20, 900.0), (0, 450.0), (80, 150.0), (120, 90.0), (235, 20.0))),
+        # The supplement: noise falls steeply to an acceptable level at 40, little above.
+        "noise_on_factor": BiasCurve("diff_on", ((-85, 300.0), (0, 6.0), (40, 1.0), (140, 0.15))),
+        "noise_off_factor": BiasCurve("diff_off", ((-35, 40.0), (0, 6.0), (40, 1.0), (190, 0.1))),
+        # A lower cut-off lets less noise through; flat above 0 (supplement).
+        "noise_bandwidth_factor": BiasCurve("fo", ((-35, 0.3), (0, 0.9), (55, 1.0))),
+        # A high-pass takes slow noise and leak away.
+        "noise_highpass_factor": BiasCurve("hpf", ((0, 1.0), (60, 0.4), (120, 0.1))),
+        # The supplement: noise keeps rising above 80, ON more than OFF.
+        "noise_refractory_factor": BiasCurve("refr", ((-20, 0.6), (0, 0.75), (80, 1.0), (120, 1.6), (235, 6.0))),
     }
 )
-
-
-@dataclass(frozen=True, slots=True)
-class PixelPhysics:
-    """Pixel model in physical units.
-
-    Attributes
-    ----------
-    threshold_on, threshold_off : float
-        Contrast thresholds in log intensity.
-    cutoff_hz, highpass_hz : float
-        Cut-off frequencies of the low-pass and the high-pass filter.
-    refractory_us : float
-        Dead time after an event.
-    noise_on, noise_off : float
-        Factors on the noise rate, 1 at the paper's biases.
-    """
-
-    threshold_on: float
-    threshold_off: float
-    cutoff_hz: float
-    highpass_hz: float
-    refractory_us: float
-    noise_on: float
-    noise_off: float
-
-
-def physical(biases: BiasParameters, curves: Mapping[str, BiasCurve] = CURVES) -> PixelPhysics:
-    """Evaluate the pixel model at the given biases.
-
-    Parameters
-    ----------
-    biases : BiasParameters
-        Bias values.
-    curves : mapping of str to BiasCurve
-        Curves of all quantities; one's own measurements in place of the model.
-    """
-    value = {name: curve.at(getattr(biases, curve.bias)) for name, curve in curves.items()}
-    common = value["noise_bandwidth_factor"] * value["noise_highpass_factor"]
-    refractory = value["noise_refractory_factor"]
-    return PixelPhysics(
-        value["threshold_on"],
-        value["threshold_off"],
-        value["cutoff_hz"],
-        value["highpass_hz"],
-        value["refractory_us"],
-        value["noise_on_factor"] * common * refractory,
-        value["noise_off_factor"] * common * np.sqrt(refractory),
-    )
 
 
 def read_biases(path: Path | str) -> BiasParameters:
     """Read a `.bias` file: one `value % bias_name` a line, empty lines allowed; a missing bias counts as 0.
 
-    Raises
-    ------
-    RecordingError
-        The file cannot be read or a line is of another form.
-    ParameterError
-        A bias is unknown or out of range.
+    Raises RecordingError for a file that cannot be read or of another form, ParameterError for a bias that is unknown
+    or out of range.
     """
     try:
         text = Path(path).read_text(encoding="utf-8")

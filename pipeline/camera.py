@@ -35,12 +35,7 @@ class CameraParameters(ParameterGroup):
         (0.0, 0.0, 0.0, 0.0, 0.0), -100.0, 100.0, 0.01, "", "OpenCV's lens distortion k1, k2, p1, p2, k3"
     )
     up: tuple[float, ...] = tunable(
-        (0.0, 0.0, -1.0),
-        -1.0,
-        1.0,
-        0.1,
-        "",
-        "up in the camera frame; (0, 0, -1) for a camera that looks down",
+        (0.0, 0.0, -1.0), -1.0, 1.0, 0.1, "", "up in the camera frame; (0, 0, -1) for a camera that looks down"
     )
 
 

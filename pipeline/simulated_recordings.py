@@ -9,8 +9,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from .biases import PAPER, BiasParameters
 from .camera import Camera, CameraParameters
 from .errors import ParameterError, RecordingError
@@ -30,7 +28,6 @@ from .simulator import (
     spinner,
 )
 from .simulator.flights import FLIGHT_KINDS
-from .simulator.sensor import LOGO
 
 Progress = Callable[[float, str], None]  # share done (0..1) and what is being done
 
@@ -70,36 +67,20 @@ class SceneParameters(ParameterGroup):
     focal_length_mm: float = tunable(8.0, 0.5, 1000.0, 0.1, "mm", "focal length of the lens")
 
 
-ALWAYS = {"seed", "background", "texture", "light_lux", "flicker_depth", "flicker_hz"}
-ALWAYS |= {"radius_mm", "width_px", "height_px", "focal_length_mm", "duration_ms", "magnitude_rps"}
-USED = {
-    "spinner": ALWAYS | {"spin", "ball"},
-    "flight": ALWAYS | {"spin", "ball", "speed_m_s", "heading_deg", "spin_decay_hz", "second_ball", "arm", "bounce"},
-    "rally": ALWAYS | {"speed_m_s", "shots", "arm"},
+# Options that do not belong to every kind of scene.
+OWN = {
+    "spinner": ("spin", "ball"),
+    "flight": ("spin", "ball", "speed_m_s", "heading_deg", "spin_decay_hz", "second_ball", "arm", "bounce"),
+    "rally": ("speed_m_s", "shots", "arm"),
 }
 
 
 @dataclass(frozen=True, slots=True)
 class WrittenSimulation:
-    """A simulated recording on disk.
-
-    Attributes
-    ----------
-    path : Path
-    events, logo_events : int
-        Number of all events and of the logo's.
-    duration_us : int
-    spin_rps : tuple of float or None
-        Spin (x, y, z) of the first ball at its first appearance, camera frame; None where it never appears.
-    warnings : list of str
-        Parts of the simulation that the format does not hold.
-    """
+    """A simulated recording on disk, and in words what the format does not hold of it."""
 
     path: Path
-    events: int
-    logo_events: int
-    duration_us: int
-    spin_rps: tuple[float, float, float] | None
+    recording: SimulatedRecording
     warnings: list[str]
 
 
@@ -148,16 +129,16 @@ def simulate(
         raise ParameterError(f"{kind!r} cannot be simulated: there are {', '.join(KINDS)}")
     given = {name: value for name, value in options.items() if value is not None}
     chosen = SceneParameters().with_values(given)
+    foreign = {name for own in OWN.values() for name in own} - set(OWN[kind])
     for name in given:
-        if name not in USED[kind] and given[name] != SceneParameters.tunables()[name].default:
+        if name in foreign and given[name] != SceneParameters.tunables()[name].default:
             raise ParameterError(f"{name} does not belong to a {kind}: leave it out")
     optics = CameraParameters(focal_length_mm=chosen.focal_length_mm)
     camera = Camera.of(optics, chosen.width_px, chosen.height_px)
     scene = _scene(kind, chosen, spin_rps, logo, camera)
     scene = replace(scene, balls=tuple(replace(ball, radius_m=chosen.radius_mm * 1e-3) for ball in scene.balls))
-    return simulate_scene(
-        scene, camera=camera, sensor=biases or PAPER, seed=chosen.seed, progress=_simulating(on_progress)
-    )
+    progress = _simulating(on_progress)
+    return simulate_scene(scene, camera=camera, sensor=biases or PAPER, seed=chosen.seed, progress=progress)
 
 
 def simulate_to_file(kind: str, out: Path, **options: Any) -> WrittenSimulation:
@@ -167,11 +148,7 @@ def simulate_to_file(kind: str, out: Path, **options: Any) -> WrittenSimulation:
 
 
 def simulate_again_to_file(
-    recording: Path,
-    out: Path,
-    *,
-    biases: BiasParameters | None = None,
-    on_progress: Progress | None = None,
+    recording: Path, out: Path, *, biases: BiasParameters | None = None, on_progress: Progress | None = None
 ) -> WrittenSimulation:
     """Simulate the scene of a simulated recording again, with other biases if given, and write it.
 
@@ -215,27 +192,14 @@ def write_simulation(made: SimulatedRecording, out: Path) -> WrittenSimulation:
     The file appears only when complete. Raises RecordingError.
     """
     _check_writable(out)
-    recording, warnings = in_memory(made), []
     keeps_truth = format_to_write(out).keeps_truth
-    if not keeps_truth:
-        warnings.append(f"{out.suffix.lower()} holds no truth and no scene: write .h5 to keep them")
+    attributes = in_memory(made).attributes if keeps_truth else None
     write_recording(
-        out,
-        made.events,
-        width_px=made.width_px,
-        height_px=made.height_px,
-        attributes=recording.attributes if keeps_truth else None,
-        truth=made.truth,
+        out, made.events, width_px=made.width_px, height_px=made.height_px, attributes=attributes, truth=made.truth
     )
-    spin = made.truth.spin_rps[0].tolist() if made.truth.t_us.size else None
-    return WrittenSimulation(
-        path=out,
-        events=len(made.events),
-        logo_events=int(np.count_nonzero(made.truth.label == LOGO)),
-        duration_us=round(made.scene.duration_s * 1e6),
-        spin_rps=None if spin is None else (spin[0], spin[1], spin[2]),
-        warnings=warnings,
-    )
+    warning = f"{out.suffix.lower()} holds no truth and no scene: write .h5 to keep them"
+    warnings = [] if keeps_truth else [warning]
+    return WrittenSimulation(out, made, warnings)
 
 
 def _simulating(on_progress: Progress | None) -> Callable[[float], None] | None:
@@ -249,50 +213,31 @@ def _check_writable(out: Path) -> None:
 
 
 def _scene(kind: str, chosen: SceneParameters, spin_rps: Sequence[float] | None, logo: str, camera: Camera) -> Scene:
-    """The scene of these choices."""
+    """The scene of these choices; what is not given is left to the function that makes it."""
     plain = {"auto": kind == "spinner", "plain": True, "table": False}[str(chosen.background)]
-    values: dict[str, Any] = {
-        "seed": chosen.seed,
-        "logo": logo,
-        "background": Background(kind="plain" if plain else "table", contrast=chosen.texture),
-        "light": Light(
-            illuminance_lux=chosen.light_lux, flicker_depth=chosen.flicker_depth, flicker_hz=chosen.flicker_hz
-        ),
-    }
+    light = Light(illuminance_lux=chosen.light_lux, flicker_depth=chosen.flicker_depth, flicker_hz=chosen.flicker_hz)
+    background = Background(kind="plain" if plain else "table", contrast=chosen.texture)
+    options: dict[str, Any] = {"seed": chosen.seed, "logo": logo, "background": background, "light": light}
+    given = {name: getattr(chosen, name) for name in ("magnitude_rps", *OWN[kind])}
+    options |= {name: value for name, value in given.items() if value is not None}
     if kind == "rally":
         if spin_rps is not None:
             raise ParameterError("spin_rps does not belong to a rally: its shots have spins of their own")
-        for name in ("speed_m_s", "magnitude_rps"):
-            if (value := getattr(chosen, name)) is not None:
-                values[name] = (value, value)
+        for name in options.keys() & {"speed_m_s", "magnitude_rps"}:
+            options[name] = (options[name], options[name])
         if chosen.duration_ms is not None:
-            values["duration_s"] = chosen.duration_ms * 1e-3
-        return rally(shots=chosen.shots, arm=chosen.arm, camera=camera, **values)
-    values["kind"] = chosen.spin
-    values["spin_rps"] = _spin(spin_rps)
-    if chosen.magnitude_rps is not None:
-        values["magnitude_rps"] = chosen.magnitude_rps
-    if chosen.ball is not None:
-        values["ball"] = int(chosen.ball)
-    if kind == "spinner":
-        return spinner(duration_ms=chosen.duration_ms or 100.0, **values)
-    for name in ("speed_m_s", "heading_deg"):
-        if (value := getattr(chosen, name)) is not None:
-            values[name] = value
-    for name in ("spin_decay_hz", "second_ball", "arm", "bounce"):
-        values[name] = getattr(chosen, name)
-    scene = flight(camera=camera, **values)
-    if chosen.duration_ms is None:
-        return scene
-    return replace(scene, duration_s=min(scene.duration_s, chosen.duration_ms * 1e-3))
-
-
-def _spin(spin_rps: Sequence[float] | None) -> Sequence[float] | None:
-    if spin_rps is None:
-        return None
-    size = math.hypot(*spin_rps)
-    if not size <= MAX_SPIN_RPS:  # not a number fails here too
+            options["duration_s"] = chosen.duration_ms * 1e-3
+        return rally(camera=camera, **options)
+    if spin_rps is not None and not (size := math.hypot(*spin_rps)) <= MAX_SPIN_RPS:  # not a number fails here too
         raise ParameterError(
             f"spin of {size:g} rps is out of range: the simulator's time step allows {MAX_SPIN_RPS:g} rps"
         )
-    return spin_rps
+    options |= {"kind": options.pop("spin"), "spin_rps": spin_rps}
+    if chosen.ball is not None:
+        options["ball"] = int(chosen.ball)
+    if kind == "spinner":
+        return spinner(duration_ms=chosen.duration_ms or 100.0, **options)
+    scene = flight(camera=camera, **options)
+    if chosen.duration_ms is None:
+        return scene
+    return replace(scene, duration_s=min(scene.duration_s, chosen.duration_ms * 1e-3))

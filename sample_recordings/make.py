@@ -48,5 +48,7 @@ def make(name: str, folder: Path) -> WrittenSimulation:
 if __name__ == "__main__":
     target = Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER
     for sample in SAMPLES:
-        made = make(sample, target)
-        note(f"{made.path}: {made.events:,} events, {made.logo_events:,} of the logo, {made.duration_us / 1e3:.0f} ms")
+        written = make(sample, target)
+        made = written.recording
+        counts = f"{len(made.events):,} events, {made.logo_events:,} of the logo"
+        note(f"{written.path}: {counts}, {made.duration_us / 1e3:.0f} ms")

@@ -95,7 +95,6 @@ def simulate(
             )
     for warning in written.warnings:
         note(f"warning: {warning}")
-    note(
-        f"wrote {written.path}: {written.events:,} events, {written.logo_events:,} of the logo, "
-        f"in {written.duration_us / 1000:.1f} ms"
-    )
+    made = written.recording
+    counts = f"{len(made.events):,} events, {made.logo_events:,} of the logo"
+    note(f"wrote {written.path}: {counts}, in {made.duration_us / 1000:.1f} ms")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera import Camera
-from .frame_camera import Frame
+from .frame_camera import Frame, pixel_rays, sphere_along
 
 Floats = NDArray[np.float64]
 
@@ -20,21 +20,11 @@ SEEN_COSINE = 0.45  # albedo is read up to 63 degrees from the middle of the dis
 
 @dataclass(frozen=True, eq=False)
 class SurfaceAlbedo:
-    """Albedo of the visible side of the ball in one frame.
+    """Albedo of the visible side of the ball in one frame."""
 
-    Attributes
-    ----------
-    t_s : float
-        Middle of the exposure.
-    normals : (n, 3) float64
-        Outward normals of the surface points, camera frame.
-    darkening : (n,) float64
-        1 - albedo / albedo of the unprinted ball, 0 to 1.
-    """
-
-    t_s: float
-    normals: Floats
-    darkening: Floats
+    t_s: float  # middle of the exposure
+    normals: Floats  # (n, 3) outward, of the surface points, camera frame
+    darkening: Floats  # (n,) 1 - albedo / albedo of the unprinted ball, 0 to 1
 
 
 def surface_albedos(seen: Sequence[Frame], camera: Camera, radius_m: float) -> list[SurfaceAlbedo]:
@@ -74,13 +64,8 @@ def _circle(frame: Frame) -> tuple[float, float, float] | None:
 
 def _surface_albedo(frame: Frame, centre_m: Floats, camera: Camera, radius_m: float) -> SurfaceAlbedo:
     """Albedo from one frame: the ball's brightness over its shading, which a smooth fit gives."""
-    side = frame.image.shape[0]
-    column, row = np.meshgrid(np.arange(side) + frame.x0_px, np.arange(side) + frame.y0_px)
-    rays = camera.rays(column.ravel(), row.ravel())
-    along, length2 = rays @ centre_m, np.sum(rays**2, axis=1)
-    inside = along**2 - length2 * (centre_m @ centre_m - radius_m**2)
-    normals = ((along - np.sqrt(np.maximum(inside, 0.0))) / length2)[:, None] * rays - centre_m
-    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    rays = pixel_rays(camera, frame.x0_px, frame.y0_px, frame.image.shape[0])
+    _, inside, normals = sphere_along(rays, centre_m, radius_m)
     cosine = -(normals @ centre_m) / np.linalg.norm(centre_m)
     on_ball = (inside > 0) & (cosine > SEEN_COSINE)
     light = frame.image.ravel()
@@ -93,6 +78,4 @@ def _surface_albedo(frame: Frame, centre_m: Floats, camera: Camera, radius_m: fl
         bright = on_ball & (light > 0.9 * plain)
         if bright.sum() < 10:
             bright = on_ball
-    darkening = np.clip(1 - light / plain, 0.0, 1.0)
-    rows = np.flatnonzero(on_ball)
-    return SurfaceAlbedo(frame.t_s, normals[rows], darkening[rows])
+    return SurfaceAlbedo(frame.t_s, normals[on_ball], np.clip(1 - light / plain, 0.0, 1.0)[on_ball])

@@ -22,27 +22,13 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class FrameCamera:
-    """The paper's frame camera (sections 4.1 and 4.3): the event camera's view at 1.5 times its resolution.
+    """The paper's frame camera (sections 4.1 and 4.3): the event camera's view at 1.5 times its resolution."""
 
-    Attributes
-    ----------
-    rate_hz : float
-        That of the state of the art's setup (Tebbe 2020).
-    resolution : float
-        Over the event camera's.
-    exposure_us : float
-        Not published; ours lets a ball of 50 rps turn by 9 degrees.
-    white_snr : float
-        Signal over noise at white; 100 (40 dB) is usual for a full well of 10,000 electrons and more.
-    levels : int
-        Of the quantisation.
-    """
-
-    rate_hz: float = 380.0
-    resolution: float = 1.5
-    exposure_us: float = 500.0
-    white_snr: float = 100.0
-    levels: int = 256
+    rate_hz: float = 380.0  # that of the state of the art's setup (Tebbe 2020)
+    resolution: float = 1.5  # over the event camera's
+    exposure_us: float = 500.0  # not published; ours lets a ball of 50 rps turn by 9 degrees
+    white_snr: float = 100.0  # 100 (40 dB) is usual for a full well of 10,000 electrons and more
+    levels: int = 256  # of the quantisation
 
     @cached_property
     def camera(self) -> Camera:
@@ -55,20 +41,10 @@ class FrameCamera:
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """The part of a frame around the ball.
+    """The part of a frame around the ball, (side, side) pixels from (x0_px, y0_px) on."""
 
-    Attributes
-    ----------
-    t_s : float
-        Middle of the exposure.
-    image, background : (side, side) float64
-        White = 1.
-    x0_px, y0_px : int
-        Position of the first pixel in the frame.
-    """
-
-    t_s: float
-    image: Floats
+    t_s: float  # middle of the exposure
+    image: Floats  # white = 1
     background: Floats
     x0_px: int
     y0_px: int
@@ -84,8 +60,7 @@ def frames(scene: Scene, of: FrameCamera, seed: int) -> Iterator[Frame]:
     exposure_s = of.exposure_us * 1e-6
     for number in range(int(scene.duration_s * of.rate_hz)):
         t_s = number / of.rate_hz + exposure_s / 2
-        pose = flown.at(np.array([t_s]))
-        x, y, radius = (float(v[0]) for v in camera.silhouette(pose.position_m, ball.radius_m))
+        x, y, radius = (float(v[0]) for v in camera.silhouette(flown.at([t_s]).position_m, ball.radius_m))
         half = math.ceil(1.6 * radius + 4)
         x0, y0 = round(x) - half, round(y) - half
         if x0 < 0 or y0 < 0 or x0 + 2 * half > camera.width_px or y0 + 2 * half > camera.height_px:
@@ -108,39 +83,48 @@ def _exposed(
     distance_m = float(pose.position_m[0, 2])
     steps = max(1, math.ceil(speed * exposure_s * camera.focal_px / distance_m / 0.5))
     times = t_s + exposure_s * ((np.arange(steps) + 0.5) / steps - 0.5)
-    side = background.shape[0]
-    column, row = np.meshgrid(np.arange(x0, x0 + side), np.arange(y0, y0 + side))
-    rays = camera.rays(column.ravel(), row.ravel())
+    rays = pixel_rays(camera, x0, y0, background.shape[0])
     sigma_px = math.hypot(float(Lens().sigma_px(np.array([distance_m]), camera.focal_px)[0]), math.sqrt(1 / 12))
     blur_mm = sigma_px * distance_m / camera.focal_px * RADIUS_MM / ball.radius_m
     printed = None if ball.logo.name == "none" else texture(ball.logo, round(blur_mm, 2))
     poses = flown.at(times)
-    total = np.zeros(side * side)
+    total = np.zeros(background.size)
     for centre, turn in zip(poses.position_m, poses.rotation, strict=True):
         cover, normals = _seen(rays, centre, ball.radius_m, sigma_px / camera.focal_px)
         printing = 0.0 if printed is None else _print_at(printed, normals @ turn)
         albedo = ball.albedo + printing * (ball.ink_albedo - ball.albedo)
         total += background.ravel() * (1 - cover) + cover * albedo * _shade(scene.light, normals @ np.array(scene.up))
-    return (total / steps).reshape(side, side)
+    return (total / steps).reshape(background.shape)
+
+
+def pixel_rays(camera: Camera, x0_px: int, y0_px: int, side: int) -> Floats:
+    """(side * side, 3) rays through the pixels of a square part of the image."""
+    column, row = np.meshgrid(np.arange(x0_px, x0_px + side), np.arange(y0_px, y0_px + side))
+    return camera.rays(column.ravel(), row.ravel())
+
+
+def sphere_along(rays: Floats, centre_m: Floats, radius_m: float) -> tuple[Floats, Floats, Floats]:
+    """Where rays (n, 3) meet a sphere: the part along its centre, the discriminant (> 0 on the disc), the normals.
+
+    Beside the disc the normals (n, 3) are those of the limb.
+    """
+    along, length2 = rays @ centre_m, np.sum(rays**2, axis=1)
+    inside = along**2 - length2 * (float(centre_m @ centre_m) - radius_m**2)
+    normals = ((along - np.sqrt(np.maximum(inside, 0.0))) / length2)[:, None] * rays - centre_m
+    return along, inside, normals / np.linalg.norm(normals, axis=1)[:, None]
 
 
 def _seen(rays: Floats, centre: Floats, radius_m: float, sigma: float) -> tuple[Floats, Floats]:
     """(n,) cover 0..1 of a ball along rays, and (n, 3) its normals there (beside it those of its limb)."""
+    along, inside, normals = sphere_along(rays, centre, radius_m)
     spare = float(centre @ centre) - radius_m**2
-    along, length2 = rays @ centre, np.sum(rays**2, axis=1)
-    inside = along**2 - length2 * spare
     slope = np.hypot(*(2 * (along * centre[i] - rays[:, i] * spare) for i in (0, 1)))
-    cover: Floats = 0.5 * erfc(-inside / (slope * sigma * math.sqrt(2)))
-    normals = ((along - np.sqrt(np.maximum(inside, 0.0))) / length2)[:, None] * rays - centre
-    return cover, normals / np.linalg.norm(normals, axis=1)[:, None]
+    return 0.5 * erfc(-inside / (slope * sigma * math.sqrt(2))), normals
 
 
 def _shade(light: Light, lift: Floats) -> Floats:
     """Brightness of a matte surface whose normal points up by `lift`: the simulator's soft light from above."""
-    shade: Floats = (
-        light.sky * 0.5 * (1 + lift) + (1 - light.sky) * np.maximum(lift, 0.0) + light.bounce * 0.5 * (1 - lift)
-    )
-    return shade
+    return light.sky * 0.5 * (1 + lift) + (1 - light.sky) * np.maximum(lift, 0.0) + light.bounce * 0.5 * (1 - lift)
 
 
 def _print_at(printed: Texture, there: Floats) -> Floats:

@@ -6,6 +6,7 @@ that follow each other suggest a spin; the one that explains the albedo in all f
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -15,12 +16,13 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from ..camera import Camera
-from ..kernels.rotation import rotations
+from ..kernels.rotation import axis_and_length, rotations
 from ..simulator.logos import Logo, Texture, texture
 from .frame_albedo import SurfaceAlbedo, surface_albedos
 from .frame_camera import Frame
 
 Floats = NDArray[np.float64]
+Printing = tuple[NDArray[np.float32], float, float]  # texture, its half extent, cosine of its cap
 
 LEAST_DARK = 0.01  # share of the disc that must be dark for a frame to give an orientation
 POINTS = 300  # of a frame that are matched
@@ -45,11 +47,7 @@ def spin_from_frames(
     starts = _starts(flight, dark, rate_hz)
     if not starts:
         return None, "the logo is not seen in two frames that follow each other"
-    best, spin = -1.0, np.zeros(3)
-    for frame, turn, start in starts:
-        match, found = flight.followed(frame, turn, start)
-        if match > best:
-            best, spin = match, found
+    best, spin = max((flight.followed(*start) for start in starts), key=lambda found: found[0])
     if best < LEAST_MATCH:
         return None, f"the frames match the logo to {best:.2f} only"
     return spin, "ok"
@@ -60,20 +58,16 @@ def _starts(flight: _Flight, dark: Sequence[int], rate_hz: float) -> list[tuple[
     grid = _grid()
     poses = {k: flight.orientations(k, grid) for k in dark}
     found: list[tuple[float, int, Floats, Floats]] = []
-    for i in dark:
-        for j in dark:
-            step_s = flight.time_s[j] - flight.time_s[i]
-            if not 0 < step_s * rate_hz < 2.5:
-                continue
-            for one in poses[i]:
-                for other in poses[j]:
-                    vector = _rotation_vector(other.T @ one)
-                    size = float(np.linalg.norm(vector))
-                    for turned in (vector, vector * (1 - 2 * math.pi / size)) if size > 0 else (vector,):
-                        spin = turned / (2 * math.pi * step_s)
-                        if np.linalg.norm(spin) <= MAX_RPS:
-                            match = flight.match(i, one, spin, WINDOWS[0])
-                            found.append((match, i, one, spin))
+    for i, j in itertools.combinations(dark, 2):
+        step_s = flight.time_s[j] - flight.time_s[i]
+        if step_s * rate_hz < 2.5:
+            for one, other in itertools.product(poses[i], poses[j]):
+                vector = _rotation_vector(other.T @ one)
+                size = float(np.linalg.norm(vector))
+                for turned in (vector, vector * (1 - 2 * math.pi / size)) if size > 0 else (vector,):
+                    spin = turned / (2 * math.pi * step_s)
+                    if np.linalg.norm(spin) <= MAX_RPS:
+                        found.append((flight.match(i, one, spin, WINDOWS[0]), i, one, spin))
     found.sort(key=lambda start: -start[0])
     return [start[1:] for start in found[:STARTS]]
 
@@ -93,7 +87,7 @@ class _Flight:
         """The (3, 3) rotations camera -> ball that explain one frame's darkening best."""
         values = np.empty(len(grid))
         some = slice(None, None, 3)  # enough to choose from a grid
-        _match_orientations(values, grid, self.normals[frame, some], self.darkening[frame, some], *self.logo)
+        _match_orientations(values, grid, self.normals[frame, some], self.darkening[frame, some], self.logo)
         chosen: list[Floats] = []
         for turn in grid[np.argsort(-values)[:500]]:
             near = math.cos(math.radians(APART_DEG)) * 2 + 1  # trace of the rotation between two
@@ -105,17 +99,9 @@ class _Flight:
 
     def match(self, frame: int, turn: Floats, spin_rps: Floats, window: int) -> float:
         """Correlation of the darkening seen and expected in the frames around one, where the ball stands at `turn`."""
-        low, high = max(frame - window, 0), frame + window + 1
-        return float(
-            _match_spin(
-                turn,
-                spin_rps,
-                self.time_s[low:high] - self.time_s[frame],
-                self.normals[low:high],
-                self.darkening[low:high],
-                *self.logo,
-            )
-        )
+        near = slice(max(frame - window, 0), frame + window + 1)
+        since_s = self.time_s[near] - self.time_s[frame]
+        return float(_match_spin(turn, spin_rps, since_s, self.normals[near], self.darkening[near], self.logo))
 
     def followed(self, frame: int, turn: Floats, spin_rps: Floats) -> tuple[float, Floats]:
         """(correlation over all frames, spin) reached from a start, over more and more frames."""
@@ -126,12 +112,8 @@ class _Flight:
                 return -self.match(frame, turn @ rotations(state[3:])[0], state[:3], window)
 
             steps = np.diag([4.0 / window] * 3 + [0.05] * 3)  # rps and radians, for what frames so far apart tell
-            options = {
-                "initial_simplex": np.vstack([state, state + steps]),
-                "xatol": 1e-3,
-                "fatol": 1e-4,
-                "maxiter": 150,
-            }
+            simplex = np.vstack([state, state + steps])
+            options = {"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-4, "maxiter": 150}
             state = minimize(missed, state, method="Nelder-Mead", options=options).x
         return -missed(state), state[:3]
 
@@ -143,9 +125,8 @@ def _grid() -> Floats:
     for polar in np.arange(step / 2, math.radians(100), step):
         count = max(1, round(2 * math.pi * math.sin(polar) / step))
         for azimuth in 2 * math.pi * np.arange(count) / count:
-            middle = np.array(
-                [math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), -math.cos(polar)]
-            )
+            x, y = math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth)
+            middle = np.array([x, y, -math.cos(polar)])
             side = np.cross(middle, [0.0, 0.0, 1.0])
             side /= np.linalg.norm(side)
             for in_plane in np.arange(0, 2 * math.pi, step):
@@ -167,19 +148,19 @@ def _rotation_vector(turn: Floats) -> Floats:
 
 @njit(cache=True, nogil=True)
 def _expected(
-    turn: Floats, x: float, y: float, z: float, logo: NDArray[np.float32], half_extent: float, cap_cosine: float
+    turn: Floats, x: float, y: float, z: float, logo: Singles, half_extent: float, cap_cosine: float
 ) -> float:
     """The logo's darkening where the surface has this normal in the camera frame."""
     bz = turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * z
     if bz <= cap_cosine:
         return 0.0
     scale = math.sqrt(2.0 / (1.0 + bz)) / half_extent
-    last = logo.shape[0] - 1
+    last = texture.shape[0] - 1
     u = ((turn[0, 0] * x + turn[0, 1] * y + turn[0, 2] * z) * scale + 1.0) * 0.5 * last
     w = ((turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z) * scale + 1.0) * 0.5 * last
     if not (0.0 <= u <= last and 0.0 <= w <= last):
         return 0.0
-    return float(logo[int(w + 0.5), int(u + 0.5)])
+    return float(texture[int(w + 0.5), int(u + 0.5)])
 
 
 @njit(cache=True, nogil=True)
@@ -191,19 +172,11 @@ def _correlation(sums: Floats) -> float:
 
 
 @njit(cache=True, nogil=True)
-def _add(
-    sums: Floats,
-    turn: Floats,
-    normals: Floats,
-    darkening: Floats,
-    logo: NDArray[np.float32],
-    half_extent: float,
-    cap_cosine: float,
-) -> None:
+def _add(sums: Floats, turn: Floats, normals: Floats, darkening: Floats, logo: Printing) -> None:
     """Add one frame's points to `sums`, the ball standing at `turn`."""
     for p in range(darkening.size):
         a = darkening[p]
-        b = _expected(turn, normals[p, 0], normals[p, 1], normals[p, 2], logo, half_extent, cap_cosine)
+        b = _expected(turn, normals[p, 0], normals[p, 1], normals[p, 2], logo)
         sums[0] += 1.0
         sums[1] += a
         sums[2] += b
@@ -213,38 +186,20 @@ def _add(
 
 
 @njit(cache=True, nogil=True)
-def _match_orientations(
-    values: Floats,
-    turns: Floats,
-    normals: Floats,
-    darkening: Floats,
-    logo: NDArray[np.float32],
-    half_extent: float,
-    cap_cosine: float,
-) -> None:
+def _match_orientations(values: Floats, turns: Floats, normals: Floats, darkening: Floats, logo: Printing) -> None:
     """Write into values the correlation of one frame's darkening with the logo at each of the turns."""
     for k in range(turns.shape[0]):
         sums = np.zeros(6)
-        _add(sums, turns[k], normals, darkening, logo, half_extent, cap_cosine)
+        _add(sums, turns[k], normals, darkening, logo)
         values[k] = _correlation(sums)
 
 
 @njit(cache=True, nogil=True)
 def _match_spin(
-    turn: Floats,
-    spin_rps: Floats,
-    since_s: Floats,
-    normals: Floats,
-    darkening: Floats,
-    logo: NDArray[np.float32],
-    half_extent: float,
-    cap_cosine: float,
+    turn: Floats, spin_rps: Floats, since_s: Floats, normals: Floats, darkening: Floats, logo: Printing
 ) -> float:
     """Correlation over frames of a ball that stands at `turn` (camera -> ball) at time 0 and spins."""
-    size = math.sqrt(spin_rps[0] ** 2 + spin_rps[1] ** 2 + spin_rps[2] ** 2)
-    x, y, z = 1.0, 0.0, 0.0
-    if size > 0.0:
-        x, y, z = spin_rps[0] / size, spin_rps[1] / size, spin_rps[2] / size
+    x, y, z, size = axis_and_length(spin_rps)
     sums, back = np.zeros(6), np.empty((3, 3))
     for k in range(since_s.size):
         # Camera frame now -> camera frame at time 0: turned back.
@@ -254,5 +209,5 @@ def _match_spin(
         back[0, 0], back[0, 1], back[0, 2] = c + x * x * v, x * y * v - z * s, x * z * v + y * s
         back[1, 0], back[1, 1], back[1, 2] = y * x * v + z * s, c + y * y * v, y * z * v - x * s
         back[2, 0], back[2, 1], back[2, 2] = z * x * v - y * s, z * y * v + x * s, c + z * z * v
-        _add(sums, turn @ back, normals[k], darkening[k], logo, half_extent, cap_cosine)
+        _add(sums, turn @ back, normals[k], darkening[k], logo)
     return _correlation(sums)

@@ -15,18 +15,15 @@ SIDE_LINE_M, CENTRE_LINE_M = 0.020, 0.003
 def intensity_map(scene: Scene, camera: Camera) -> NDArray[np.float64]:
     """(height x width,) float64 intensity of the background, white in full light = 1."""
     background = scene.background
-    count = camera.width_px * camera.height_px
-    albedo = np.full(count, background.albedo)
-    if background.kind == "table":
-        albedo = _table(scene, camera)
+    plain = background.kind == "plain"
+    albedo = np.full(camera.width_px * camera.height_px, background.albedo) if plain else _table(scene, camera)
     if background.contrast > 0:
         from scipy.ndimage import gaussian_filter  # a quarter of a second to load, needed here only
 
         random = np.random.default_rng(background.texture_seed)
         grain = gaussian_filter(random.standard_normal((camera.height_px, camera.width_px)), background.grain_px)
         albedo = albedo * np.exp(background.contrast * grain.ravel() / grain.std())
-    result: NDArray[np.float64] = albedo
-    return result
+    return albedo
 
 
 def _table(scene: Scene, camera: Camera) -> NDArray[np.float64]:
@@ -42,8 +39,7 @@ def _table(scene: Scene, camera: Camera) -> NDArray[np.float64]:
     across = across / np.linalg.norm(across) if np.linalg.norm(across) > 1e-6 else np.array([0.0, 1.0, 0.0])
     along = np.cross(up, across)
     with np.errstate(invalid="ignore"):
-        a = np.where(below, depth * (rays @ across), np.inf)
-        b = np.where(below, depth * (rays @ along), np.inf)
+        a, b = (np.where(below, depth * (rays @ axis), np.inf) for axis in (across, along))
     pixel_m = background.height_m / camera.focal_px
 
     def within(distance: NDArray[np.float64], half: float) -> NDArray[np.float64]:

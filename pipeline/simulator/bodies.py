@@ -79,16 +79,13 @@ class BallBody:
             surface = max(surface, float(np.max((speed + turn) * scale)))
         return outline, surface
 
-    def distance_m(self, time_s: Floats) -> float:
-        """Distance from the camera in the middle of these times, m."""
-        one = self._trajectory_at(float(time_s[time_s.size // 2]))
-        return float(one.at(time_s[time_s.size // 2 : time_s.size // 2 + 1]).position_m[0, 2])
+    def distance_m(self, time_s: float) -> float:
+        """Depth of the centre."""
+        return float(self._trajectory_at(time_s).at([time_s]).position_m[0, 2])
 
     def _trajectory_at(self, time_s: float) -> Trajectory:
-        for one in self.trajectories:
-            if one.start_s <= time_s <= one.end_s:
-                return one
-        return self.trajectories[-1]
+        there = (one for one in self.trajectories if one.start_s <= time_s <= one.end_s)
+        return next(there, self.trajectories[-1])
 
     def packed(self, camera: Camera, lens: Lens, time_s: Floats, every: int, slower: int) -> PackedBody:
         """The ball at these times, looked at in every so many of them; slower: see `kernels_light`."""
@@ -96,20 +93,14 @@ class BallBody:
         pose = np.empty((time_s.size, columns.POSE_COLUMNS))
         pose[:, columns.CENTRE : columns.CENTRE + 3] = there.position_m
         pose[:, columns.TURN : columns.TURN + 9] = np.swapaxes(there.rotation, 1, 2).reshape(-1, 9)
-        sigma = _sigma_px(camera, lens, there.position_m[:, 2])
-        pose[:, columns.SIGMA] = sigma
+        pose[:, columns.SIGMA] = sigma = _sigma_px(camera, lens, there.position_m[:, 2])
         # The texture's own blur: one for the ball's whole time, so that it is drawn once.
         far = float(np.median(np.concatenate([one.position_m[:, 2] for one in self.trajectories])))
         typical = float(_sigma_px(camera, lens, np.array([far]))[0])
         blur_mm = TEXTURE_SHARE * typical * far / camera.focal_px * 1e3 * RADIUS_MM / (self.ball.radius_m * 1e3)
         printed = texture(self.ball.logo, round(blur_mm, 2))
         kind = np.zeros(columns.BODY_COLUMNS)
-        kind[[columns.KIND, columns.OWNER, columns.EVERY, columns.SLOWER]] = (
-            columns.BALL,
-            self.number,
-            every,
-            slower,
-        )
+        kind[[columns.KIND, columns.OWNER, columns.EVERY, columns.SLOWER]] = columns.BALL, self.number, every, slower
         kind[columns.RADIUS] = self.ball.radius_m
         kind[[columns.ALBEDO, columns.ALBEDO_2]] = self.ball.albedo, self.ball.ink_albedo
         kind[[columns.HALF_EXTENT, columns.TEXELS]] = printed.half_extent, printed.values.shape[0]
@@ -153,9 +144,9 @@ class ArmBody:
         speed *= camera.focal_px / max(near, 0.1)
         return 0.0, speed
 
-    def distance_m(self, time_s: Floats) -> float:
-        """Distance from the camera in the middle of these times, m."""
-        elbow, hand = arm_ends(self.arm, time_s[time_s.size // 2 : time_s.size // 2 + 1])
+    def distance_m(self, time_s: float) -> float:
+        """Mean depth of elbow and hand."""
+        elbow, hand = arm_ends(self.arm, [time_s])
         return float(elbow[0, 2] + hand[0, 2]) / 2
 
     def packed(self, camera: Camera, lens: Lens, time_s: Floats, every: int, slower: int) -> PackedBody:
@@ -170,15 +161,10 @@ class ArmBody:
             pose[:, column : column + 2], pose[:, column + 2] = image, radius_px
             low.append(image - radius_px[:, None])
             high.append(image + radius_px[:, None])
-        sigma = _sigma_px(camera, lens, np.array([self.distance_m(time_s)]))[0]
-        pose[:, columns.SIGMA] = sigma
+        distance_m = self.distance_m(float(time_s[time_s.size // 2]))
+        pose[:, columns.SIGMA] = sigma = _sigma_px(camera, lens, np.array([distance_m]))[0]
         kind = np.zeros(columns.BODY_COLUMNS)
-        kind[[columns.KIND, columns.OWNER, columns.EVERY, columns.SLOWER]] = (
-            columns.ARM,
-            self.number,
-            every,
-            slower,
-        )
+        kind[[columns.KIND, columns.OWNER, columns.EVERY, columns.SLOWER]] = columns.ARM, self.number, every, slower
         kind[[columns.ALBEDO, columns.ALBEDO_2]] = arm.sleeve_albedo, arm.hand_albedo
         first, last = np.minimum(*low) - 4 * sigma - 1, np.maximum(*high) + 4 * sigma + 1
         box = _clipped(first[:, 0], first[:, 1], last[:, 0], last[:, 1], camera)
@@ -187,17 +173,13 @@ class ArmBody:
 
 def _sigma_px(camera: Camera, lens: Lens, distance_m: Floats) -> Floats:
     """Blur of an outline: the lens and the pixel's own area."""
-    result: Floats = np.sqrt(lens.sigma_px(distance_m, camera.focal_px) ** 2 + PIXEL_VARIANCE_PX2)
-    return result
+    return np.sqrt(lens.sigma_px(distance_m, camera.focal_px) ** 2 + PIXEL_VARIANCE_PX2)
 
 
 def _clipped(x0: Floats, y0: Floats, x1: Floats, y1: Floats, camera: Camera) -> NDArray[np.int32]:
     """(n, 4) int32 boxes inside the image, the ends not included; empty outside."""
-    left = np.clip(np.floor(x0), 0, camera.width_px)
-    top = np.clip(np.floor(y0), 0, camera.height_px)
-    right = np.clip(np.ceil(x1) + 1, 0, camera.width_px)
-    bottom = np.clip(np.ceil(y1) + 1, 0, camera.height_px)
-    return np.stack([left, top, right, bottom], axis=1).astype(np.int32)
+    box = np.stack([np.floor(x0), np.floor(y0), np.ceil(x1) + 1, np.ceil(y1) + 1], axis=1)
+    return np.asarray(np.clip(box, 0, 2 * [camera.width_px, camera.height_px]), np.int32)
 
 
 def bodies_of(scene: Scene) -> list[BallBody | ArmBody]:

@@ -1,4 +1,4 @@
-"""FlightSampler through the image, and how logos are mounted."""
+"""Flights through the image, and how logos are mounted."""
 
 from __future__ import annotations
 
@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from ..camera import Camera
 from ..errors import ParameterError
 from ..kernels.rotation import rotations
-from .motion import Trajectory, quaternion_of, trajectory
-from .scene import Air, Background, Ball, Flight, Scene, Vector3
+from .motion import Trajectory, quaternion_of, trajectory, triple
+from .scene import Air, Background, Ball, Flight, Scene
 
 Floats = NDArray[np.float64]
 
-# Angle of the logo's centre from the spin axis, rotation of the wordmark in its plane (degrees): our reading
-# of the paper's picture of balls 1-7. At rotation 0 the word runs along the direction in which the ball
-# turns.
+# Angle of the logo's centre from the spin axis, rotation of the wordmark in its plane (degrees): our reading of the
+# paper's picture of balls 1-7. At rotation 0 the word runs along the direction in which the ball turns.
 SPINNER_BALLS = {1: (90, 0), 2: (45, 0), 3: (45, 90), 4: (45, 45), 5: (4, 0), 6: (90, 90), 7: (90, 45)}
 FLIGHT_KINDS = ("top", "back", "left", "right", "corkscrew", "mixed")
 HEADING_DEG = 8.0  # spread of the direction of shots along the table
@@ -44,9 +43,7 @@ def mounted(ball: int, spin_rps: Floats, phase_rad: float, toward: Floats) -> Fl
     centre = math.cos(angle) * pole + math.sin(angle) * side
     word = np.cross(pole, side)
     frame = np.stack([word, np.cross(centre, word), centre], axis=1)
-    spun = rotations(phase_rad * pole)[0] @ frame
-    result: Floats = spun @ rotations([0.0, 0.0, in_plane])[0]
-    return result
+    return np.asarray(rotations(phase_rad * pole)[0] @ frame @ rotations([0.0, 0.0, in_plane])[0])
 
 
 class FlightSampler:
@@ -60,11 +57,11 @@ class FlightSampler:
         self,
         kind: str,
         magnitude_rps: float,
-        spin_rps: Sequence[float] | None,
         speed_m_s: float,
-        heading_deg: float | None,
-        ball: int | None,
-        bounce: bool,
+        heading_deg: float | None = None,
+        spin_rps: Sequence[float] | None = None,
+        ball: int | None = None,
+        bounce: bool = False,
     ) -> tuple[Flight, float, float]:
         """A flight that comes in after time 0 and ends when it has left, the time of its middle, its heading."""
         if not 0.5 <= speed_m_s <= 50:
@@ -95,10 +92,9 @@ class FlightSampler:
             bounces=bounce,
             end_s=here.end_s - start_s,
         )
-        ball_there, scene = self._alone(whole)
-        flown = trajectory(whole, ball_there, scene)
+        flown = self._flown(whole, self.air)
         # It starts outside, so only what comes after the middle counts as leaving.
-        end = _leaves(flown, ball_there, self.camera, after_s=-start_s)
+        end = self._leaves(flown, after_s=-start_s)
         return replace(whole, end_s=round(float(flown.time_s[end]), 6)), -start_s, heading
 
     def _middle(self, speed_m_s: float, heading_deg: float, bounce: bool) -> tuple[Floats, Floats]:
@@ -116,9 +112,9 @@ class FlightSampler:
         level = math.sqrt(speed_m_s**2 - rise**2)
         return middle, level * course / float(np.linalg.norm(course)) + rise * up
 
-    def _alone(self, motion: Flight, air: Air | None = None) -> tuple[Ball, Scene]:
+    def _flown(self, motion: Flight, air: Air) -> Trajectory:
         ball = Ball((motion,))
-        return ball, Scene(motion.end_s, (ball,), air=air or self.air, up=triple(self.up))
+        return trajectory(motion, ball, Scene(motion.end_s, (ball,), air=air, up=triple(self.up)))
 
     def _entry(self, here: Flight) -> tuple[float, Floats, Floats]:
         """(time < 0, position, velocity) where this flight came into the image.
@@ -127,21 +123,19 @@ class FlightSampler:
         signs.
         """
         mirrored = replace(here, velocity_m_s=triple(-np.array(here.velocity_m_s)))
-        ball, scene = self._alone(mirrored, replace(self.air, drag=-self.air.drag, magnus=-self.air.magnus))
-        back = trajectory(mirrored, ball, scene)
-        row = _leaves(back, ball, self.camera, after_s=0.0)
+        back = self._flown(mirrored, replace(self.air, drag=-self.air.drag, magnus=-self.air.magnus))
+        row = self._leaves(back, after_s=0.0)
         return -float(back.time_s[row]), back.position_m[row], -back.velocity_m_s[row]
 
-
-def _leaves(ahead: Trajectory, ball: Ball, camera: Camera, after_s: float) -> int:
-    """First sample after a time at which the ball has left the image; raises ParameterError when it stays."""
-    x, y, radius = camera.silhouette(ahead.position_m, ball.radius_m)
-    gone = (x < -radius - 8) | (x > camera.width_px + radius + 8)
-    gone |= (y < -radius - 8) | (y > camera.height_px + radius + 8)
-    gone &= ahead.time_s > after_s
-    if not gone.any():
-        raise ParameterError("the ball does not leave the image: choose a higher speed or another heading")
-    return int(np.argmax(gone))
+    def _leaves(self, ahead: Trajectory, after_s: float) -> int:
+        """First sample after a time at which the ball has left the image; raises ParameterError when it stays."""
+        x, y, radius = self.camera.silhouette(ahead.position_m, Ball.radius_m)
+        gone = (x < -radius - 8) | (x > self.camera.width_px + radius + 8)
+        gone |= (y < -radius - 8) | (y > self.camera.height_px + radius + 8)
+        gone &= ahead.time_s > after_s
+        if not gone.any():
+            raise ParameterError("the ball does not leave the image: choose a higher speed or another heading")
+        return int(np.argmax(gone))
 
 
 def spin_direction(kind: str, velocity: Floats, up: Floats, random: np.random.Generator) -> Floats:
@@ -155,16 +149,14 @@ def spin_direction(kind: str, velocity: Floats, up: Floats, random: np.random.Ge
     across = np.cross(up, forward)
     across /= np.linalg.norm(across)
     pure = {"top": across, "back": -across, "left": up, "right": -up, "corkscrew": forward}[kind]
-    tilted: Floats = rotations(math.radians(8.0) * random.standard_normal(3))[0] @ pure
-    return tilted
+    return np.asarray(rotations(math.radians(8.0) * random.standard_normal(3))[0] @ pure)
 
 
 def _rotation_vector(random: np.random.Generator) -> Floats:
     """(3,) rotation vector of a uniformly random rotation."""
     w, *xyz = random.standard_normal(4)
     length = float(np.linalg.norm(xyz))
-    result: Floats = 2 * math.atan2(length, w) * np.array(xyz) / length
-    return result
+    return np.asarray(2 * math.atan2(length, w) * np.array(xyz) / length)
 
 
 def vector(name: str, value: Sequence[float]) -> Floats:
@@ -173,9 +165,3 @@ def vector(name: str, value: Sequence[float]) -> Floats:
     if vector.shape != (3,) or not np.all(np.isfinite(vector)):
         raise ParameterError(f"{name} = {value!r} is not a list of 3 numbers")
     return vector
-
-
-def triple(vector: Floats) -> Vector3:
-    """Vector (3,) as three numbers."""
-    x, y, z = (float(v) for v in vector)
-    return x, y, z

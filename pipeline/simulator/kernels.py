@@ -82,14 +82,7 @@ def _look(
 
 @njit(cache=True, nogil=True)
 def _tails(
-    pixels: Pixels,
-    view: View,
-    bodies: Bodies,
-    physics: Physics,
-    row: int,
-    before_us: float,
-    now_us: float,
-    gain: float,
+    pixels: Pixels, view: View, bodies: Bodies, physics: Physics, row: int, before_us: float, now_us: float, gain: float
 ) -> None:
     """Go on with the pixels that bodies have left, and let go those that have come to rest."""
     box, state, width = bodies.box, pixels.state, physics.width_px
@@ -150,15 +143,7 @@ def leave_all(pixels: Pixels, box: Ints, width: int) -> None:
 
 
 @njit(cache=True, nogil=True)
-def run(
-    pixels: Pixels,
-    view: View,
-    bodies: Bodies,
-    physics: Physics,
-    time_us: Floats,
-    first: int,
-    fresh: bool,
-) -> int:
+def run(pixels: Pixels, view: View, bodies: Bodies, physics: Physics, time_us: Floats, first: int, fresh: bool) -> int:
     """Simulate the rows from `first` of time_us on, writing into `pixels`; return the next row.
 
     Returns early when the event buffers are more than half full: empty them (cursor[1] = 0) and call again.

@@ -24,21 +24,9 @@ SIGMA = 12  # blur of the outline in px
 POSE_COLUMNS = 13
 
 # Columns of what a body is like.
-(
-    KIND,
-    OWNER,
-    EVERY,
-    SLOWER,
-    RADIUS,
-    ALBEDO,
-    ALBEDO_2,
-    HALF_EXTENT,
-    TEXELS,
-    CAP_COSINE,
-    EXTENT_X,
-    EXTENT_Y,
-    SAMPLE,
-) = range(13)
+(KIND, OWNER, EVERY, SLOWER, RADIUS, ALBEDO, ALBEDO_2, HALF_EXTENT, TEXELS, CAP_COSINE, EXTENT_X, EXTENT_Y, SAMPLE) = (
+    range(13)
+)
 BODY_COLUMNS = 13  # SLOWER: so many looks may pass where a body moves slowest
 
 LOOKS_A_PIXEL = 4  # at least, of any motion

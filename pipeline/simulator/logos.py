@@ -29,17 +29,7 @@ RADIUS_MM = 20.0  # logos are drawn for the 40 mm ball
 
 @dataclass(frozen=True)
 class Logo:
-    """Logo of a ball.
-
-    Attributes
-    ----------
-    name : str
-        One of `NAMES`, or "png".
-    png_base64 : str
-        For "png": the file's bytes in base64.
-    width_mm : float
-        For "png": width on the ball.
-    """
+    """Logo of a ball: one of `NAMES`, or "png" with the file's bytes and the width on the ball."""
 
     name: str = "andro"
     png_base64: str = ""
@@ -52,8 +42,10 @@ class Logo:
             raise ParameterError(f"logo width {self.width_mm:g} mm is out of range: 1 to 60 mm")
 
     @classmethod
-    def of(cls, name_or_png: str) -> Logo:
-        """A logo by name or from a PNG file (dark = print, transparent = none); raises ParameterError."""
+    def of(cls, name_or_png: str | Logo) -> Logo:
+        """A logo by name or from a PNG file (dark = print, transparent = none), or itself; raises ParameterError."""
+        if isinstance(name_or_png, Logo):
+            return name_or_png
         if not name_or_png.lower().endswith(".png"):
             return cls(name_or_png)
         try:
@@ -67,24 +59,12 @@ class Logo:
 
 @dataclass(frozen=True, eq=False)
 class Texture:
-    """Printing on the Lambert azimuthal equal-area map.
+    """Printing on the Lambert azimuthal equal-area map."""
 
-    Attributes
-    ----------
-    values : (n, n) float32
-        0 = ball, 1 = print; row = w, column = u.
-    half_extent : float
-        Half side of the map in (u, w).
-    cap_rad : float
-        Angle from the logo's centre beyond which nothing is printed.
-    extent_u, extent_w : float
-        Largest |u| and |w| with printing.
-    """
-
-    values: NDArray[np.float32]
-    half_extent: float
-    cap_rad: float
-    extent_u: float
+    values: NDArray[np.float32]  # (n, n), 0 = ball, 1 = print; row = w, column = u
+    half_extent: float  # half side of the map in (u, w)
+    cap_rad: float  # angle from the logo's centre beyond which nothing is printed
+    extent_u: float  # largest |u| and |w| with printing
     extent_w: float
 
 
@@ -121,8 +101,7 @@ def _stroke(a: Floats, b: Floats, start: tuple[float, float], end: tuple[float, 
     along_a, along_b = end[0] - start[0], end[1] - start[1]
     share = ((a - start[0]) * along_a + (b - start[1]) * along_b) / (along_a**2 + along_b**2)
     share = np.clip(share, 0.0, 1.0)
-    distance: Floats = np.hypot(a - start[0] - share * along_a, b - start[1] - share * along_b)
-    return distance
+    return np.hypot(a - start[0] - share * along_a, b - start[1] - share * along_b)
 
 
 def _ring(a: Floats, b: Floats, centre: tuple[float, float], half: tuple[float, float]) -> Floats:
@@ -130,33 +109,23 @@ def _ring(a: Floats, b: Floats, centre: tuple[float, float], half: tuple[float, 
     x, y = (a - centre[0]) / half[0], (b - centre[1]) / half[1]
     radius = np.maximum(np.hypot(x, y), 1e-9)
     slope = np.hypot(x / half[0], y / half[1]) / radius
-    distance: Floats = np.abs(radius - 1) / np.maximum(slope, 1e-9)
-    return distance
+    return np.asarray(np.abs(radius - 1) / np.maximum(slope, 1e-9))
 
 
 def _wordmark(a: Floats, b: Floats) -> Floats:
     """A word of five bold letters (A N D R O), 24 mm long and 6.2 mm high, strokes of 1.4 mm."""
     top, base, half = 2.4, -2.4, 0.7
-    lines: list[Floats] = []
-    for start, end in (
-        ((-11.3, base), (-9.5, top)),  # A
-        ((-9.5, top), (-7.7, base)),
-        ((-10.5, -1.0), (-8.5, -1.0)),
-        ((-5.6, base), (-5.6, top)),  # N
-        ((-5.6, top), (-2.6, base)),
-        ((-2.6, base), (-2.6, top)),
+    strokes = (
+        *(((-11.3, base), (-9.5, top)), ((-9.5, top), (-7.7, base)), ((-10.5, -1.0), (-8.5, -1.0))),  # A
+        *(((-5.6, base), (-5.6, top)), ((-5.6, top), (-2.6, base)), ((-2.6, base), (-2.6, top))),  # N
         ((-0.4, base), (-0.4, top)),  # D
-        ((4.4, base), (4.4, top)),  # R
-        ((5.5, -0.2), (6.7, base)),
-    ):
-        lines.append(_stroke(a, b, start, end))
+        *(((4.4, base), (4.4, top)), ((5.5, -0.2), (6.7, base))),  # R
+    )
+    lines = [_stroke(a, b, start, end) for start, end in strokes]
     lines.append(np.where(a >= -0.4, _ring(a, b, (-0.4, 0.0), (2.7, 2.4)), np.inf))
     lines.append(np.where(a >= 4.4, _ring(a, b, (4.4, 1.1), (2.1, 1.3)), np.inf))
     lines.append(_ring(a, b, (9.9, 0.0), (1.7, 2.4)))  # O
-    nearest = lines[0]
-    for line in lines[1:]:
-        nearest = np.minimum(nearest, line)
-    return nearest - half
+    return np.asarray(np.minimum.reduce(lines) - half)
 
 
 def _line(width_mm: float) -> Drawing:
@@ -189,10 +158,8 @@ def _drawing(logo: Logo) -> tuple[Drawing, float]:
     def sampled(a: Floats, b: Floats) -> Floats:
         column, row = a / pitch + (width - 1) / 2, (height - 1) / 2 - b / pitch
         inside = (column >= 0) & (column <= width - 1) & (row >= 0) & (row <= height - 1)
-        row = np.clip(np.rint(row), 0, height - 1).astype(np.intp)
-        column = np.clip(np.rint(column), 0, width - 1).astype(np.intp)
-        nearest = dark[row, column]
-        return (0.5 - np.where(inside, nearest, 0.0)) * TEXEL_MM
+        row, column = (np.clip(np.rint(v), 0, n - 1).astype(np.intp) for v, n in ((row, height), (column, width)))
+        return (0.5 - np.where(inside, dark[row, column], 0.0)) * TEXEL_MM
 
     return sampled, 0.5 * pitch * float(np.hypot(width, height))
 
@@ -209,5 +176,4 @@ def _png_darkness(png_base64: str) -> Floats:
     if picture.ndim == 2:
         return 1.0 - picture
     dark = 1.0 - picture[..., :3].mean(axis=2)
-    printed: Floats = dark * picture[..., 3] if picture.shape[2] == 4 else dark
-    return printed
+    return np.asarray(dark * picture[..., 3] if picture.shape[2] == 4 else dark)

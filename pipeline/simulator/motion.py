@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..kernels.rotation import rotations
-from .scene import Air, Arm, Ball, Fixed, Flight, Quaternion, Scene, Vector3
+from .scene import Arm, Ball, Fixed, Flight, Quaternion, Scene, Vector3
 
 Floats = NDArray[np.float64]
 
@@ -74,39 +73,16 @@ def matrix_of(quaternion: Quaternion) -> Floats:
 
 def quaternion_of(matrix: Floats) -> Quaternion:
     """The unit quaternion (w, x, y, z), w >= 0, of a rotation matrix."""
-    values, vectors = np.linalg.eigh(
-        np.array(
-            [
-                [matrix[0, 0] - matrix[1, 1] - matrix[2, 2], 0, 0, 0],
-                [matrix[1, 0] + matrix[0, 1], matrix[1, 1] - matrix[0, 0] - matrix[2, 2], 0, 0],
-                [
-                    matrix[2, 0] + matrix[0, 2],
-                    matrix[2, 1] + matrix[1, 2],
-                    matrix[2, 2] - matrix[0, 0] - matrix[1, 1],
-                    0,
-                ],
-                [
-                    matrix[2, 1] - matrix[1, 2],
-                    matrix[0, 2] - matrix[2, 0],
-                    matrix[1, 0] - matrix[0, 1],
-                    np.trace(matrix),
-                ],
-            ]
-        )
-    )
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix
+    lower = [
+        [xx - yy - zz, 0, 0, 0],
+        [yx + xy, yy - xx - zz, 0, 0],
+        [zx + xz, zy + yz, zz - xx - yy, 0],
+        [zy - yz, xz - zx, yx - xy, np.trace(matrix)],
+    ]
+    values, vectors = np.linalg.eigh(np.array(lower))
     x, y, z, w = vectors[:, np.argmax(values)] * (1 if vectors[3, np.argmax(values)] >= 0 else -1)
     return float(w), float(x), float(y), float(z)
-
-
-def accelerations(ball: Ball, air: Air, up: Sequence[float]) -> tuple[Floats, float, float]:
-    """Gravity (3,) in m/s^2, drag in 1/m (times -|v| v) and Magnus in 1 (times 2 pi spin x v)."""
-    area = math.pi * ball.radius_m**2
-    pressure = 0.5 * air.density_kg_m3 * area / ball.mass_kg
-    return (
-        -air.gravity_m_s2 * np.asarray(up, np.float64),
-        pressure * air.drag,
-        pressure * air.magnus * ball.radius_m,
-    )
 
 
 def trajectory(motion: Fixed | Flight, ball: Ball, scene: Scene) -> Trajectory:
@@ -122,12 +98,14 @@ def trajectory(motion: Fixed | Flight, ball: Ball, scene: Scene) -> Trajectory:
 
 def _flown(flight: Flight, ball: Ball, scene: Scene) -> Trajectory:
     """Runge-Kutta of fourth order, in plain numbers: arrays of three are slower."""
-    gravity, drag, magnus = accelerations(ball, scene.air, scene.up)
+    air, up = scene.air, np.array(scene.up, np.float64)
+    gx, gy, gz = triple(-air.gravity_m_s2 * up)
+    area = math.pi * ball.radius_m**2
+    pressure = 0.5 * air.density_kg_m3 * area / ball.mass_kg
+    drag = pressure * air.drag  # 1/m, times -|v| v
+    lift = 2 * math.pi * (pressure * air.magnus * ball.radius_m)  # times spin x v
     count = max(int(np.ceil((flight.end_s - flight.start_s) / STEP_S)), 1)
     h = (flight.end_s - flight.start_s) / count
-    up = np.array(scene.up, np.float64)
-    gx, gy, gz = (float(g) for g in gravity)
-    lift = 2 * math.pi * magnus
 
     def acceleration(v: Vector3, w: Vector3) -> Vector3:
         (vx, vy, vz), (wx, wy, wz) = v, w
@@ -174,10 +152,11 @@ def _off_the_table(
         return position, velocity, spin
     v, w = bounced(v, np.array(spin), up, radius_m)
     p = p + (radius_m - height) * up
-    return _numbers(p), _numbers(v), _numbers(w)
+    return triple(p), triple(v), triple(w)
 
 
-def _numbers(vector: Floats) -> Vector3:
+def triple(vector: Floats) -> Vector3:
+    """The vector (3,) as plain numbers."""
     x, y, z = (float(v) for v in vector)
     return x, y, z
 

@@ -32,18 +32,7 @@ class Fixed:
 
 @dataclass(frozen=True)
 class Flight:
-    """A ball in free flight during [start_s, end_s), with gravity, drag and Magnus force.
-
-    Attributes
-    ----------
-    start_s, end_s : float
-    position_m, velocity_m_s, spin_rps, orientation : tuple of float
-        At start_s, camera frame.
-    spin_decay_hz : float
-        The spin falls as exp(-spin_decay_hz t); 0 = constant.
-    bounces : bool
-        Whether the ball bounces off the table of the scene.
-    """
+    """A ball in free flight during [start_s, end_s), with gravity, drag and Magnus force; its state is at start_s."""
 
     start_s: float
     end_s: float
@@ -51,29 +40,21 @@ class Flight:
     velocity_m_s: Vector3
     spin_rps: Vector3
     orientation: Quaternion
-    spin_decay_hz: float = 0.0
-    bounces: bool = False
+    spin_decay_hz: float = 0.0  # the spin falls as exp(-spin_decay_hz t)
+    bounces: bool = False  # off the table of the scene
 
 
 @dataclass(frozen=True)
 class Air:
     """Gravity and aerodynamics of a flying ball.
 
-    Attributes
-    ----------
-    gravity_m_s2 : float
-    density_kg_m3 : float
-        Of the air.
-    drag : float
-        Drag coefficient of a smooth sphere at Reynolds numbers of 10^4 to 10^5.
-    magnus : float
-        Lift coefficient per spin parameter (|spin| radius / speed), so that the Magnus acceleration is
-        magnus rho area radius / (2 mass) spin x velocity; 0.6 lies within the published range for 40 mm balls.
+    `magnus` is the lift coefficient per spin parameter (|spin| radius / speed), so that the Magnus acceleration is
+    magnus rho area radius / (2 mass) spin x velocity; 0.6 lies within the published range for 40 mm balls.
     """
 
     gravity_m_s2: float = 9.81
     density_kg_m3: float = 1.2
-    drag: float = 0.4
+    drag: float = 0.4  # coefficient of a smooth sphere at Reynolds numbers of 10^4 to 10^5
     magnus: float = 0.6
 
 
@@ -111,26 +92,14 @@ class Arm:
 
 @dataclass(frozen=True)
 class Background:
-    """Static background: a plane `height_m` below the camera.
+    """Static background: a plane `height_m` below the camera, with a random texture."""
 
-    Attributes
-    ----------
-    kind : str
-        "plain" (table everywhere) or "table" (with white lines, and the floor beyond).
-    height_m : float
-    albedo, line_albedo, floor_albedo : float
-        Of the table, its lines and the floor.
-    contrast, grain_px : float
-        Standard deviation in log intensity and grain of a random texture.
-    texture_seed : int
-    """
-
-    kind: str = "table"
+    kind: str = "table"  # "plain" (table everywhere) or "table" (with white lines, and the floor beyond)
     height_m: float = 2.0
-    albedo: float = 0.12
+    albedo: float = 0.12  # of the table
     line_albedo: float = 0.7
     floor_albedo: float = 0.25
-    contrast: float = 0.0
+    contrast: float = 0.0  # of the texture: standard deviation in log intensity
     grain_px: float = 6.0
     texture_seed: int = 0
 
@@ -147,23 +116,12 @@ class Light:
     that the events of a flying ball lie on its disc as they do for real balls (accumulated frames of
     cogsys-tuebingen/snn-edge-benchmark: occupancy flat up to 0.6 radii, a ring above); with a ball darker at
     its limb OFF events begin far inside it.
-
-    Attributes
-    ----------
-    illuminance_lux : float
-        On the table (the paper's 1,930 lx are the reference of all intensities).
-    sky, bounce : float
-        Shares of the ceiling and of the light from below.
-    flicker_depth : float
-        Amplitude of the flicker over the mean, 0 = steady LED panels.
-    flicker_hz : float
-        Frequency of the flicker.
     """
 
-    illuminance_lux: float = 1930.0
+    illuminance_lux: float = 1930.0  # on the table; the paper's are the reference of all intensities
     sky: float = 0.9
     bounce: float = 0.5
-    flicker_depth: float = 0.0
+    flicker_depth: float = 0.0  # amplitude over the mean, 0 = steady LED panels
     flicker_hz: float = 100.0
 
 
@@ -196,9 +154,8 @@ class Scene:
                     raise ParameterError(f"the ball at {motion.position_m} m is not in front of the camera")
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain dictionaries and lists, ready for JSON."""
-        plain: dict[str, Any] = _plain(self)
-        return plain
+        """Plain dictionaries and tuples, ready for JSON."""
+        return dataclasses.asdict(self)
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, Any]) -> Scene:
@@ -206,10 +163,10 @@ class Scene:
         try:
             values = dict(plain)
             values["balls"] = tuple(_ball(ball) for ball in values["balls"])
-            values["arm"] = None if values.get("arm") is None else _made(Arm, values["arm"])
+            values["arm"] = None if values.get("arm") is None else built(Arm, values["arm"])
             for name, kind in (("background", Background), ("light", Light), ("air", Air)):
-                values[name] = _made(kind, values.get(name, {}))
-            return _made(cls, values)
+                values[name] = built(kind, values.get(name, {}))
+            return built(cls, values)
         except (KeyError, TypeError, AttributeError, ValueError) as error:
             raise ParameterError(f"this is no scene of the simulator: {error}") from error
 
@@ -217,24 +174,15 @@ class Scene:
 Kind = TypeVar("Kind")
 
 
-def _made(kind: type[Kind], plain: Mapping[str, Any]) -> Kind:
+def built(kind: type[Kind], plain: Mapping[str, Any]) -> Kind:
+    """An instance of a dataclass from its fields, lists of JSON made tuples."""
     return kind(**{name: tuple(value) if isinstance(value, list) else value for name, value in plain.items()})
 
 
 def _ball(plain: Mapping[str, Any]) -> Ball:
     values = dict(plain)
     values["motions"] = tuple(
-        _made(Flight if "velocity_m_s" in motion else Fixed, motion) for motion in values["motions"]
+        built(Flight if "velocity_m_s" in motion else Fixed, motion) for motion in values["motions"]
     )
-    values["logo"] = _made(Logo, values.get("logo", {}))
-    return _made(Ball, values)
-
-
-def _plain(value: Any) -> Any:
-    if dataclasses.is_dataclass(value):
-        return {item.name: _plain(getattr(value, item.name)) for item in dataclasses.fields(value)}
-    if isinstance(value, Mapping):
-        return {name: _plain(item) for name, item in value.items()}
-    if isinstance(value, (tuple, list)):
-        return [_plain(item) for item in value]
-    return value
+    values["logo"] = built(Logo, values.get("logo", {}))
+    return built(Ball, values)

@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 from ..camera import Camera
 from ..errors import ParameterError
 from ..kernels.rotation import rotations
-from .flights import HEADING_DEG, FlightSampler, mounted, triple, vector
+from .flights import HEADING_DEG, FlightSampler, mounted, vector
 from .logos import Logo
-from .motion import quaternion_of
+from .motion import quaternion_of, triple
 from .scene import Air, Arm, Background, Ball, Fixed, Flight, Light, Scene
 from .simulation import default_camera
 
 Floats = NDArray[np.float64]
 
-SPINNER_KINDS = ("top", "back", "side")
+SPINNER_AXES = {"top": (1.0, 0.0, 0.0), "back": (-1.0, 0.0, 0.0), "side": (0.0, 0.0, 1.0)}
 SPINNER_TILT_DEG = 3.0  # how well the spinner's axis is aligned with the camera's axes (our reading)
 
 
@@ -45,16 +45,10 @@ def spinner(
         1 to 7, position of the logo on the ball.
     kind : str
         "top" (axis +x of the camera), "back" (-x) or "side" (+z), tilted at random by 3 degrees.
-    magnitude_rps : float
     spin_rps : (3,) sequence of float or None
-        Exact spin in the camera frame instead.
-    duration_ms : float
-    logo : str or Logo
+        Exact spin in the camera frame instead of kind and magnitude.
     position_m : (3,) sequence of float or None
         Of the centre, camera frame; None = drawn within 0.2 m of the optical axis at 2 m.
-    background : Background or None
-    light : Light or None
-    seed : int
 
     Raises
     ------
@@ -63,11 +57,10 @@ def spinner(
     """
     random = np.random.default_rng([seed, 1])
     if spin_rps is None:
-        if kind not in SPINNER_KINDS:
-            raise ParameterError(f"kind {kind!r} is unknown: there are {', '.join(SPINNER_KINDS)}")
-        axis = {"top": (1.0, 0.0, 0.0), "back": (-1.0, 0.0, 0.0), "side": (0.0, 0.0, 1.0)}[kind]
+        if kind not in SPINNER_AXES:
+            raise ParameterError(f"kind {kind!r} is unknown: there are {', '.join(SPINNER_AXES)}")
         tilt = rotations(math.radians(SPINNER_TILT_DEG) * random.standard_normal(3))[0]
-        spin = magnitude_rps * (tilt @ np.array(axis))
+        spin = magnitude_rps * (tilt @ np.array(SPINNER_AXES[kind]))
     else:
         spin = vector("spin_rps", spin_rps)
     place = np.append(random.uniform(-0.2, 0.2, 2), 2.0) if position_m is None else vector("position_m", position_m)
@@ -75,9 +68,9 @@ def spinner(
     motion = Fixed(0.0, duration_ms * 1e-3, triple(place), triple(spin), quaternion_of(turn))
     return Scene(
         duration_ms * 1e-3,
-        (Ball((motion,), logo=_logo(logo)),),
-        background=Background(kind="plain") if background is None else background,
-        light=Light() if light is None else light,
+        (Ball((motion,), logo=Logo.of(logo)),),
+        background=background or Background(kind="plain"),
+        light=light or Light(),
         description=f"spinner, ball {ball}",
     )
 
@@ -107,28 +100,22 @@ def flight(
     ----------
     kind : str
         Spin relative to the direction of flight, tilted at random by about 8 degrees; "mixed" = any direction.
-    magnitude_rps : float
     spin_rps : (3,) sequence of float or None
-        Exact spin in the camera frame instead.
+        Exact spin in the camera frame instead of kind and magnitude.
     speed_m_s : float
         In the middle of the image (with `bounce`: at the table).
     heading_deg : float or None
         Direction in the image, 0 = +x, 90 = +y (down); None = drawn about 90 or 270.
     ball : int or None
         1 to 7, position of the logo relative to the spin axis as on the spinner; None = at random.
-    logo : str or Logo
     second_ball, arm : bool
         Whether another ball crosses, an arm swings at the border; both count as other objects.
     bounce : bool
         Whether the ball bounces off the table.
-    background : Background or None
-    light : Light or None
-    air : Air or None
     spin_decay_hz : float
         The spin falls as exp(-spin_decay_hz t).
     camera : Camera or None
         None = the paper's.
-    seed : int
 
     Raises
     ------
@@ -136,18 +123,16 @@ def flight(
         For an unknown kind, ball or logo, a value out of range, a ball that does not leave the image.
     """
     random = np.random.default_rng([seed, 2])
-    camera = default_camera() if camera is None else camera
-    air = Air() if air is None else air
+    camera, air = camera or default_camera(), air or Air()
     draw = FlightSampler(random, camera, air, spin_decay_hz)
-    shot, middle_s, heading = draw.shot(kind, magnitude_rps, spin_rps, speed_m_s, heading_deg, ball, bounce)
-    balls = [Ball((shot,), logo=_logo(logo))]
+    shot, middle_s, heading = draw.shot(kind, magnitude_rps, speed_m_s, heading_deg, spin_rps, ball, bounce)
+    balls = [Ball((shot,), logo=Logo.of(logo))]
     if second_ball:
         away = heading + float(random.choice([-1, 1]) * random.uniform(60.0, 120.0))
         other, its_middle_s = _second(draw, float(random.uniform(2.0, 5.0)), away)
-        # It comes through the middle a quarter of the flight before or after the first, so that they do not
-        # collide.
+        # Through the middle a quarter of the flight before or after the first, so that they do not collide.
         start = middle_s + float(random.choice([-0.25, 0.25])) * shot.end_s - its_middle_s
-        balls.append(Ball((replace(other, start_s=start, end_s=start + other.end_s),), logo=_logo(logo)))
+        balls.append(Ball((replace(other, start_s=start, end_s=start + other.end_s),), logo=Logo.of(logo)))
     return Scene(
         shot.end_s,
         tuple(balls),
@@ -167,7 +152,7 @@ def _second(draw: FlightSampler, speed_m_s: float, heading_deg: float) -> tuple[
     """
     while True:
         try:
-            return draw.shot("mixed", 20.0, None, speed_m_s, heading_deg, None, False)[:2]
+            return draw.shot("mixed", 20.0, speed_m_s, heading_deg)[:2]
         except ParameterError:
             if speed_m_s > 10.0:
                 raise
@@ -190,7 +175,7 @@ def rally(
 ) -> Scene:
     """Several shots to and fro with pauses; speeds and spins drawn from the ranges, kinds in turn."""
     random = np.random.default_rng([seed, 3])
-    camera = default_camera() if camera is None else camera
+    camera = camera or default_camera()
     if shots < 1:
         raise ParameterError(f"a rally of {shots} shots is out of range: 1 or more")
     slot = duration_s / shots
@@ -200,22 +185,17 @@ def rally(
         shot, _, _ = draw.shot(
             kinds[number % len(kinds)],
             float(random.uniform(*magnitude_rps)),
-            None,
             float(random.uniform(*speed_m_s)),
             (90.0 if number % 2 == 0 else 270.0) + float(random.normal(0, HEADING_DEG)),
-            None,
-            False,
         )
         if shot.end_s > slot:
-            raise ParameterError(
-                f"{shots} shots do not fit into {duration_s:g} s, one takes {shot.end_s:.2f} s: "
-                "ask for fewer or more time"
-            )
+            takes = f"one takes {shot.end_s:.2f} s"
+            raise ParameterError(f"{shots} shots do not fit into {duration_s:g} s, {takes}: ask for fewer or more time")
         start = round(number * slot + float(random.uniform(0, slot - shot.end_s)), 6)
         motions.append(replace(shot, start_s=start, end_s=start + shot.end_s))
     return Scene(
         duration_s,
-        (Ball(tuple(motions), logo=_logo(logo)),),
+        (Ball(tuple(motions), logo=Logo.of(logo)),),
         arm=swinging_arm(random, camera) if arm else None,
         background=background or Background(),
         light=light or Light(),
@@ -238,7 +218,3 @@ def swinging_arm(random: np.random.Generator, camera: Camera) -> Arm:
         frequency_hz=float(random.uniform(0.8, 1.5)),
         phase_rad=float(random.uniform(0, 2 * np.pi)),
     )
-
-
-def _logo(logo: str | Logo) -> Logo:
-    return logo if isinstance(logo, Logo) else Logo.of(logo)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..biases import CURVES, PAPER, BiasCurve, BiasParameters, physical
+from ..biases import CURVES, PAPER, BiasCurve, BiasParameters
 from ..errors import ParameterError
 from ..events import EventBatch
 
@@ -49,8 +49,7 @@ class Lens:
     def sigma_px(self, distance_m: NDArray[np.float64], focal_px: float) -> NDArray[np.float64]:
         """Sigma of the blur at these distances: a disc of diameter b has b / 4 along each axis."""
         disc = focal_px * self.aperture_mm * 1e-3 * np.abs(1 / distance_m - 1 / self.focus_m)
-        sigma: NDArray[np.float64] = np.hypot(self.blur_px, disc / 4)
-        return sigma
+        return np.hypot(self.blur_px, disc / 4)
 
 
 @dataclass(frozen=True)
@@ -143,18 +142,20 @@ class SensorModel:
     @classmethod
     def of(cls, biases: BiasParameters = PAPER, curves: Mapping[str, BiasCurve] = CURVES) -> SensorModel:
         """The sensor at these biases; `curves` may hold one's own measurements."""
-        pixel = physical(biases, curves)
-        base = cls()
-        noise = 0.5 * (pixel.noise_on + pixel.noise_off)
+        value = {name: curve.at(getattr(biases, curve.bias)) for name, curve in curves.items()}
+        common = value["noise_bandwidth_factor"] * value["noise_highpass_factor"]
+        refractory = value["noise_refractory_factor"]
+        noise_on = value["noise_on_factor"] * common * refractory
+        noise = 0.5 * (noise_on + value["noise_off_factor"] * common * np.sqrt(refractory))
         return cls(
-            threshold_on=pixel.threshold_on,
-            threshold_off=pixel.threshold_off,
-            cutoff_hz=pixel.cutoff_hz,
-            highpass_hz=pixel.highpass_hz,
-            refractory_us=pixel.refractory_us,
-            noise_hz=base.noise_hz * noise,
-            noise_on_share=0.5 * pixel.noise_on / noise,
-            hot_median_hz=base.hot_median_hz * noise,
+            threshold_on=value["threshold_on"],
+            threshold_off=value["threshold_off"],
+            cutoff_hz=value["cutoff_hz"],
+            highpass_hz=value["highpass_hz"],
+            refractory_us=value["refractory_us"],
+            noise_hz=cls.noise_hz * noise,
+            noise_on_share=0.5 * noise_on / noise,
+            hot_median_hz=cls.hot_median_hz * noise,
         )
 
     @classmethod
@@ -187,11 +188,9 @@ class LabelledEvents:
 
 def thresholds(sensor: SensorModel, pixels: int, random: np.random.Generator) -> tuple[NDArray[np.float32], ...]:
     """(pixels,) float32 ON and OFF thresholds with mismatch, kept above a quarter of the nominal."""
-    result = []
-    for nominal in (sensor.threshold_on, sensor.threshold_off):
-        factor = 1 + sensor.mismatch * random.standard_normal(pixels, dtype=np.float32)
-        result.append((nominal * np.maximum(factor, 0.25)).astype(np.float32))
-    return tuple(result)
+    factors = (1 + sensor.mismatch * random.standard_normal(pixels, dtype=np.float32) for _ in range(2))
+    nominal = (sensor.threshold_on, sensor.threshold_off)
+    return tuple((n * np.maximum(f, 0.25)).astype(np.float32) for n, f in zip(nominal, factors, strict=True))
 
 
 def hot_rates_hz(
@@ -213,18 +212,11 @@ def noise(
 ) -> LabelledEvents:
     """Background noise: uniform Poisson noise, more of it in the dark, and hot pixels; not sorted.
 
-    Parameters
-    ----------
-    sensor : SensorModel
-    intensity : (pixels,) float64
-        Of the background, relative to white.
-    duration_us, width_px : int
-    pattern, random : numpy.random.Generator
-        For the hot pixels, and for the events.
+    `intensity` (pixels,) is that of the background, relative to white; `pattern` draws the hot pixels, `random` the
+    events.
     """
     pixels = intensity.size
-    # Shot noise in log intensity falls with the root of the photocurrent, and so does the noise rate (v2e's
-    # law).
+    # Shot noise in log intensity falls with the root of the photocurrent, and so does the noise rate (v2e's law).
     weight = 1 / np.sqrt(np.maximum(intensity, 1e-3))
     total = np.cumsum(weight)
     count = int(random.poisson(sensor.noise_hz * total[-1] * duration_us * 1e-6))

@@ -21,7 +21,7 @@ from . import kernels, kernels_light, kernels_pixel
 from .background import intensity_map
 from .bodies import ArmBody, BallBody, bodies_of
 from .motion import Trajectory
-from .scene import Scene
+from .scene import Scene, built
 from .sensor import EDGE, LOGO, OTHER, LabelledEvents, Lens, SensorModel, noise, read_out, thresholds
 
 EDGE_STEP_PX = 0.25  # an outline moves less than this between two looks at it
@@ -64,6 +64,11 @@ class SimulatedRecording:
         """Length of the scene."""
         return round(self.scene.duration_s * 1e6)
 
+    @property
+    def logo_events(self) -> int:
+        """Number of the logo's events."""
+        return int(np.count_nonzero(self.truth.label == LOGO))
+
 
 def default_camera(width_px: int = 1280, height_px: int = 720) -> Camera:
     """The paper's camera."""
@@ -90,19 +95,13 @@ def simulate_scene(
         A pixel array in physical units, or biases to make one from.
     lens : Lens or None
     seed : int
-        Of pixel mismatch, noise and jitter.
+        Of pixel mismatch, noise and jitter; raises ParameterError when negative.
     progress : callable or None
         Called with the share done, 0 to 1.
-
-    Raises
-    ------
-    ParameterError
-        For a negative seed.
     """
     if seed < 0:
         raise ParameterError(f"seed {seed} is out of range: 0 or more")
-    camera = default_camera() if camera is None else camera
-    lens = Lens() if lens is None else lens
+    camera, lens = camera or default_camera(), lens or Lens()
     array = SensorModel.of(sensor) if isinstance(sensor, BiasParameters) else sensor
     pattern, background, pixel = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
     if array.pattern_seed is not None:
@@ -114,7 +113,7 @@ def simulate_scene(
     moving = work.run(progress)
     brightness = scene.light.illuminance_lux / REFERENCE_LUX
     still = noise(array, backdrop * brightness, duration_us, camera.width_px, pattern, background)
-    read = read_out([moving, still], array, duration_us)
+    read = read_out([*moving, still], array, duration_us)
     description = {
         "version": VERSION,
         "seed": seed,
@@ -129,17 +128,12 @@ def simulate_scene(
 
 
 def simulate_again(
-    description: dict[str, Any],
-    *,
-    sensor: SensorModel | BiasParameters | None = None,
-    progress: Progress | None = None,
+    description: dict[str, Any], *, sensor: SensorModel | BiasParameters | None = None, progress: Progress | None = None
 ) -> SimulatedRecording:
     """The recording of a description again, or the same scene with another sensor; raises ParameterError."""
     try:
         scene = Scene.from_dict(description["scene"])
-        values = dict(description["camera"])
-        values["distortion"], values["up"] = tuple(values["distortion"]), tuple(values["up"])
-        camera, lens = Camera(**values), Lens(**description["lens"])
+        camera, lens = built(Camera, description["camera"]), built(Lens, description["lens"])
         seed = int(description["seed"])
         if sensor is None:
             biases = description.get("biases")
@@ -192,14 +186,8 @@ class _Simulation:
         on, off = thresholds(sensor, count, pattern)
         column, row = np.meshgrid(np.arange(camera.width_px), np.arange(camera.height_px))
         rays = camera.rays(column.ravel(), row.ravel())
-        self.view = kernels_pixel.View(
-            np.ascontiguousarray(rays[:, 0]),
-            np.ascontiguousarray(rays[:, 1]),
-            backdrop,
-            on,
-            off,
-            random.standard_normal(NORMALS),
-        )
+        ray_x, ray_y = np.ascontiguousarray(rays[:, :2].T)
+        self.view = kernels_pixel.View(ray_x, ray_y, backdrop, on, off, random.standard_normal(NORMALS))
         light = scene.light
         self.physics = kernels_light.Physics(
             tau_us=sensor.tau_us,
@@ -239,7 +227,7 @@ class _Simulation:
             event_word=np.empty(buffer, np.int64),
         )
 
-    def run(self, progress: Progress | None) -> LabelledEvents:
+    def run(self, progress: Progress | None) -> list[LabelledEvents]:
         """All events of moving bodies (and flicker), delayed and jittered, not sorted."""
         end = self.scene.duration_s
         visible = [body.visible(self.camera, end) for body in self.bodies]
@@ -253,12 +241,7 @@ class _Simulation:
             self.boxes = np.zeros((0, 4), np.int32)
             if there or self.pixels.cursor[0] or self.scene.light.flicker_depth:
                 self._segment(there, start, stop, progress)
-        if not self.found:
-            return LabelledEvents(EventBatch.empty(), np.empty(0, np.uint8))
-        return LabelledEvents(
-            EventBatch.concatenate(part.events for part in self.found),
-            np.concatenate([part.label for part in self.found]),
-        )
+        return self.found
 
     def _segment(
         self, there: Sequence[BallBody | ArmBody], start: float, stop: float, progress: Progress | None
@@ -273,9 +256,8 @@ class _Simulation:
             for (slowest, _), own in zip(speeds, wanted, strict=True)
         ]
         rows = max(math.ceil((stop - start) / step), 1)
-        fresh = start == 0.0
-        if fresh and self.scene.light.flicker_depth:
-            self._list_all()
+        if start == 0.0 and self.scene.light.flicker_depth:  # every pixel works all the time
+            kernels.begin_all(self.pixels, self.view, self.physics)
         for first in range(0, rows, CHUNK_ROWS):
             if not (there or self.pixels.cursor[0]):
                 break  # everything has come to rest
@@ -285,24 +267,12 @@ class _Simulation:
             self.pixels.rest[:] = -1
             packed = _packed(there, every, slower, self.camera, self.lens, time_s)
             self.boxes = packed.box[-1].copy()
-            row = 0 if fresh and first == 0 else 1
+            row = 0 if start == 0.0 and first == 0 else 1
             while row <= count:
-                row = kernels.run(
-                    self.pixels,
-                    self.view,
-                    packed,
-                    self.physics,
-                    time_s * 1e6,
-                    row,
-                    fresh and first == 0 and row == 0,
-                )
+                row = kernels.run(self.pixels, self.view, packed, self.physics, time_s * 1e6, row, row == 0)
                 self._collect()
             if progress is not None:
                 progress(min(float(time_s[-1]) / self.scene.duration_s, 1.0))
-
-    def _list_all(self) -> None:
-        """Under flickering light every pixel works all the time."""
-        kernels.begin_all(self.pixels, self.view, self.physics)
 
     def _collect(self) -> None:
         pixels, sensor = self.pixels, self.sensor
@@ -327,7 +297,8 @@ def _packed(
     time_s: NDArray[np.float64],
 ) -> kernels_light.Bodies:
     """The bodies at these times in the kernels' form, from far to near."""
-    order = sorted(range(len(there)), key=lambda k: -there[k].distance_m(time_s))
+    middle_s = float(time_s[time_s.size // 2])
+    order = sorted(range(len(there)), key=lambda k: -there[k].distance_m(middle_s))
     packed = [there[k].packed(camera, lens, time_s, every[k], max(slower[k], 1)) for k in order]
     side = max((body.texture.shape[0] for body in packed), default=2)
     texture = np.zeros((len(packed), side, side), np.float32)

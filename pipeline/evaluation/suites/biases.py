@@ -32,11 +32,7 @@ SWEEPS: dict[str, tuple[tuple[str, ...], tuple[int, ...], tuple[int, ...]]] = {
     "refr": (("refr",), (-20, 0, 40, 80, 120, 180, 235), (-20, 80, 235)),
 }
 # The supplement's pictures: bias -> (values, microseconds shown); `fo` as linear time surfaces.
-PICTURES = {
-    "diff_on = diff_off": ((40, 90, 140), 3000),
-    "refr": ((120, 80, -20), 2000),
-    "fo": ((-35, 55), 1000),
-}
+PICTURES = {"diff_on = diff_off": ((40, 90, 140), 3000), "refr": ((120, 80, -20), 2000), "fo": ((-35, 55), 1000)}
 NEEDS = ("simulator", "biases.py", "evaluation/suites/biases.py")  # the estimators have no part in it
 PICTURE_PX = 64  # side of a picture; the ball has a radius of about 17 px
 
@@ -88,7 +84,7 @@ def measure_ball(context: TaskContext, sweep: str, value: int, seed: int, durati
     """Events a second of everything while a ball flies through, as the supplement counts them, and of its logo."""
     scene = _flying(seed, duration_ms)
     made = simulate_scene(scene, sensor=_set(sweep, value), seed=seed)
-    logo_hz = float(np.count_nonzero(made.truth.label == LOGO)) / scene.duration_s
+    logo_hz = float(made.logo_events) / scene.duration_s
     return [_row("ball", sweep, value, seed, made) | {"logo_hz": logo_hz}]
 
 

@@ -14,11 +14,11 @@ from spinscope.pipeline.biases import (
     PAPER,
     BiasCurve,
     BiasParameters,
-    physical,
     read_biases,
     write_biases,
 )
 from spinscope.pipeline.errors import ParameterError, RecordingError
+from spinscope.pipeline.simulator import SensorModel
 
 # Which way the quantity goes as its bias rises.
 RISING = {
@@ -42,15 +42,14 @@ def test_curves_are_monotone_over_the_makers_whole_range(name):
     assert np.all(change > 0) if name in RISING else np.all(change < 0)
     for value, quantity in curve.points:
         assert curve.at(value) == pytest.approx(quantity)
-    assert curve.source
     assert not curve.calibrated
 
 
 def test_ones_own_curves_replace_ours():
-    mine = BiasCurve("refr", "us", ((-20, 100.0), (235, 10.0)), "measured", calibrated=True)
-    assert physical(PAPER, {**CURVES, "refractory_us": mine}).refractory_us == pytest.approx(mine.at(80))
-    assert physical(PAPER).noise_on == pytest.approx(1.0)
-    assert physical(FACTORY).threshold_on < physical(PAPER).threshold_on
+    mine = BiasCurve("refr", ((-20, 100.0), (235, 10.0)), calibrated=True)
+    assert SensorModel.of(PAPER, {**CURVES, "refractory_us": mine}).refractory_us == pytest.approx(mine.at(80))
+    assert SensorModel.of(PAPER).noise_hz == pytest.approx(SensorModel.noise_hz)
+    assert SensorModel.of(FACTORY).threshold_on < SensorModel.of(PAPER).threshold_on
 
 
 def test_noise_rises_with_bandwidth_and_after_short_dead_times_on_more_than_off():
