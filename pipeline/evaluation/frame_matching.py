@@ -147,20 +147,19 @@ def _rotation_vector(turn: Floats) -> Floats:
 
 
 @njit(cache=True, nogil=True)
-def _expected(
-    turn: Floats, x: float, y: float, z: float, logo: Singles, half_extent: float, cap_cosine: float
-) -> float:
+def _expected(turn: Floats, x: float, y: float, z: float, logo: Printing) -> float:
     """The logo's darkening where the surface has this normal in the camera frame."""
+    printed, half_extent, cap_cosine = logo
     bz = turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * z
     if bz <= cap_cosine:
         return 0.0
     scale = math.sqrt(2.0 / (1.0 + bz)) / half_extent
-    last = texture.shape[0] - 1
+    last = printed.shape[0] - 1
     u = ((turn[0, 0] * x + turn[0, 1] * y + turn[0, 2] * z) * scale + 1.0) * 0.5 * last
     w = ((turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z) * scale + 1.0) * 0.5 * last
     if not (0.0 <= u <= last and 0.0 <= w <= last):
         return 0.0
-    return float(texture[int(w + 0.5), int(u + 0.5)])
+    return float(printed[int(w + 0.5), int(u + 0.5)])
 
 
 @njit(cache=True, nogil=True)
