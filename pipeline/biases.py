@@ -7,10 +7,8 @@ marked as not calibrated, to be replaced by one's own measurements (`SensorModel
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 
@@ -62,34 +60,32 @@ class BiasCurve:
 
 
 # Quantities by name, with the reasons for the model's points; factors are on the noise rate, 1 at the paper's biases.
-CURVES: Mapping[str, BiasCurve] = MappingProxyType(
-    {
-        # 25 % nominal contrast (log 0.22) near the factory setting; the supplement's ball keeps its outline and loses
-        # most of the logo at 140.
-        "threshold_on": BiasCurve("diff_on", ((-85, 0.10), (0, 0.19), (40, 0.27), (60, 0.33), (140, 0.62))),
-        # As threshold_on from 0 to 60; steeper above, where the supplement sees the ball's ON and OFF events part
-        # (which of them gets rarer is our choice).
-        "threshold_off": BiasCurve(
-            "diff_off", ((-35, 0.14), (0, 0.19), (40, 0.27), (60, 0.33), (90, 0.55), (140, 1.50), (190, 1.90))
-        ),
-        # The supplement: only values below 0 change the ball's event rate, there late events of the edge lie inside
-        # the ball; the lowest setting is in use against lamps that flicker with 100 Hz.
-        "cutoff_hz": BiasCurve("fo", ((-35, 60.0), (-20, 120.0), (-10, 400.0), (0, 3000.0), (55, 8000.0))),
-        # 0 filters nothing that matters (supplement), above it slow motion fades first.
-        "highpass_hz": BiasCurve("hpf", ((0, 0.0), (20, 5.0), (60, 40.0), (120, 300.0))),
-        # The supplement: at 80 a pixel is free again when a 6,000 px/s edge has left it (170 us).
-        "refractory_us": BiasCurve("refr", ((-20, 900.0), (0, 450.0), (80, 150.0), (120, 90.0), (235, 20.0))),
-        # The supplement: noise falls steeply to an acceptable level at 40, little above.
-        "noise_on_factor": BiasCurve("diff_on", ((-85, 300.0), (0, 6.0), (40, 1.0), (140, 0.15))),
-        "noise_off_factor": BiasCurve("diff_off", ((-35, 40.0), (0, 6.0), (40, 1.0), (190, 0.1))),
-        # A lower cut-off lets less noise through; flat above 0 (supplement).
-        "noise_bandwidth_factor": BiasCurve("fo", ((-35, 0.3), (0, 0.9), (55, 1.0))),
-        # A high-pass takes slow noise and leak away.
-        "noise_highpass_factor": BiasCurve("hpf", ((0, 1.0), (60, 0.4), (120, 0.1))),
-        # The supplement: noise keeps rising above 80, ON more than OFF.
-        "noise_refractory_factor": BiasCurve("refr", ((-20, 0.6), (0, 0.75), (80, 1.0), (120, 1.6), (235, 6.0))),
-    }
-)
+CURVES = {
+    # 25 % nominal contrast (log 0.22) near the factory setting; the supplement's ball keeps its outline and loses
+    # most of the logo at 140.
+    "threshold_on": BiasCurve("diff_on", ((-85, 0.10), (0, 0.19), (40, 0.27), (60, 0.33), (140, 0.62))),
+    # As threshold_on from 0 to 60; steeper above, where the supplement sees the ball's ON and OFF events part
+    # (which of them gets rarer is our choice).
+    "threshold_off": BiasCurve(
+        "diff_off", ((-35, 0.14), (0, 0.19), (40, 0.27), (60, 0.33), (90, 0.55), (140, 1.50), (190, 1.90))
+    ),
+    # The supplement: only values below 0 change the ball's event rate, there late events of the edge lie inside
+    # the ball; the lowest setting is in use against lamps that flicker with 100 Hz.
+    "cutoff_hz": BiasCurve("fo", ((-35, 60.0), (-20, 120.0), (-10, 400.0), (0, 3000.0), (55, 8000.0))),
+    # 0 filters nothing that matters (supplement), above it slow motion fades first.
+    "highpass_hz": BiasCurve("hpf", ((0, 0.0), (20, 5.0), (60, 40.0), (120, 300.0))),
+    # The supplement: at 80 a pixel is free again when a 6,000 px/s edge has left it (170 us).
+    "refractory_us": BiasCurve("refr", ((-20, 900.0), (0, 450.0), (80, 150.0), (120, 90.0), (235, 20.0))),
+    # The supplement: noise falls steeply to an acceptable level at 40, little above.
+    "noise_on_factor": BiasCurve("diff_on", ((-85, 300.0), (0, 6.0), (40, 1.0), (140, 0.15))),
+    "noise_off_factor": BiasCurve("diff_off", ((-35, 40.0), (0, 6.0), (40, 1.0), (190, 0.1))),
+    # A lower cut-off lets less noise through; flat above 0 (supplement).
+    "noise_bandwidth_factor": BiasCurve("fo", ((-35, 0.3), (0, 0.9), (55, 1.0))),
+    # A high-pass takes slow noise and leak away.
+    "noise_highpass_factor": BiasCurve("hpf", ((0, 1.0), (60, 0.4), (120, 0.1))),
+    # The supplement: noise keeps rising above 80, ON more than OFF.
+    "noise_refractory_factor": BiasCurve("refr", ((-20, 0.6), (0, 0.75), (80, 1.0), (120, 1.6), (235, 6.0))),
+}
 
 
 def read_biases(path: Path | str) -> BiasParameters:

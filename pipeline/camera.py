@@ -65,15 +65,10 @@ class Camera:
         if length < 1e-6:
             raise ParameterError("camera.up = 0,0,0 is no direction: (0, 0, -1) is up for a camera that looks down")
         x, y = parameters.principal_x_px, parameters.principal_y_px
-        return cls(
-            width_px,
-            height_px,
-            parameters.focal_length_mm * 1000.0 / parameters.pixel_um,
-            (width_px - 1) / 2 if x is None else x,
-            (height_px - 1) / 2 if y is None else y,
-            parameters.distortion,
-            tuple(float(u) / length for u in parameters.up),
-        )
+        principal = (width_px - 1) / 2 if x is None else x, (height_px - 1) / 2 if y is None else y
+        focal_px = parameters.focal_length_mm * 1000.0 / parameters.pixel_um
+        up = tuple(float(u) / length for u in parameters.up)
+        return cls(width_px, height_px, focal_px, *principal, parameters.distortion, up)
 
     def rays(self, x_px: ArrayLike, y_px: ArrayLike) -> Floats:
         """(n, 3) float64 directions of the camera rays through these pixels, with z = 1, distortion undone."""

@@ -191,15 +191,13 @@ def write_simulation(made: SimulatedRecording, out: Path) -> WrittenSimulation:
     HDF5 carries the truth and what it takes to simulate the scene again; RAW (EVT3) and NPZ hold events alone.
     The file appears only when complete. Raises RecordingError.
     """
-    _check_writable(out)
     keeps_truth = format_to_write(out).keeps_truth
     attributes = in_memory(made).attributes if keeps_truth else None
     write_recording(
         out, made.events, width_px=made.width_px, height_px=made.height_px, attributes=attributes, truth=made.truth
     )
-    warning = f"{out.suffix.lower()} holds no truth and no scene: write .h5 to keep them"
-    warnings = [] if keeps_truth else [warning]
-    return WrittenSimulation(out, made, warnings)
+    loss = f"{out.suffix.lower()} holds no truth and no scene: write .h5 to keep them"
+    return WrittenSimulation(out, made, [] if keeps_truth else [loss])
 
 
 def _simulating(on_progress: Progress | None) -> Callable[[float], None] | None:

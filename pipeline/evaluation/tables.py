@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import statistics
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 Value = str | int | float | bool | None
@@ -58,21 +58,12 @@ Cell = Value | Summary
 
 @dataclass(frozen=True, slots=True)
 class ResultTable:
-    """A table for people; a Summary reads "mean ± sd (median)".
-
-    Attributes
-    ----------
-    title : str
-    columns : tuple of str
-    rows : list of tuple
-    note : str
-        Explanation of the numbers in one or two sentences.
-    """
+    """A table for people; a Summary reads "mean ± sd (median)"."""
 
     title: str
     columns: tuple[str, ...]
     rows: list[tuple[Cell, ...]]
-    note: str = ""
+    note: str = ""  # explanation of the numbers in one or two sentences
 
     def as_text(self) -> list[list[str]]:
         """Every cell as text, row by row."""
@@ -80,14 +71,7 @@ class ResultTable:
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON: summaries with all their fields."""
-        plain = [
-            [
-                {name: getattr(cell, name) for name in Summary.__slots__} if isinstance(cell, Summary) else cell
-                for cell in row
-            ]
-            for row in self.rows
-        ]
-        return {"title": self.title, "columns": list(self.columns), "rows": plain, "note": self.note}
+        return asdict(self)
 
 
 def text(cell: Cell) -> str:

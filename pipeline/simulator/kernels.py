@@ -12,23 +12,9 @@ import math
 import numpy as np
 from numba import njit
 
+from . import kernels_pixel as pixel
 from .kernels_light import EVERY, Bodies, Floats, Physics, light
-from .kernels_pixel import (
-    IN_BOX,
-    LIGHT,
-    PLAIN,
-    RESTING,
-    SIGNAL,
-    SIGNAL_PLAIN,
-    TAIL,
-    TIME,
-    Ints,
-    Pixels,
-    View,
-    advance,
-    begin,
-    settled,
-)
+from .kernels_pixel import Ints, Pixels, View
 
 
 @njit(cache=True, nogil=True)
@@ -62,18 +48,18 @@ def _look(
                 owner, background, box, kind, pose, texture, physics, row, x, y, ray_x[p], ray_y[p]
             )
             looked[p] = row
-            at_work = role[p] == IN_BOX or role[p] == TAIL
+            at_work = role[p] == pixel.IN_BOX or role[p] == pixel.TAIL
             if covered or at_work:
                 intensity = intensity * gain + floor
                 plain = plain * gain + floor
                 if fresh:
-                    begin(state, role, cursor, sensor, physics, p, intensity, plain, now_us)
+                    pixel.begin(state, role, cursor, sensor, physics, p, intensity, plain, now_us)
                     continue
                 if not at_work:
                     before = background[p] * gain + floor
-                    begin(state, role, cursor, sensor, physics, p, before, before, since_us)
-                advance(state, events, sensor, physics, p, owner[p], intensity, plain, now_us)
-                if looks > base and not settled(state, p):  # its events want their times right
+                    pixel.begin(state, role, cursor, sensor, physics, p, before, before, since_us)
+                pixel.advance(state, events, sensor, physics, p, owner[p], intensity, plain, now_us)
+                if looks > base and not pixel.settled(state, p):  # its events want their times right
                     looks = base
             if steady and looks >= 2.0:
                 resting[p] = row + every * (int(looks) - 1)
@@ -96,19 +82,19 @@ def _tails(
     while i < cursor[0]:
         p = listing[i]
         y, x = p // width, p % width
-        new_role = TAIL
+        new_role = pixel.TAIL
         for k in range(box.shape[1]):
             if box[row, k, 0] <= x < box[row, k, 2] and box[row, k, 1] <= y < box[row, k, 3]:
-                new_role = IN_BOX
-        if new_role == TAIL and now_us - state[p, TIME] >= pause_us:
-            if settled(state, p):  # nothing happened since its last look: a body that vanishes does so now
-                state[p, TIME] = max(state[p, TIME], before_us)
+                new_role = pixel.IN_BOX
+        if new_role == pixel.TAIL and now_us - state[p, pixel.TIME] >= pause_us:
+            if pixel.settled(state, p):  # nothing happened since its last look: a body that vanishes does so now
+                state[p, pixel.TIME] = max(state[p, pixel.TIME], before_us)
             intensity = background[p] * gain + physics.floor
-            advance(state, events, sensor, physics, p, owner[p], intensity, intensity, now_us)
-            if physics.flicker_depth == 0.0 and settled(state, p):
-                state[p, SIGNAL], state[p, SIGNAL_PLAIN] = state[p, LIGHT], state[p, PLAIN]
-                new_role = RESTING
-        if new_role == TAIL:
+            pixel.advance(state, events, sensor, physics, p, owner[p], intensity, intensity, now_us)
+            if physics.flicker_depth == 0.0 and pixel.settled(state, p):
+                state[p, pixel.SIGNAL], state[p, pixel.SIGNAL_PLAIN] = state[p, pixel.LIGHT], state[p, pixel.PLAIN]
+                new_role = pixel.RESTING
+        if new_role == pixel.TAIL:
             i += 1
         else:
             role[p] = new_role
@@ -128,8 +114,8 @@ def _leave(pixels: Pixels, box: Ints, old: int, new: int, k: int, width: int) ->
                 x = box[new, k, 2]
                 continue
             p = y * width + x
-            if role[p] == IN_BOX:
-                role[p] = TAIL
+            if role[p] == pixel.IN_BOX:
+                role[p] = pixel.TAIL
                 listing[cursor[0]] = p
                 cursor[0] += 1
             x += 1
@@ -171,7 +157,7 @@ def begin_all(pixels: Pixels, view: View, physics: Physics) -> None:
     sensor = (view.threshold_on, view.threshold_off, view.normals)
     for p in range(view.background.size):
         intensity = view.background[p] * physics.brightness + physics.floor
-        begin(pixels.state, pixels.role, pixels.cursor, sensor, physics, p, intensity, intensity, 0.0)
-        pixels.role[p] = TAIL
+        pixel.begin(pixels.state, pixels.role, pixels.cursor, sensor, physics, p, intensity, intensity, 0.0)
+        pixels.role[p] = pixel.TAIL
         pixels.listing[p] = p
     pixels.cursor[0] = view.background.size

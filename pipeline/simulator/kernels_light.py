@@ -23,11 +23,10 @@ TURN = 3
 SIGMA = 12  # blur of the outline in px
 POSE_COLUMNS = 13
 
-# Columns of what a body is like.
-(KIND, OWNER, EVERY, SLOWER, RADIUS, ALBEDO, ALBEDO_2, HALF_EXTENT, TEXELS, CAP_COSINE, EXTENT_X, EXTENT_Y, SAMPLE) = (
-    range(13)
-)
-BODY_COLUMNS = 13  # SLOWER: so many looks may pass where a body moves slowest
+# Columns of what a body is like; SLOWER: so many looks may pass where it moves slowest.
+KIND, OWNER, EVERY, SLOWER, RADIUS, ALBEDO, ALBEDO_2 = range(7)
+HALF_EXTENT, TEXELS, CAP_COSINE, EXTENT_X, EXTENT_Y, SAMPLE = range(7, 13)  # of a ball's logo
+BODY_COLUMNS = 13
 
 LOOKS_A_PIXEL = 4  # at least, of any motion
 
@@ -50,9 +49,7 @@ class Physics(NamedTuple):
     refractory_us: float
     off_after_on_us: float
     contrast_noise: float
-    up_x: float
-    up_y: float
-    up_z: float
+    up: tuple[float, float, float]
     sky: float
     bounce: float
     brightness: float  # illuminance over the reference
@@ -113,7 +110,7 @@ def ball_light(
     nx, ny, nz = far * ray_x - cx, far * ray_y - cy, far - cz
     norm = 1.0 / math.sqrt(nx * nx + ny * ny + nz * nz)
     nx, ny, nz = nx * norm, ny * norm, nz * norm
-    lift = nx * physics.up_x + ny * physics.up_y + nz * physics.up_z
+    lift = nx * physics.up[0] + ny * physics.up[1] + nz * physics.up[2]
     shade = (
         physics.sky * 0.5 * (1.0 + lift) + (1.0 - physics.sky) * max(lift, 0.0) + physics.bounce * 0.5 * (1.0 - lift)
     )

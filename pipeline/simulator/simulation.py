@@ -20,7 +20,7 @@ from ..results import Truth
 from . import kernels, kernels_light, kernels_pixel
 from .background import intensity_map
 from .bodies import ArmBody, BallBody, bodies_of
-from .motion import Trajectory
+from .motion import triple
 from .scene import Scene, built
 from .sensor import EDGE, LOGO, OTHER, LabelledEvents, Lens, SensorModel, noise, read_out, thresholds
 
@@ -34,6 +34,9 @@ REFERENCE_LUX = 1930.0  # the paper's setup, section 4.1
 VERSION = 2  # of the model: raised whenever the same scene and seed give other events
 
 Progress = Callable[[float], None]
+BodyLooks = tuple[
+    BallBody | ArmBody, int, int
+]  # a body is looked at in every so many rows; slower: see `kernels_light`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,25 +148,18 @@ def simulate_again(
 
 def truth_of(scene: Scene, camera: Camera, label: NDArray[np.uint8]) -> Truth:
     """The truth of the first ball every 500 us of its motions."""
-    rows: list[tuple[NDArray[np.int64], Trajectory]] = []
+    times, poses = [np.empty(0, np.int64)], []
     for flown in BallBody(scene, 0).trajectories if scene.balls else ():
         first = -(-max(round(flown.start_s * 1e6), 0) // TRUTH_STEP_US) * TRUTH_STEP_US
         last = round(min(flown.end_s, scene.duration_s) * 1e6)
-        t_us = np.arange(first, last, TRUTH_STEP_US, dtype=np.int64)
-        rows.append((t_us, flown.at(t_us * 1e-6)))
-    nowhere = np.empty((0, 3))
-    position = np.concatenate([nowhere, *(pose.position_m for _, pose in rows)])
-    x_px, y_px, radius_px = camera.silhouette(position, scene.balls[0].radius_m if scene.balls else 1.0)
-    return Truth(
-        t_us=np.concatenate([np.empty(0, np.int64), *(t_us for t_us, _ in rows)]),
-        x_px=x_px,
-        y_px=y_px,
-        radius_px=radius_px,
-        position_m=position,
-        velocity_m_s=np.concatenate([nowhere, *(pose.velocity_m_s for _, pose in rows)]),
-        spin_rps=np.concatenate([nowhere, *(pose.spin_rps for _, pose in rows)]),
-        label=label,
+        times.append(np.arange(first, last, TRUTH_STEP_US, dtype=np.int64))
+        poses.append(flown.at(times[-1] * 1e-6))
+    position_m, velocity_m_s, spin_rps = (
+        np.concatenate([np.empty((0, 3)), *(getattr(pose, name) for pose in poses)])
+        for name in ("position_m", "velocity_m_s", "spin_rps")
     )
+    circle = camera.silhouette(position_m, scene.balls[0].radius_m if scene.balls else 1.0)
+    return Truth(np.concatenate(times), *circle, position_m, velocity_m_s, spin_rps, label)
 
 
 class _Simulation:
@@ -196,9 +192,7 @@ class _Simulation:
             refractory_us=sensor.dead_us,
             off_after_on_us=sensor.off_after_on_us,
             contrast_noise=sensor.contrast_noise,
-            up_x=float(scene.up[0]),
-            up_y=float(scene.up[1]),
-            up_z=float(scene.up[2]),
+            up=triple(np.array(scene.up)),
             sky=light.sky,
             bounce=light.bounce,
             brightness=light.illuminance_lux / REFERENCE_LUX,
@@ -208,13 +202,8 @@ class _Simulation:
             focal_px=camera.focal_px,
             width_px=camera.width_px,
         )
-        self.pixels = self._at_rest(count)
-        self.boxes = np.zeros((0, 4), np.int32)  # of the bodies at the end of the last segment
-        self.found: list[LabelledEvents] = []
-
-    def _at_rest(self, count: int) -> kernels_pixel.Pixels:
-        buffer = 4 * count if self.scene.light.flicker_depth else 1 << 20
-        return kernels_pixel.Pixels(
+        buffer = 4 * count if light.flicker_depth else 1 << 20
+        self.pixels = kernels_pixel.Pixels(
             state=np.zeros((count, kernels_pixel.STATE_COLUMNS)),
             role=np.full(count, kernels_pixel.NEW, np.uint8),
             owner=np.zeros(count, np.uint8),
@@ -226,6 +215,8 @@ class _Simulation:
             event_us=np.empty(buffer),
             event_word=np.empty(buffer, np.int64),
         )
+        self.boxes = np.zeros((0, 4), np.int32)  # of the bodies at the end of the last segment
+        self.found: list[LabelledEvents] = []
 
     def run(self, progress: Progress | None) -> list[LabelledEvents]:
         """All events of moving bodies (and flicker), delayed and jittered, not sorted."""
@@ -250,11 +241,10 @@ class _Simulation:
         speeds = [body.speeds_px_s(self.camera, start, stop) for body in there]
         wanted = [min(EDGE_STEP_PX / max(surface, 1e-3), LONGEST_STEP_S) for _, surface in speeds]
         step = min(wanted, default=LONGEST_STEP_S)
-        every = [int(own / step + 1e-9) for own in wanted]
-        slower = [
-            int(min(EDGE_STEP_PX / max(slowest, 1e-3), LONGEST_STEP_S) / own)
-            for (slowest, _), own in zip(speeds, wanted, strict=True)
-        ]
+        looks: list[BodyLooks] = []
+        for body, (slowest, _), own in zip(there, speeds, wanted, strict=True):
+            slower = int(min(EDGE_STEP_PX / max(slowest, 1e-3), LONGEST_STEP_S) / own)
+            looks.append((body, int(own / step + 1e-9), max(slower, 1)))
         rows = max(math.ceil((stop - start) / step), 1)
         if start == 0.0 and self.scene.light.flicker_depth:  # every pixel works all the time
             kernels.begin_all(self.pixels, self.view, self.physics)
@@ -265,7 +255,7 @@ class _Simulation:
             time_s = start + (stop - start) * np.arange(first, first + count + 1) / rows
             self.pixels.looked[:] = -1
             self.pixels.rest[:] = -1
-            packed = _packed(there, every, slower, self.camera, self.lens, time_s)
+            packed = _packed(looks, self.camera, self.lens, time_s)
             self.boxes = packed.box[-1].copy()
             row = 0 if start == 0.0 and first == 0 else 1
             while row <= count:
@@ -289,24 +279,18 @@ class _Simulation:
 
 
 def _packed(
-    there: Sequence[BallBody | ArmBody],
-    every: Sequence[int],
-    slower: Sequence[int],
-    camera: Camera,
-    lens: Lens,
-    time_s: NDArray[np.float64],
+    looks: Sequence[BodyLooks], camera: Camera, lens: Lens, time_s: NDArray[np.float64]
 ) -> kernels_light.Bodies:
     """The bodies at these times in the kernels' form, from far to near."""
     middle_s = float(time_s[time_s.size // 2])
-    order = sorted(range(len(there)), key=lambda k: -there[k].distance_m(middle_s))
-    packed = [there[k].packed(camera, lens, time_s, every[k], max(slower[k], 1)) for k in order]
+    looks = sorted(looks, key=lambda look: -look[0].distance_m(middle_s))
+    packed = [body.packed(camera, lens, time_s, every, slower) for body, every, slower in looks]
     side = max((body.texture.shape[0] for body in packed), default=2)
     texture = np.zeros((len(packed), side, side), np.float32)
-    for k, body in enumerate(packed):
-        texture[k, : body.texture.shape[0], : body.texture.shape[1]] = body.texture
     pose = np.empty((time_s.size, len(packed), kernels_light.POSE_COLUMNS))
     box = np.empty((time_s.size, len(packed), 4), np.int32)
     kind = np.empty((len(packed), kernels_light.BODY_COLUMNS))
     for k, body in enumerate(packed):
         pose[:, k], box[:, k], kind[k] = body.pose, body.box, body.kind
+        texture[k, : body.texture.shape[0], : body.texture.shape[1]] = body.texture
     return kernels_light.Bodies(pose, box, kind, texture)

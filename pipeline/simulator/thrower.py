@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from types import MappingProxyType
 
 import numpy as np
 
@@ -12,32 +11,28 @@ from .scene import Scene
 from .scenes import flight
 
 # Velocity setting -> metres per second (section 4.3).
-THROWER_SPEED_M_S = MappingProxyType({10: 4.0, 15: 5.5, 20: 7.5, 25: 9.0})
+THROWER_SPEED_M_S = {10: 4.0, 15: 5.5, 20: 7.5, 25: 9.0}
 
 _SETTINGS = range(-5, 8)
 
 
-def _row(*values: float) -> MappingProxyType[int, float]:
-    return MappingProxyType(dict(zip(_SETTINGS, values, strict=False)))
+def _row(*values: float) -> dict[int, float]:
+    return dict(zip(_SETTINGS, values, strict=False))
 
 
 # Magnitudes in rps by velocity setting and spin setting; settings the paper could not measure are absent.
-THROWER_SIDE_RPS = MappingProxyType(
-    {
-        25: _row(137.81, 124.60, 107.42, 103.23, 98.22, 81.83, 63.69, 38.87, 35.72, 41.38, 62.41),
-        20: _row(127.10, 110.70, 92.45, 93.09, 88.47, 72.36, 60.61, 45.53, 45.40, 53.64, 64.80),
-        15: _row(119.51, 98.76, 81.94, 81.89, 72.69, 66.75, 63.80, 57.20, 57.48, 63.80, 68.69),
-        10: _row(92.31, 74.41, 60.74, 61.23, 58.74, 57.85, 61.46, 61.80, 62.27, 65.54, 66.11),
-    }
-)
-THROWER_BACKTOP_RPS = MappingProxyType(
-    {
-        25: _row(111.81, 90.41, 64.34, 65.46, 53.42, 34.13, 17.01, 16.61, 35.10, 54.20, 74.14),
-        20: _row(99.99, 78.42, 55.22, 53.91, 39.42, 13.30, 2.05, 22.39, 39.94, 54.05, 68.90),
-        15: _row(93.11, 71.01, 47.27, 39.65, 22.80, 5.65, 4.77, 25.30, 40.17, 54.37, 62.67, 95.77),
-        10: _row(72.33, 54.58, 36.46, 23.41, 9.21, 0.91, 7.41, 17.10, 25.04, 34.94, 38.67, 59.75, 88.76),
-    }
-)
+THROWER_SIDE_RPS = {
+    25: _row(137.81, 124.60, 107.42, 103.23, 98.22, 81.83, 63.69, 38.87, 35.72, 41.38, 62.41),
+    20: _row(127.10, 110.70, 92.45, 93.09, 88.47, 72.36, 60.61, 45.53, 45.40, 53.64, 64.80),
+    15: _row(119.51, 98.76, 81.94, 81.89, 72.69, 66.75, 63.80, 57.20, 57.48, 63.80, 68.69),
+    10: _row(92.31, 74.41, 60.74, 61.23, 58.74, 57.85, 61.46, 61.80, 62.27, 65.54, 66.11),
+}
+THROWER_BACKTOP_RPS = {
+    25: _row(111.81, 90.41, 64.34, 65.46, 53.42, 34.13, 17.01, 16.61, 35.10, 54.20, 74.14),
+    20: _row(99.99, 78.42, 55.22, 53.91, 39.42, 13.30, 2.05, 22.39, 39.94, 54.05, 68.90),
+    15: _row(93.11, 71.01, 47.27, 39.65, 22.80, 5.65, 4.77, 25.30, 40.17, 54.37, 62.67, 95.77),
+    10: _row(72.33, 54.58, 36.46, 23.41, 9.21, 0.91, 7.41, 17.10, 25.04, 34.94, 38.67, 59.75, 88.76),
+}
 
 # Human shots: medians and 95th percentiles of spin and speed; the highest spin measured.
 HUMAN_SPIN_RPS = (46.0, 120.0, 152.0)

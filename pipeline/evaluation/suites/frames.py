@@ -19,9 +19,8 @@ HELP = "A frame camera beside the event camera on the same flights (table 2)."
 
 FRAME = "frame"  # the rival among the methods
 # What the rival's results depend on: nothing of the event camera's pipeline.
-NEEDS: tuple[str, ...] = ("simulator", "biases.py", "evaluation/rendering.py")
-NEEDS += ("evaluation/suites/thrower.py", "evaluation/suites/frames.py")
-NEEDS += tuple(f"evaluation/frame_{name}.py" for name in ("camera", "albedo", "matching"))
+FILES = ("rendering", "suites/thrower", "suites/frames", "frame_camera", "frame_albedo", "frame_matching")
+NEEDS = ("simulator", "biases.py", *(f"evaluation/{name}.py" for name in FILES))
 EVERY = 3  # every so many of the thrower's flights are taken: the rival needs seconds for each
 BINS_RPS = ((0, 30), (30, 60), (60, 90), (90, 150))
 

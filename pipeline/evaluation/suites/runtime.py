@@ -47,15 +47,10 @@ def measure(context: TaskContext, tick_us: int, **flight: Any) -> list[Row]:
     for tick in chain.run(parameters, forget=STAGES):
         taken_ms = {name: (chain.seconds[name] - before[name]) * 1e3 for name in STAGES}
         before = dict(chain.seconds)
-        row: Row = {
-            "tick_us": tick_us,
-            "seed": about["seed"],
-            "t_us": tick.packet.end_us,
-            "tick_ms": (tick.packet.end_us - tick.packet.start_us) / 1e3,
-            "events": len(tick.packet.events),
-            "has_ball": tick.track.has_ball,
-            "latency_ms": sum(taken_ms[name] for name in LATENCY_STAGES),
-        }
+        packet, latency_ms = tick.packet, sum(taken_ms[name] for name in LATENCY_STAGES)
+        row: Row = {"tick_us": tick_us, "seed": about["seed"], "t_us": packet.end_us}
+        row |= {"tick_ms": (packet.end_us - packet.start_us) / 1e3, "events": len(packet.events)}
+        row |= {"has_ball": tick.track.has_ball, "latency_ms": latency_ms}
         rows.append(row | {f"{name}_ms": value for name, value in taken_ms.items()})
     return rows
 

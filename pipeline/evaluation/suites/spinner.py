@@ -50,16 +50,8 @@ def measure(context: TaskContext, ball: int, kind: str, rps: float, seed: int) -
     for start_ms, end_ms in WINDOWS_MS:
         window_us = (start_ms * 1000, end_ms * 1000)
         seen = logo_events(recording, window_us)
-        about: Row = {
-            "ball": ball,
-            "kind": kind,
-            "rps": rps,
-            "seed": seed,
-            "window_ms": end_ms - start_ms,
-            "start_ms": start_ms,
-            "logo_events": seen,
-            "visible": seen >= VISIBLE[end_ms - start_ms],
-        }
+        about: Row = {"ball": ball, "kind": kind, "rps": rps, "seed": seed, "window_ms": end_ms - start_ms}
+        about |= {"start_ms": start_ms, "logo_events": seen, "visible": seen >= VISIBLE[end_ms - start_ms]}
         rows += estimate_rows(estimated(recording, parameters, window_us), recording.truth, about)
     return rows
 

@@ -79,15 +79,9 @@ def _measured(context: TaskContext, recording: SimulatedRecording, about: Row) -
 def flight_of(context: TaskContext, velocity: int, spin: int, side: bool, seed: int) -> tuple[SimulatedRecording, Row]:
     """The recording of a flight at these settings of the thrower, and the columns that tell flights apart."""
     recording = render(context, thrown(velocity, spin, side=side, seed=seed), seed=seed)
-    about: Row = {
-        "velocity_setting": velocity,
-        "spin_setting": spin,
-        "side": side,
-        "seed": seed,
-        "by": THROWER,
-        "speed_m_s": THROWER_SPEED_M_S[velocity],
-        "rps": (THROWER_SIDE_RPS if side else THROWER_BACKTOP_RPS)[velocity][spin],
-    }
+    about: Row = {"velocity_setting": velocity, "spin_setting": spin, "side": side, "seed": seed, "by": THROWER}
+    about["speed_m_s"] = THROWER_SPEED_M_S[velocity]
+    about["rps"] = (THROWER_SIDE_RPS if side else THROWER_BACKTOP_RPS)[velocity][spin]
     return recording, about | _visibility(recording)
 
 

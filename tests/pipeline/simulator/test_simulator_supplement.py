@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinscope.pipeline.biases import CURVES, FACTORY, PAPER, BiasParameters, Curve
+from spinscope.pipeline.biases import CURVES, FACTORY, PAPER, BiasCurve, BiasParameters
 from spinscope.pipeline.camera import Camera, CameraParameters
 from spinscope.pipeline.simulator import (
     Background,
@@ -87,7 +87,7 @@ def first_on_us(recording: SimulatedRecording) -> np.ndarray:
 
 
 def test_ones_own_curves_make_the_sensor():
-    mine = Curve("refr", "us", ((-20, 100.0), (235, 10.0)), "measured", calibrated=True)
+    mine = BiasCurve("refr", ((-20, 100.0), (235, 10.0)), calibrated=True)
     assert SensorModel.of(PAPER, {**CURVES, "refractory_us": mine}).refractory_us == pytest.approx(mine.at(80))
 
 
