@@ -605,9 +605,9 @@ EVALUATION = [
         "pipeline/spin_terms.py", "if abs(value) >= WORTH", "if value >= WORTH", "tests/pipeline/test_spin_terms.py"
     ),
     Mutant(
-        "pipeline/biases.py",
-        'value["noise_on_factor"] * common * refractory,',
-        'value["noise_on_factor"] * common / refractory,',
+        "pipeline/simulator/sensor.py",
+        'noise_on = value["noise_on_factor"] * common * refractory',
+        'noise_on = value["noise_on_factor"] * common / refractory',
         "tests/pipeline/simulator/test_simulator_biases.py",
     ),
 ]
