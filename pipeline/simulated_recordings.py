@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -28,8 +28,7 @@ from .simulator import (
     spinner,
 )
 from .simulator.flights import FLIGHT_KINDS
-
-Progress = Callable[[float, str], None]  # share done (0..1) and what is being done
+from .simulator.simulation import Progress
 
 KINDS = ("spinner", "flight", "rally")
 # At 1000 rps an outline crosses 0.25 px, the simulator's step, in 2.4 us. The fastest spin measured: 152 rps.
@@ -137,8 +136,7 @@ def simulate(
     camera = Camera.of(optics, chosen.width_px, chosen.height_px)
     scene = _scene(kind, chosen, spin_rps, logo, camera)
     scene = replace(scene, balls=tuple(replace(ball, radius_m=chosen.radius_mm * 1e-3) for ball in scene.balls))
-    progress = _simulating(on_progress)
-    return simulate_scene(scene, camera=camera, sensor=biases or PAPER, seed=chosen.seed, progress=progress)
+    return simulate_scene(scene, camera=camera, sensor=biases or PAPER, seed=chosen.seed, on_progress=on_progress)
 
 
 def simulate_to_file(kind: str, out: Path, **options: Any) -> WrittenSimulation:
@@ -160,7 +158,7 @@ def simulate_again_to_file(
         raise RecordingError(
             f"the recording holds no scene: give one that `spinscope simulate` wrote as HDF5: {recording}"
         )
-    return write_simulation(simulate_again(description, sensor=biases, progress=_simulating(on_progress)), out)
+    return write_simulation(simulate_again(description, sensor=biases, on_progress=on_progress), out)
 
 
 def description_in(attributes: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -198,10 +196,6 @@ def write_simulation(made: SimulatedRecording, out: Path) -> WrittenSimulation:
     )
     loss = f"{out.suffix.lower()} holds no truth and no scene: write .h5 to keep them"
     return WrittenSimulation(out, made, [] if keeps_truth else [loss])
-
-
-def _simulating(on_progress: Progress | None) -> Callable[[float], None] | None:
-    return None if on_progress is None else lambda share: on_progress(share, "simulating")
 
 
 def _check_writable(out: Path) -> None:

@@ -216,7 +216,7 @@ def sweep_bias(
     report(BiasSweep(name, len(values), []))
     for value in values:
         sensor = biases.with_values(dict.fromkeys(swept.biases, value))
-        made = simulate_again(description, sensor=sensor, progress=lambda _: check())
+        made = simulate_again(description, sensor=sensor, on_progress=lambda _share, _what: check())
         is_ball, is_noise = (np.isin(made.truth.label, labels) for labels in ((EDGE, LOGO), (NOISE, HOT)))
         rates = _rates(made.events, is_ball, is_noise, float(description["scene"]["duration_s"]))
         found.append(BiasSweepPoint(value=value, **rates))

@@ -104,7 +104,7 @@ def pixel_rays(camera: Camera, x0_px: int, y0_px: int, side: int) -> Floats:
 
 
 def sphere_along(rays: Floats, centre_m: Floats, radius_m: float) -> tuple[Floats, Floats, Floats]:
-    """Where rays (n, 3) meet a sphere: the part along its centre, the discriminant (> 0 on the disc), the normals.
+    """Intersection of rays (n, 3) with a sphere: part along its centre, discriminant (> 0 on the disc), normals.
 
     Beside the disc the normals (n, 3) are those of the limb.
     """

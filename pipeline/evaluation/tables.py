@@ -14,14 +14,9 @@ Row = dict[str, Value]  # one measurement; names carry their units
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """Statistics of errors.
+    """Statistics of errors, over `count` values from so many attempts.
 
-    Attributes
-    ----------
-    count, of : int
-        Number of values and of attempts; count / of is the success rate.
-    mean, sd, median : float or None
-        None without values; the standard deviation of the sample needs two.
+    `mean`, `sd` and `median` are None without values; the standard deviation of the sample needs two.
     """
 
     count: int

@@ -27,15 +27,7 @@ Progress = Callable[[float, str], None]  # share done (0..1) and what is being d
 
 @dataclass(frozen=True)
 class TaskContext:
-    """Surroundings of every task.
-
-    Attributes
-    ----------
-    cache : Path or None
-        Folder for recordings and rows; None keeps nothing.
-    parameters : Parameters
-        Of the pipeline under evaluation.
-    """
+    """Folder for recordings and rows (None keeps nothing), and parameters of the pipeline under evaluation."""
 
     cache: Path | None = None
     parameters: Parameters = field(default_factory=Parameters)
@@ -72,12 +64,8 @@ def executor(workers: int = 1, cluster: str | None = None) -> Iterator[Parallel]
     workers : int
         Number of processes; up to 1, this process does the work.
     cluster : str or None
-        Address of a Dask scheduler, like "tcp://127.0.0.1:8786", whose workers do the work instead.
-
-    Raises
-    ------
-    ParameterError
-        Where Dask is not installed, or no cluster answers at the address.
+        Address of a Dask scheduler, like "tcp://127.0.0.1:8786", whose workers do the work instead; raises
+        ParameterError where Dask is not installed or none answers.
     """
     options: dict[str, Any] = {"return_as": "generator_unordered", "batch_size": 1}
     if cluster is None:

@@ -69,9 +69,6 @@ class Goal:
 
     Attributes
     ----------
-    what : str
-        Name of the recordings.
-    rows : sequence of dict
     answered : float or None
         Smallest share of answers (largest, where `refuse`).
     rps, deg : float or None
@@ -108,10 +105,8 @@ def goals(title: str, asked: Sequence[Goal], note: str) -> ResultTable:
         met = True
         for value, limit, at_least in found:
             # Three digits, so that a goal missed by a hair is seen to be missed.
-            cells += [
-                f"{value:.3f}" if at_least and value is not None else value,
-                None if limit is None else f"{'>=' if at_least else '<='} {limit:g}",
-            ]
+            cells.append(f"{value:.3f}" if at_least and value is not None else value)
+            cells.append(None if limit is None else f"{'>=' if at_least else '<='} {limit:g}")
             if limit is not None and value is not None:
                 met = met and (value >= limit if at_least else value <= limit)
         lines.append((*cells, "yes" if met else "no"))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -23,16 +22,6 @@ PIXEL_VARIANCE_PX2 = 1 / 12  # of a square pixel's own area
 TEXTURE_SHARE = 0.6  # of the blur's sigma goes into the texture, the rest into samples around the pixel
 ARM_PIECE = 0.05  # of a swing's period: its speed is taken as constant
 LOOK_S = 1e-3  # a ball of 30 m/s moves 30 mm in this time, less than its width
-
-
-@dataclass(frozen=True, eq=False)
-class PackedBody:
-    """One body at n times; see `kernels_light.Bodies`."""
-
-    pose: Floats
-    box: NDArray[np.int32]
-    kind: Floats
-    texture: NDArray[np.float32]
 
 
 class BallBody:
@@ -87,8 +76,8 @@ class BallBody:
         there = (one for one in self.trajectories if one.start_s <= time_s <= one.end_s)
         return next(there, self.trajectories[-1])
 
-    def packed(self, camera: Camera, lens: Lens, time_s: Floats, every: int, slower: int) -> PackedBody:
-        """The ball at these times, looked at in every so many of them; slower: see `kernels_light`."""
+    def packed(self, camera: Camera, lens: Lens, time_s: Floats, every: int, slower: int) -> columns.Bodies:
+        """The ball alone at these times, looked at in every so many of them; slower: see `kernels_light`."""
         there = self._trajectory_at(float(time_s[time_s.size // 2])).at(time_s)
         pose = np.empty((time_s.size, columns.POSE_COLUMNS))
         pose[:, columns.CENTRE : columns.CENTRE + 3] = there.position_m
@@ -108,7 +97,7 @@ class BallBody:
         kind[[columns.EXTENT_X, columns.EXTENT_Y]] = printed.extent_u, printed.extent_w
         kind[columns.SAMPLE] = math.sqrt(3 * (1 - TEXTURE_SHARE**2)) * typical
         box = self._box(camera, there.position_m, 4 * float(sigma.max()) + 1.0)
-        return PackedBody(pose, box, kind, printed.values)
+        return columns.Bodies(pose, box, kind, printed.values)
 
     def _box(self, camera: Camera, position_m: Floats, margin_px: float) -> NDArray[np.int32]:
         x, y, _ = camera.silhouette(position_m, self.ball.radius_m)
@@ -149,8 +138,8 @@ class ArmBody:
         elbow, hand = arm_ends(self.arm, [time_s])
         return float(elbow[0, 2] + hand[0, 2]) / 2
 
-    def packed(self, camera: Camera, lens: Lens, time_s: Floats, every: int, slower: int) -> PackedBody:
-        """The arm at these times, looked at in every so many of them; slower: see `kernels_light`."""
+    def packed(self, camera: Camera, lens: Lens, time_s: Floats, every: int, slower: int) -> columns.Bodies:
+        """The arm alone at these times, looked at in every so many of them; slower: see `kernels_light`."""
         arm = self.arm
         pose = np.zeros((time_s.size, columns.POSE_COLUMNS))
         low, high = [], []
@@ -168,7 +157,7 @@ class ArmBody:
         kind[[columns.ALBEDO, columns.ALBEDO_2]] = arm.sleeve_albedo, arm.hand_albedo
         first, last = np.minimum(*low) - 4 * sigma - 1, np.maximum(*high) + 4 * sigma + 1
         box = _clipped(first[:, 0], first[:, 1], last[:, 0], last[:, 1], camera)
-        return PackedBody(pose, box, kind, np.zeros((2, 2), np.float32))
+        return columns.Bodies(pose, box, kind, np.zeros((2, 2), np.float32))
 
 
 def _sigma_px(camera: Camera, lens: Lens, distance_m: Floats) -> Floats:

@@ -14,13 +14,13 @@ from numba import njit
 
 from . import kernels_pixel as pixel
 from .kernels_light import EVERY, Bodies, Floats, Physics, light
-from .kernels_pixel import Ints, Pixels, View
+from .kernels_pixel import Ints, Maps, Pixels
 
 
 @njit(cache=True, nogil=True)
 def _look(
     pixels: Pixels,
-    view: View,
+    view: Maps,
     bodies: Bodies,
     physics: Physics,
     row: int,
@@ -68,7 +68,7 @@ def _look(
 
 @njit(cache=True, nogil=True)
 def _tails(
-    pixels: Pixels, view: View, bodies: Bodies, physics: Physics, row: int, before_us: float, now_us: float, gain: float
+    pixels: Pixels, view: Maps, bodies: Bodies, physics: Physics, row: int, before_us: float, now_us: float, gain: float
 ) -> None:
     """Go on with the pixels that bodies have left, and let go those that have come to rest."""
     box, state, width = bodies.box, pixels.state, physics.width_px
@@ -129,7 +129,7 @@ def leave_all(pixels: Pixels, box: Ints, width: int) -> None:
 
 
 @njit(cache=True, nogil=True)
-def run(pixels: Pixels, view: View, bodies: Bodies, physics: Physics, time_us: Floats, first: int, fresh: bool) -> int:
+def run(pixels: Pixels, view: Maps, bodies: Bodies, physics: Physics, time_us: Floats, first: int, fresh: bool) -> int:
     """Simulate the rows from `first` of time_us on, writing into `pixels`; return the next row.
 
     Returns early when the event buffers are more than half full: empty them (cursor[1] = 0) and call again.
@@ -152,7 +152,7 @@ def run(pixels: Pixels, view: View, bodies: Bodies, physics: Physics, time_us: F
 
 
 @njit(cache=True, nogil=True)
-def begin_all(pixels: Pixels, view: View, physics: Physics) -> None:
+def begin_all(pixels: Pixels, view: Maps, physics: Physics) -> None:
     """Put every pixel of `pixels` to work on its background at time 0."""
     sensor = (view.threshold_on, view.threshold_off, view.normals)
     for p in range(view.background.size):

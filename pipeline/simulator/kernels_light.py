@@ -32,7 +32,7 @@ LOOKS_A_PIXEL = 4  # at least, of any motion
 
 
 class Bodies(NamedTuple):
-    """k bodies from far to near at n times."""
+    """k bodies from far to near at n times; of a body alone without the axis k."""
 
     pose: Floats  # (n, k, POSE_COLUMNS)
     box: Ints  # (n, k, 4) x0, y0, x1, y1 (x1, y1 not included), empty while away

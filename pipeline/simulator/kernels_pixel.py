@@ -52,8 +52,8 @@ Events = tuple[NDArray[np.int64], Floats, NDArray[np.int64]]  # cursor, event_us
 Thresholds = tuple[Singles, Singles, Floats]  # threshold_on, threshold_off, normals
 
 
-class View(NamedTuple):
-    """The camera and what stands still, each (n,)."""
+class Maps(NamedTuple):
+    """Maps over the pixels that do not change, each (n,)."""
 
     ray_x: Floats  # rays through the pixels, z = 1
     ray_y: Floats

@@ -37,7 +37,7 @@ def spinner(
     light: Light | None = None,
     seed: int = 0,
 ) -> Scene:
-    """A ball that turns in place (the paper's ball spinner).
+    """A ball that turns in place (the paper's ball spinner); raises ParameterError for unknown or impossible values.
 
     Parameters
     ----------
@@ -49,11 +49,6 @@ def spinner(
         Exact spin in the camera frame instead of kind and magnitude.
     position_m : (3,) sequence of float or None
         Of the centre, camera frame; None = drawn within 0.2 m of the optical axis at 2 m.
-
-    Raises
-    ------
-    ParameterError
-        For an unknown kind, ball or logo.
     """
     random = np.random.default_rng([seed, 1])
     if spin_rps is None:
@@ -94,7 +89,7 @@ def flight(
     camera: Camera | None = None,
     seed: int = 0,
 ) -> Scene:
-    """One shot across the image, from border to border.
+    """One shot across the image, from border to border; raises ParameterError, also when the ball does not leave it.
 
     Parameters
     ----------
@@ -116,11 +111,6 @@ def flight(
         The spin falls as exp(-spin_decay_hz t).
     camera : Camera or None
         None = the paper's.
-
-    Raises
-    ------
-    ParameterError
-        For an unknown kind, ball or logo, a value out of range, a ball that does not leave the image.
     """
     random = np.random.default_rng([seed, 2])
     camera, air = camera or default_camera(), air or Air()

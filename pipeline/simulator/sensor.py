@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -161,21 +162,9 @@ class SensorModel:
     @classmethod
     def ideal(cls, threshold: float = 0.27) -> SensorModel:
         """Equal pixels that answer at once and without noise."""
-        return cls(
-            threshold_on=threshold,
-            threshold_off=threshold,
-            mismatch=0.0,
-            cutoff_hz=1e7,
-            dark_tau_us=0.0,
-            refractory_us=0.0,
-            reset_settling=0.0,
-            off_after_on_us=0.0,
-            contrast_noise=0.0,
-            delay_us=0.0,
-            jitter_us=0.0,
-            noise_hz=0.0,
-            hot_share=0.0,
-        )
+        absent = ("mismatch", "dark_tau_us", "refractory_us", "reset_settling", "off_after_on_us", "contrast_noise")
+        zero: dict[str, Any] = dict.fromkeys((*absent, "delay_us", "jitter_us", "noise_hz", "hot_share"), 0.0)
+        return cls(threshold_on=threshold, threshold_off=threshold, cutoff_hz=1e7, **zero)
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,7 +33,7 @@ NORMALS = 1 << 16
 REFERENCE_LUX = 1930.0  # the paper's setup, section 4.1
 VERSION = 2  # of the model: raised whenever the same scene and seed give other events
 
-Progress = Callable[[float], None]
+Progress = Callable[[float, str], None]  # share done (0..1) and what is being done
 BodyLooks = tuple[
     BallBody | ArmBody, int, int
 ]  # a body is looked at in every so many rows; slower: see `kernels_light`
@@ -85,7 +85,7 @@ def simulate_scene(
     sensor: SensorModel | BiasParameters = PAPER,
     lens: Lens | None = None,
     seed: int = 0,
-    progress: Progress | None = None,
+    on_progress: Progress | None = None,
 ) -> SimulatedRecording:
     """Simulate a scene with exact truth; the same arguments give the same events.
 
@@ -99,8 +99,8 @@ def simulate_scene(
     lens : Lens or None
     seed : int
         Of pixel mismatch, noise and jitter; raises ParameterError when negative.
-    progress : callable or None
-        Called with the share done, 0 to 1.
+    on_progress : callable or None
+        Called with the share done (0..1) and what is being done.
     """
     if seed < 0:
         raise ParameterError(f"seed {seed} is out of range: 0 or more")
@@ -113,7 +113,7 @@ def simulate_scene(
     backdrop = intensity_map(scene, camera)
     work = _Simulation(scene, camera, array, lens, backdrop, pattern, pixel)
     duration_us = round(scene.duration_s * 1e6)
-    moving = work.run(progress)
+    moving = work.run(on_progress)
     brightness = scene.light.illuminance_lux / REFERENCE_LUX
     still = noise(array, backdrop * brightness, duration_us, camera.width_px, pattern, background)
     read = read_out([*moving, still], array, duration_us)
@@ -131,7 +131,10 @@ def simulate_scene(
 
 
 def simulate_again(
-    description: dict[str, Any], *, sensor: SensorModel | BiasParameters | None = None, progress: Progress | None = None
+    description: dict[str, Any],
+    *,
+    sensor: SensorModel | BiasParameters | None = None,
+    on_progress: Progress | None = None,
 ) -> SimulatedRecording:
     """The recording of a description again, or the same scene with another sensor; raises ParameterError."""
     try:
@@ -143,7 +146,7 @@ def simulate_again(
             sensor = SensorModel(**description["sensor"]) if biases is None else BiasParameters(**biases)
     except (KeyError, TypeError, ValueError) as error:
         raise ParameterError(f"this is no description of a simulated recording: {error}") from error
-    return simulate_scene(scene, camera=camera, sensor=sensor, lens=lens, seed=seed, progress=progress)
+    return simulate_scene(scene, camera=camera, sensor=sensor, lens=lens, seed=seed, on_progress=on_progress)
 
 
 def truth_of(scene: Scene, camera: Camera, label: NDArray[np.uint8]) -> Truth:
@@ -183,7 +186,7 @@ class _Simulation:
         column, row = np.meshgrid(np.arange(camera.width_px), np.arange(camera.height_px))
         rays = camera.rays(column.ravel(), row.ravel())
         ray_x, ray_y = np.ascontiguousarray(rays[:, :2].T)
-        self.view = kernels_pixel.View(ray_x, ray_y, backdrop, on, off, random.standard_normal(NORMALS))
+        self.view = kernels_pixel.Maps(ray_x, ray_y, backdrop, on, off, random.standard_normal(NORMALS))
         light = scene.light
         self.physics = kernels_light.Physics(
             tau_us=sensor.tau_us,
@@ -218,7 +221,7 @@ class _Simulation:
         self.boxes = np.zeros((0, 4), np.int32)  # of the bodies at the end of the last segment
         self.found: list[LabelledEvents] = []
 
-    def run(self, progress: Progress | None) -> list[LabelledEvents]:
+    def run(self, on_progress: Progress | None) -> list[LabelledEvents]:
         """All events of moving bodies (and flicker), delayed and jittered, not sorted."""
         end = self.scene.duration_s
         visible = [body.visible(self.camera, end) for body in self.bodies]
@@ -231,11 +234,11 @@ class _Simulation:
             kernels.leave_all(self.pixels, self.boxes, self.camera.width_px)
             self.boxes = np.zeros((0, 4), np.int32)
             if there or self.pixels.cursor[0] or self.scene.light.flicker_depth:
-                self._segment(there, start, stop, progress)
+                self._segment(there, start, stop, on_progress)
         return self.found
 
     def _segment(
-        self, there: Sequence[BallBody | ArmBody], start: float, stop: float, progress: Progress | None
+        self, there: Sequence[BallBody | ArmBody], start: float, stop: float, on_progress: Progress | None
     ) -> None:
         """Simulate [start, stop], in which these bodies and no others may be seen."""
         speeds = [body.speeds_px_s(self.camera, start, stop) for body in there]
@@ -261,8 +264,8 @@ class _Simulation:
             while row <= count:
                 row = kernels.run(self.pixels, self.view, packed, self.physics, time_s * 1e6, row, row == 0)
                 self._collect()
-            if progress is not None:
-                progress(min(float(time_s[-1]) / self.scene.duration_s, 1.0))
+            if on_progress is not None:
+                on_progress(min(float(time_s[-1]) / self.scene.duration_s, 1.0), "simulating")
 
     def _collect(self) -> None:
         pixels, sensor = self.pixels, self.sensor

@@ -97,12 +97,9 @@ class HoughKalman:
     def _begun(self, circle: Circle) -> BallFilter:
         per_m = circle.radius_px / self.radius_m
         std = np.array([HOUGH_STD_PX, HOUGH_STD_PX, FASTEST_M_S * per_m, FASTEST_M_S * per_m, HOUGH_STD_PX])
-        return BallFilter(
-            np.array([circle.x_px, circle.y_px, 0.0, 0.0, circle.radius_px]),
-            np.diag(std**2),
-            ACCELERATION_M_S2 * per_m,
-            APPROACH_M_S * per_m * circle.radius_px / self.focal_px,
-        )
+        mean = np.array([circle.x_px, circle.y_px, 0.0, 0.0, circle.radius_px])
+        approach_px_s = APPROACH_M_S * per_m * circle.radius_px / self.focal_px
+        return BallFilter(mean, np.diag(std**2), ACCELERATION_M_S2 * per_m, approach_px_s)
 
 
 def _found(tick: Tick, follower: HoughKalman) -> dict[str, BallState | None]:
