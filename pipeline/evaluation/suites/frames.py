@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...simulator import thrown
 from .. import paper
 from ..estimation import COLUMNS, method_lines, spin_errors
 from ..frame_camera import FrameCamera, frames
@@ -35,11 +34,9 @@ def tasks(quick: bool) -> list[Task]:
 def measure(context: TaskContext, velocity: int, spin: int, side: bool, seed: int) -> list[Row]:
     """The frame camera's errors in one flight."""
     recording, row = thrower.flight_of(context, velocity, spin, side, seed)
-    scene = thrown(velocity, spin, side=side, seed=seed)
-    rival = FrameCamera()
-    found, reason = spin_from_frames(
-        list(frames(scene, rival, seed)), rival.camera, scene.balls[0].radius_m, rival.rate_hz, scene.balls[0].logo
-    )
+    scene, rival = recording.scene, FrameCamera()
+    ball, seen = scene.balls[0], list(frames(scene, rival, seed))
+    found, reason = spin_from_frames(seen, rival.camera, ball.radius_m, rival.rate_hz, ball.logo)
     row |= {"method": FRAME, "magnitude_error_rps": None, "axis_error_deg": None, "reason": reason}
     if found is not None:
         row["magnitude_error_rps"], row["axis_error_deg"] = spin_errors(found, recording.truth.spin_rps[0])
