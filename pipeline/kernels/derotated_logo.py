@@ -15,13 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from .arrays import Bytes, Flags, Floats, Integers, Singles
 from .rotation import axis_and_length, rotate
-
-Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
-Bytes = NDArray[np.uint8]
 
 CELLS = 48  # along the cube of a painting: 2.7 degrees, a pixel's share of a ball of 20 px radius
 NOISE_SHARE = 0.1  # of the full count: below it there is no colour
@@ -35,9 +31,7 @@ def _place(direction: float, side: int) -> float:
 
 
 @njit(cache=True, nogil=True)
-def count_derotated(
-    density: Singles, normals: Floats, on: NDArray[np.bool_], seconds: Floats, spin_rps: Floats
-) -> None:
+def count_derotated(density: Singles, normals: Floats, on: Flags, seconds: Floats, spin_rps: Floats) -> None:
     """Fill `density` with turned events.
 
     Counts first, then spreads the few cells that have any: 3 x as fast as turning the events and smoothing the whole
@@ -133,9 +127,7 @@ def full_count(counts: Singles) -> float:
 
 
 @njit(cache=True, nogil=True)
-def colour_counts(
-    picture: Bytes, places: NDArray[np.int64], counts: Singles, colours: Singles, ground: Singles
-) -> None:
+def colour_counts(picture: Bytes, places: Integers, counts: Singles, colours: Singles, ground: Singles) -> None:
     """Write the ground's colour, shifted towards others by counts, into places of `picture`.
 
     Noise below a tenth of the full count has no colour, and from the full count on there is all of it.
@@ -186,7 +178,7 @@ class Canvas(NamedTuple):
         Colour where there are no events.
     """
 
-    places: NDArray[np.int64]
+    places: Integers
     directions: Floats
     colours: Singles
     ground: Singles
@@ -198,9 +190,9 @@ def paint(
     canvases: tuple[Canvas, ...],
     frames: tuple[Floats, ...],
     normals: Floats,
-    on: NDArray[np.bool_],
+    on: Flags,
     seconds: Floats,
-    seen: NDArray[np.int64],
+    seen: Integers,
     spins_rps: Floats,
 ) -> None:
     """Paint the logo at several moments m, in pictures of several kinds, in one call.

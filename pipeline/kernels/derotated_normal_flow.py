@@ -11,11 +11,9 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Flags, Floats, Integers
 from .rotation import axis_and_length, rotate
-
-Floats = NDArray[np.float64]
 
 FEWEST = 8  # events for the line's two parameters, its drift, and enough left to judge it by
 NEIGHBOURS = 48  # at most, half of them before and half after
@@ -24,7 +22,7 @@ NO_LINE = 2.0
 
 
 @numba.njit(cache=True, nogil=True)
-def derotated_normals(normals: Floats, t_us: NDArray[np.int64], common_us: int, spin_rad_s: Floats) -> Floats:
+def derotated_normals(normals: Floats, t_us: Integers, common_us: int, spin_rad_s: Floats) -> Floats:
     """Normals at one common time, if the ball turns with this spin.
 
     Parameters
@@ -113,7 +111,7 @@ def fit_moving_line(u: Floats, v: Floats, t_s: Floats, width_rad: float) -> tupl
 
 @numba.njit(cache=True, nogil=True)
 def _gather(
-    near: Floats, turned: Floats, t_us: NDArray[np.int64], k: int, frame: Floats, reach_rad: float, reach_us: float
+    near: Floats, turned: Floats, t_us: Integers, k: int, frame: Floats, reach_rad: float, reach_us: float
 ) -> int:
     """Write (u, v, t in s) of event k and its neighbours into `near` (3, NEIGHBOURS); return how many there are.
 
@@ -139,16 +137,16 @@ def _gather(
 
 @numba.njit(cache=True, nogil=True)
 def derotated_constraints(
-    t_us: NDArray[np.int64],
+    t_us: Integers,
     normals: Floats,
-    on: NDArray[np.bool_],
+    on: Flags,
     spin_rad_s: Floats,
     stride: int,
     reach_rad: float,
     reach_us: float,
     width_rad: float,
     sharpest: float,
-) -> tuple[NDArray[np.int64], Floats, Floats, Floats, NDArray[np.int64]]:
+) -> tuple[Integers, Floats, Floats, Floats, Integers]:
     """Constraints rows . spin = speeds from every stride-th event whose neighbours make a line.
 
     Parameters

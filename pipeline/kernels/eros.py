@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+
+from .arrays import Bytes, Pixels
 
 # Widest block: its levels (254 at the event) still fit a byte. Half of it is the margin; being a multiple of
 # 8, it lets the image's rows start at whole words.
@@ -31,7 +32,7 @@ def odd_px(k_px: int) -> int:
     return k_px | 1
 
 
-def value_table(k_px: int) -> NDArray[np.uint8]:
+def value_table(k_px: int) -> Bytes:
     """Value of each level: (levels + 1,) uint8; the last is 255, at the level that an event sets.
 
     By multiplying again and again, as the reference does: 255 x 0.3 = 76.5 is a tie that rounding errors
@@ -50,28 +51,19 @@ def _stride_px(width_px: int) -> int:
     return MARGIN_PX + (width_px + 7) // 8 * 8
 
 
-def empty_levels(width_px: int, height_px: int) -> NDArray[np.uint8]:
+def empty_levels(width_px: int, height_px: int) -> Bytes:
     """Lives of an empty surface: flat uint8, with margins, and room behind for the last block's last band."""
     return np.zeros((height_px + 2 * MARGIN_PX) * _stride_px(width_px) + 64, np.uint8)
 
 
 @njit(cache=True, nogil=True)
-def update(
-    levels: NDArray[np.uint8],
-    width_px: int,
-    k_px: int,
-    full: int,
-    x_px: NDArray[np.uint16],
-    y_px: NDArray[np.uint16],
-) -> None:
+def update(levels: Bytes, width_px: int, k_px: int, full: int, x_px: Pixels, y_px: Pixels) -> None:
     """Add events in their order: fade the block around each, then set its pixel; writes into `levels` only.
 
     Parameters
     ----------
     levels : flat uint8
-        As made by `empty_levels` for this width.
-    width_px : int
-        Width of the image.
+        As made by `empty_levels` for this width of the image.
     k_px : int
         Width of the block, odd, at most K_MAX_PX.
     full : int
@@ -95,7 +87,7 @@ def update(
 
 
 @njit(cache=True, nogil=True)
-def render(values: NDArray[np.uint8], levels: NDArray[np.uint8], table: NDArray[np.uint8]) -> None:
+def render(values: Bytes, levels: Bytes, table: Bytes) -> None:
     """Write the values of the levels into `values` (height, width) uint8, which must hold zeros.
 
     Skips what is empty, by whole rows and then 32 pixels at a time: on a flight's surface 5 x as fast as cv2.LUT over

@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+
+from .arrays import Events, Integers
 
 OFF, STC, TRAIL, STC_CUT_TRAIL = range(4)
 
@@ -43,18 +44,15 @@ def _passes(mode: int, same: bool, pause_us: int, threshold_us: int, passed_befo
 
 @njit(cache=True, nogil=True)
 def filter_events(
-    last: NDArray[np.int64],
+    last: Integers,
     width_px: int,
-    t_us: NDArray[np.int64],
-    x_px: NDArray[np.uint16],
-    y_px: NDArray[np.uint16],
-    on: NDArray[np.bool_],
+    events: Events,
     mode: int,
     threshold_us: int,
     logo_mode: int,
     logo_threshold_us: int,
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Apply the surface's and the logo's filter to events in order of time; writes into `last` only.
+) -> tuple[Integers, Integers]:
+    """Apply the surface's and the logo's filter to events; writes into `last` only.
 
     Both in one go, because they share the pixels' last events and fetching these is most of the work.
 
@@ -64,18 +62,15 @@ def filter_events(
         The pixels' states, NEVER at the start.
     width_px : int
         Width of the image.
-    t_us, x_px, y_px, on : (n,) int64, uint16, uint16, bool
-        The events.
     mode, logo_mode : int
         OFF, STC, TRAIL or STC_CUT_TRAIL.
-    threshold_us, logo_threshold_us : int
-        Threshold of each filter.
 
     Returns
     -------
     rows, logo_rows : (m,) int64
         Rising indices of the events that each filter passes.
     """
+    t_us, x_px, y_px, on = events
     # Unsigned indices need no check for negative ones: a quarter faster.
     count, width = np.uint64(t_us.size), np.uint64(width_px)
     rows, logo_rows = np.empty(t_us.size, np.int64), np.empty(t_us.size, np.int64)

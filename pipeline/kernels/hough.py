@@ -6,20 +6,12 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Votes = NDArray[np.uint16]
+from .arrays import Bytes, Integers, Pixels
 
 
 @njit(cache=True, nogil=True)
-def vote(
-    votes: Votes,
-    x_px: NDArray[np.int64],
-    y_px: NDArray[np.int64],
-    x0_px: int,
-    y0_px: int,
-    radius0_px: int,
-) -> None:
+def vote(votes: Pixels, x_px: Integers, y_px: Integers, x0_px: int, y0_px: int, radius0_px: int) -> None:
     """Let each pixel vote for every circle that runs through it; adds into `votes` only.
 
     Parameters
@@ -28,8 +20,6 @@ def vote(
         votes[b, a, k] counts the pixels whose distance from the centre (x0 + a, y0 + b) rounds to radius0 + k, k >= 0.
     x_px, y_px : (n,) int64
         The pixels.
-    x0_px, y0_px, radius0_px : int
-        Centre and radius of votes[0, 0, 0].
     """
     height, width, radii = votes.shape
     reach = radius0_px + radii - 1
@@ -52,7 +42,7 @@ def vote(
 
 
 @njit(cache=True, nogil=True)
-def peak(votes: Votes, radius0_px: int) -> tuple[float, int, int, int]:
+def peak(votes: Pixels, radius0_px: int) -> tuple[float, int, int, int]:
     """Best supported circle: (support, a, b, k), its indices in the votes.
 
     The support is votes^2 / (2 pi radius): the number of votes times the share of the outline that they fill,
@@ -75,15 +65,11 @@ def peak(votes: Votes, radius0_px: int) -> tuple[float, int, int, int]:
 
 
 @njit(cache=True, nogil=True)
-def bright_pixels(
-    image: NDArray[np.uint8], least: int, most_pixels: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def bright_pixels(image: Bytes, least: int, most_pixels: int) -> tuple[Integers, Integers]:
     """Columns and rows (m,) int64 of the pixels of at least this value, thinned evenly to most_pixels."""
     count = 0
-    for y in range(image.shape[0]):
-        for x in range(image.shape[1]):
-            if image[y, x] >= least:
-                count += 1
+    for value in image.flat:
+        count += value >= least
     stride = max(1, -(-count // max(most_pixels, 1))) | 1  # odd: even ones would pick out whole columns
     xs = np.empty(-(-count // stride), np.int64)
     ys = np.empty(xs.size, np.int64)
@@ -99,13 +85,7 @@ def bright_pixels(
 
 
 @njit(cache=True, nogil=True)
-def active_cells(
-    values: NDArray[np.uint8],
-    x_px: NDArray[np.uint16],
-    y_px: NDArray[np.uint16],
-    least: int,
-    cell_px: int,
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def active_cells(values: Bytes, x_px: Pixels, y_px: Pixels, least: int, cell_px: int) -> tuple[Integers, Integers]:
     """Cells of cell_px x cell_px pixels in which one of these pixels is at least `least` in `values`.
 
     Cells without an active neighbour among their eight are left out: what remains of the noise is isolated.
@@ -116,10 +96,6 @@ def active_cells(
         A surface.
     x_px, y_px : (n,) uint16
         Pixels of events.
-    least : int
-        Value from which a pixel counts as bright.
-    cell_px : int
-        Width of a cell.
 
     Returns
     -------
@@ -159,7 +135,7 @@ def active_cells(
 
 
 @njit(cache=True, nogil=True)
-def refined(votes: Votes, a: int, b: int, k: int) -> tuple[float, float, float]:
+def refined(votes: Pixels, a: int, b: int, k: int) -> tuple[float, float, float]:
     """Peak (a, b, k) to sub-pixel: the centre of mass of the squared votes in the 3 x 3 x 3 around it."""
     height, width, radii = votes.shape
     total, sum_a, sum_b, sum_k = 0.0, 0.0, 0.0, 0.0
@@ -179,32 +155,19 @@ def refined(votes: Votes, a: int, b: int, k: int) -> tuple[float, float, float]:
 
 @njit(cache=True, nogil=True)
 def best_circle(
-    x_px: NDArray[np.int64],
-    y_px: NDArray[np.int64],
-    left_px: int,
-    top_px: int,
-    width_px: int,
-    height_px: int,
-    radius0_px: int,
-    radii: int,
+    x_px: Integers, y_px: Integers, left_px: int, top_px: int, side_px: int, radius0_px: int, radii: int
 ) -> tuple[float, float, float, float]:
-    """Circle through these pixels with the best support.
+    """Circle through these pixels (n,) with the best support.
 
-    Parameters
-    ----------
-    x_px, y_px : (n,) int64
-        The pixels.
-    left_px, top_px, width_px, height_px : int
-        Window of the centre.
-    radius0_px, radii : int
-        The radius rounds to one of so many from radius0 on.
+    Its centre is in a window of side_px x side_px from (left, top) on, and its radius rounds to one of `radii` from
+    radius0 on.
 
     Returns
     -------
     x_px, y_px, radius_px, share : float
         Centre, radius, and share of the outline that voted. All 0 without votes.
     """
-    votes = np.zeros((height_px, width_px, radii), np.uint16)
+    votes = np.zeros((side_px, side_px, radii), np.uint16)
     vote(votes, x_px, y_px, left_px, top_px, radius0_px)
     support, a, b, k = peak(votes, radius0_px)
     if support == 0.0:
@@ -212,21 +175,3 @@ def best_circle(
     x, y, radius = refined(votes, a, b, k)
     share = min(1.0, votes[b, a, k] / (2.0 * math.pi * (radius0_px + k)))
     return left_px + x, top_px + y, radius0_px + radius, share
-
-
-@njit(cache=True, nogil=True)
-def best_in_window(
-    window: NDArray[np.uint8],
-    x0_px: int,
-    y0_px: int,
-    least: int,
-    most_pixels: int,
-    left_px: int,
-    top_px: int,
-    side_px: int,
-    radius0_px: int,
-    radii: int,
-) -> tuple[float, float, float, float]:
-    """Circle (see `best_circle`) through the `bright_pixels` of a window whose first pixel is (x0, y0)."""
-    xs, ys = bright_pixels(window, least, most_pixels)
-    return best_circle(xs + x0_px, ys + y0_px, left_px, top_px, side_px, side_px, radius0_px, radii)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from .arrays import Bytes, Floats
 
 
-def flow_colours(vx_px_s: Floats, vy_px_s: Floats, bound_px_s: float) -> NDArray[np.uint8]:
+def flow_colours(vx_px_s: Floats, vy_px_s: Floats, bound_px_s: float) -> Bytes:
     """Colours (..., 3) uint8 RGB of velocities; white stands still, full colour moves at bound_px_s or faster.
 
     Hue 0 (red) moves to +x (right) and hue rises towards +y (down in the image).
@@ -18,11 +17,11 @@ def flow_colours(vx_px_s: Floats, vy_px_s: Floats, bound_px_s: float) -> NDArray
     # Value 1: a channel falls from 1 to 1 - saturation with the hue's distance from the channel's own.
     away = np.abs((hue[..., None] * 6.0 + np.array([0.0, 4.0, 2.0])) % 6.0 - 3.0) - 1.0
     channels = 1.0 - saturation[..., None] * (1.0 - np.clip(away, 0.0, 1.0))
-    colours: NDArray[np.uint8] = np.round(255.0 * channels).astype(np.uint8)
+    colours: Bytes = np.round(255.0 * channels).astype(np.uint8)
     return colours
 
 
-def hsv_wheel(size_px: int) -> NDArray[np.uint8]:
+def hsv_wheel(size_px: int) -> Bytes:
     """Colour wheel (size_px, size_px, 3) uint8: zero velocity in the middle, the bound at the rim, black outside."""
     across = (2.0 * np.arange(size_px) + 1.0) / size_px - 1.0
     vx, vy = np.meshgrid(across, across)
@@ -32,29 +31,12 @@ def hsv_wheel(size_px: int) -> NDArray[np.uint8]:
 
 
 def hsv_image(
-    x_px: Floats,
-    y_px: Floats,
-    vx_px_s: Floats,
-    vy_px_s: Floats,
-    *,
-    bound_px_s: float,
-    radius_px: float,
-    size_px: int,
-) -> NDArray[np.uint8]:
-    """Image (size_px, size_px, 3) uint8 of the ball's disc with the mean flow of every cell that has any.
+    x_px: Floats, y_px: Floats, vx_px_s: Floats, vy_px_s: Floats, *, bound_px_s: float, radius_px: float, size_px: int
+) -> Bytes:
+    """Image (size_px, size_px, 3) uint8 of the ball's disc with the mean flow of every cell; black without any.
 
-    Parameters
-    ----------
-    x_px, y_px : (n,) float64
-        Places relative to the ball's centre; those outside the picture are left out.
-    vx_px_s, vy_px_s : (n,) float64
-        Flow.
-    bound_px_s : float
-        Speed of full colour.
-    radius_px : float
-        Half width of the picture.
-    size_px : int
-        Width of the image. Cells without flow are black.
+    The places (n,) are relative to the ball's centre; those beyond radius_px, half the picture, are left out. Flow of
+    bound_px_s has full colour.
     """
     scale = size_px / (2.0 * radius_px)
     column, row = np.floor((x_px + radius_px) * scale), np.floor((y_px + radius_px) * scale)

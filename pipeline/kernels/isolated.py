@@ -15,15 +15,14 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Line = NDArray[np.uint8]
+from .arrays import Bytes
 
 ONE, TWO, THREE = np.uint64(1), np.uint64(2), np.uint64(3)
 
 
 @njit(cache=True, nogil=True)
-def _load(line: Line, values: NDArray[np.uint8], y: int, x0: int) -> None:
+def _load(line: Bytes, values: Bytes, y: int, x0: int) -> None:
     """Copy row y of values from column x0; zeros outside the image (assigning slices is 18 x slower)."""
     height, width = values.shape
     line[:] = 0
@@ -35,7 +34,7 @@ def _load(line: Line, values: NDArray[np.uint8], y: int, x0: int) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _ring(ring: Line, a: Line, b: Line, c: Line, d: Line) -> None:
+def _ring(ring: Bytes, a: Bytes, b: Bytes, c: Bytes, d: Bytes) -> None:
     """Write, for each 4 x 4 block of four lines, not 0 into `ring` where one of its 12 outer pixels is set."""
     for n in range(np.uint64(ring.size)):
         i = np.uint64(n)
@@ -44,7 +43,7 @@ def _ring(ring: Line, a: Line, b: Line, c: Line, d: Line) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _spare_unless_full(ring: Line, b: Line, c: Line) -> None:
+def _spare_unless_full(ring: Bytes, b: Bytes, c: Bytes) -> None:
     """Count the ring as set where not all four inner pixels are."""
     for n in range(np.uint64(ring.size)):
         i = np.uint64(n)
@@ -53,7 +52,7 @@ def _spare_unless_full(ring: Line, b: Line, c: Line) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _keep(out: Line, line: Line, above: Line, below: Line) -> None:
+def _keep(out: Bytes, line: Bytes, above: Bytes, below: Bytes) -> None:
     """Write the line without its pixels in a window with an empty ring; above, below: rings of the windows there."""
     for n in range(np.uint64(out.size)):
         i = np.uint64(n)
@@ -63,9 +62,7 @@ def _keep(out: Line, line: Line, above: Line, below: Line) -> None:
 
 
 @njit(cache=True, nogil=True)
-def copy_cleaned(
-    window: NDArray[np.uint8], values: NDArray[np.uint8], x0_px: int, y0_px: int, full_blocks_only: bool
-) -> None:
+def copy_cleaned(window: Bytes, values: Bytes, x0_px: int, y0_px: int, full_blocks_only: bool) -> None:
     """Write a window of `values` without its isolated pixels into `window`, and into nothing else.
 
     Parameters
@@ -73,9 +70,7 @@ def copy_cleaned(
     window : (rows, columns) uint8
         Output, within the image.
     values : (height, width) uint8
-        The image; not 0 = occupied. Pixels around the window count as neighbours.
-    x0_px, y0_px : int
-        First column and row of the window.
+        The image; not 0 = occupied. Pixels around the window, whose first is (x0, y0), count as neighbours.
     full_blocks_only : bool
         Use the printed kernel; otherwise the rule of the text.
     """

@@ -4,28 +4,24 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
+
+from .arrays import Events, Flags, Floats, Integers
 
 
 @numba.njit(cache=True, nogil=True)
 def logo_rows(
-    t_us: NDArray[np.int64],
-    x_px: NDArray[np.uint16],
-    y_px: NDArray[np.uint16],
-    on: NDArray[np.bool_],
+    events: Events,
     reference_us: float,
     centre_px: tuple[float, float],
     velocity_px_s: tuple[float, float],
     mask_px: float,
     rim_px: float,
     ring_px: tuple[float, float],
-) -> tuple[NDArray[np.int64], NDArray[np.bool_], int, int]:
+) -> tuple[Integers, Flags, int, int]:
     """Select the events inside the moving mask.
 
     Parameters
     ----------
-    t_us, x_px, y_px, on : (n,) int64, uint16, uint16, bool
-        The events.
     reference_us : float
         The time stamp that an event of the scene with the ball at `centre_px` carries.
     centre_px, velocity_px_s : (x, y) float
@@ -46,6 +42,7 @@ def logo_rows(
     likes, others : int
         Events in the annulus that are ON ahead or OFF behind, as a bright ball's outline, and the others.
     """
+    t_us, x_px, y_px, on = events
     rows, inside = np.empty(t_us.size, np.int64), np.empty(t_us.size, np.bool_)
     count, likes, others = 0, 0, 0
     mask2, rim2 = max(mask_px, 0.0) ** 2, max(rim_px, 0.0) ** 2
@@ -70,24 +67,12 @@ def logo_rows(
 
 @numba.njit(cache=True, nogil=True)
 def outline_like(
-    x_px: NDArray[np.float64],
-    y_px: NDArray[np.float64],
-    on: NDArray[np.bool_],
-    velocity_px_s: tuple[float, float],
-    least_radius_px: float,
-) -> NDArray[np.bool_]:
+    x_px: Floats, y_px: Floats, on: Flags, velocity_px_s: tuple[float, float], least_radius_px: float
+) -> Flags:
     """Mark the events (n,) that look like the outline's: ON ahead of the centre or OFF behind it, far out.
 
-    Parameters
-    ----------
-    x_px, y_px : (n,) float64
-        Relative to the ball's centre.
-    on : (n,) bool
-        Polarity.
-    velocity_px_s : (x, y) float
-        Velocity of the ball; events within 60 degrees of it (or of its opposite) are marked.
-    least_radius_px : float
-        Distance from the centre from which events are marked.
+    Their places (n,) are relative to the ball's centre. Marked are those within 60 degrees of its velocity (or of the
+    opposite) and at least least_radius_px from the centre.
     """
     out = np.empty(x_px.size, np.bool_)
     vx, vy = velocity_px_s

@@ -12,26 +12,19 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from .arrays import Events, Floats, Integers, Pixels
 
 
 @njit(cache=True, nogil=True)
 def near_outline(
-    circle: Floats,
-    t_us: NDArray[np.int64],
-    x_px: NDArray[np.uint16],
-    y_px: NDArray[np.uint16],
-    reference_us: float,
-    gate_px: float,
-    most_events: int,
-    ahead_only: bool,
-) -> NDArray[np.int64]:
+    circle: Floats, events: Events, reference_us: float, gate_px: float, most_events: int, ahead_only: bool
+) -> Integers:
     """Indices (m,) int64 of events within gate_px of the moving outline, thinned evenly to most_events.
 
     With ahead_only, only those on the half of the outline that moves outwards.
     """
+    t_us, x_px, y_px, _ = events
     near = np.empty(t_us.size, np.int64)
     m = 0
     inner = max(circle[4] - gate_px, 0.0) ** 2
@@ -170,13 +163,9 @@ def fit_circle(
     prior_std : (5,) float64
         1 sigma by which the answer may leave it (large = freely, 0 = not at all: zeros for the velocity give the fit of
         a circle at rest).
-    ellipticity, tau_s, x_px, y_px : (2,), (n,), (n,), (n,) float64
-        Shape of the outline, and the events.
     gate_px, floor_px : float
         Tukey's cut-off in the first round; it then shrinks to 4.7 robust sigma, by half a round at least (so that the
         sharp outline wins over a band of late events inside it), down to floor_px.
-    most_rounds : int
-        Number of steps.
 
     Returns
     -------
@@ -219,53 +208,23 @@ def fit_circle(
 
 
 @njit(cache=True, nogil=True)
-def outside_circle(
-    circle: Floats,
-    t_us: NDArray[np.int64],
-    x_px: NDArray[np.uint16],
-    y_px: NDArray[np.uint16],
-    reference_us: float,
-    margin_px: float,
-) -> NDArray[np.int64]:
+def outside_circle(circle: Floats, events: Events, reference_us: float, margin_px: float) -> Integers:
     """Indices (m,) int64 of events more than margin_px outside the moving circle."""
-    chosen = np.empty(t_us.size, np.int64)
-    m = 0
-    limit = (circle[4] + margin_px) ** 2
-    for i in range(t_us.size):
-        tau = (t_us[i] - reference_us) * 1e-6
-        dx = x_px[i] - (circle[0] + circle[2] * tau)
-        dy = y_px[i] - (circle[1] + circle[3] * tau)
-        chosen[m] = i
-        m += dx * dx + dy * dy > limit
-    return chosen[:m].copy()
+    t_us, x_px, y_px, _ = events
+    tau_s = (t_us - reference_us) * 1e-6
+    dx, dy = x_px - (circle[0] + circle[2] * tau_s), y_px - (circle[1] + circle[3] * tau_s)
+    return np.flatnonzero(dx * dx + dy * dy > (circle[4] + margin_px) ** 2)
 
 
 @njit(cache=True, nogil=True)
-def in_square(
-    x_px: NDArray[np.uint16], y_px: NDArray[np.uint16], centre_x_px: float, centre_y_px: float, reach_px: float
-) -> NDArray[np.int64]:
+def in_square(x_px: Pixels, y_px: Pixels, centre_x_px: float, centre_y_px: float, reach_px: float) -> Integers:
     """Indices (m,) int64 of events within reach_px of a place, in both columns and rows."""
-    chosen = np.empty(x_px.size, np.int64)
-    m = 0
-    for i in range(x_px.size):
-        chosen[m] = i
-        m += (abs(x_px[i] - centre_x_px) <= reach_px) & (abs(y_px[i] - centre_y_px) <= reach_px)
-    return chosen[:m].copy()
+    return np.flatnonzero((np.abs(x_px - centre_x_px) <= reach_px) & (np.abs(y_px - centre_y_px) <= reach_px))
 
 
 @njit(cache=True, nogil=True)
-def relative_events(
-    chosen: NDArray[np.int64],
-    t_us: NDArray[np.int64],
-    x_px: NDArray[np.uint16],
-    y_px: NDArray[np.uint16],
-    reference_us: float,
-) -> tuple[Floats, Floats, Floats]:
+def relative_events(chosen: Integers, events: Events, reference_us: float) -> tuple[Floats, Floats, Floats]:
     """Seconds after the reference time, columns and rows of the chosen events, (m,) float64 each."""
-    tau_s, x, y = np.empty(chosen.size), np.empty(chosen.size), np.empty(chosen.size)
-    for k in range(chosen.size):
-        i = chosen[k]
-        tau_s[k] = (t_us[i] - reference_us) * 1e-6
-        x[k] = x_px[i]
-        y[k] = y_px[i]
-    return tau_s, x, y
+    t_us, x_px, y_px, _ = events
+    tau_s = (t_us[chosen] - reference_us) * 1e-6
+    return tau_s, x_px[chosen].astype(np.float64), y_px[chosen].astype(np.float64)

@@ -9,11 +9,9 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from .arrays import Events, Flags, Floats
 from .moving_circle import fit_circle, in_square, near_outline, relative_events, residuals
-
-Floats = NDArray[np.float64]
 
 # Events used for a fit: beyond this the pixels' common errors outweigh the statistical, 0.1 px / sqrt(n).
 MOST_EVENTS = 200
@@ -64,7 +62,7 @@ def vote_velocity(
     tau_s: Floats,
     x_px: Floats,
     y_px: Floats,
-    on: NDArray[np.bool_],
+    on: Flags,
     step_px_s: float,
     gate_px: float,
 ) -> None:
@@ -78,12 +76,6 @@ def vote_velocity(
     ----------
     votes : (2 m + 1, 2 m + 1) float64
         votes[m + j, m + i] is for the circle's velocity plus (i, j) * step_px_s, within the disc of radius m.
-    circle : (5,) float64
-        The circle.
-    tau_s, x_px, y_px, on : (n,) float64, float64, float64, bool
-        The events.
-    step_px_s : float
-        Step of the velocity.
     gate_px : float
         Distance from the outline at which an event no longer counts.
     """
@@ -105,48 +97,34 @@ def support(
     tau_s: Floats,
     x_px: Floats,
     y_px: Floats,
-    on: NDArray[np.bool_],
+    on: Flags,
     width_px: int,
     height_px: int,
-    tolerance_px: float,
-    early_px: float,
-    bins: int,
 ) -> Floats:
-    """Support of a moving outline by events.
+    """Support of a moving outline by events (n,) in an image of this size.
 
-    Parameters
-    ----------
-    circle, ellipticity : (5,), (2,) float64
-        The outline.
-    tau_s, x_px, y_px, on : (n,) float64, float64, float64, bool
-        The events.
-    width_px, height_px : int
-        Size of the image.
-    tolerance_px, early_px : float
-        On the outline = within tolerance_px of it, and behind the centre up to early_px inside.
-    bins : int
-        The outline is cut into so many sectors, which count from two events on, from one where there are fewer than
-        three a sector; sectors that the motion passes at a grazing angle (|cos| < 0.25) yield few events and do not
-        count.
+    On the outline = within ON_OUTLINE_PX of it, and behind the centre up to EARLY_SHARE of the radius inside. The
+    outline is cut into SECTORS, which count from two events on, from one where there are fewer than three a sector;
+    sectors that the motion passes at a grazing angle (|cos| < 0.25) yield few events and do not count.
 
     Returns
     -------
     (8,) float64
         [events on the outline, share of ON among those ahead of the centre, the same behind it,
         share of the visible outline ahead that has events, the same behind it, share of the whole outline that is
-        visible, events just outside (one to four tolerances beyond), events inside]. Shares of nothing are 0.
+        visible, events just outside (one to four ON_OUTLINE_PX beyond), events inside]. Shares of nothing are 0.
     """
-    counts = np.zeros(bins, np.int64)
+    counts = np.zeros(SECTORS, np.int64)
     ahead_on, ahead, behind_on, behind, outside, inside = 0, 0, 0, 0, 0, 0
     error = residuals(circle, ellipticity, tau_s, x_px, y_px)
     for i in range(tau_s.size):
-        if error[i] > tolerance_px:
-            outside += error[i] < 4.0 * tolerance_px
+        if error[i] > ON_OUTLINE_PX:
+            outside += error[i] < 4.0 * ON_OUTLINE_PX
             continue
         dx = x_px[i] - (circle[0] + circle[2] * tau_s[i])
         dy = y_px[i] - (circle[1] + circle[3] * tau_s[i])
         is_ahead = dx * circle[2] + dy * circle[3] > 0.0
-        if error[i] < -(tolerance_px if is_ahead else max(tolerance_px, early_px)):
+        if error[i] < -(ON_OUTLINE_PX if is_ahead else max(ON_OUTLINE_PX, EARLY_SHARE * circle[4])):
             inside += 1
             continue
         if is_ahead:
@@ -155,18 +133,15 @@ def support(
         else:
             behind += 1
             behind_on += on[i]
-        counts[int((math.atan2(dy, dx) / (2.0 * math.pi) + 1.0) * bins) % bins] += 1
+        counts[int((math.atan2(dy, dx) / (2.0 * math.pi) + 1.0) * SECTORS) % SECTORS] += 1
     speed = math.hypot(circle[2], circle[3]) + 1e-9
-    least = 2 if ahead + behind >= 3 * bins else 1
-    seen = np.zeros(2)
-    visible = np.zeros(2)
+    least = 2 if ahead + behind >= 3 * SECTORS else 1
+    seen, visible = np.zeros(2), np.zeros(2)
     in_view = 0
-    for b in range(bins):
-        angle = 2.0 * math.pi * (b + 0.5) / bins
-        nx = math.cos(angle)
-        ny = math.sin(angle)
-        x = circle[0] + circle[4] * nx
-        y = circle[1] + circle[4] * ny
+    for b in range(SECTORS):
+        angle = 2.0 * math.pi * (b + 0.5) / SECTORS
+        nx, ny = math.cos(angle), math.sin(angle)
+        x, y = circle[0] + circle[4] * nx, circle[1] + circle[4] * ny
         if x < 0.0 or y < 0.0 or x > width_px - 1 or y > height_px - 1:
             continue
         in_view += 1
@@ -183,7 +158,7 @@ def support(
             behind_on / max(behind, 1),
             seen[0] / max(visible[0], 1.0),
             seen[1] / max(visible[1], 1.0),
-            in_view / bins,
+            in_view / SECTORS,
             float(outside),
             float(inside),
         ]
@@ -195,10 +170,7 @@ def fit_outline(
     expected: Floats,
     prior_std: Floats,
     ellipticity: Floats,
-    t_us: NDArray[np.int64],
-    x_px: NDArray[np.uint16],
-    y_px: NDArray[np.uint16],
-    on: NDArray[np.bool_],
+    events: Events,
     reference_us: float,
     gate_px: float,
     width_px: int,
@@ -210,10 +182,8 @@ def fit_outline(
     ----------
     expected, prior_std, ellipticity : (5,), (5,), (2,) float64
         As for `fit_circle`.
-    t_us, x_px, y_px, on : (n,) int64, uint16, uint16, bool
-        The events; those within gate_px of the expected outline take part.
     reference_us, gate_px : float
-        Reference time and gate.
+        Time of the expected circle; events within the gate of its outline take part.
     width_px, height_px : int
         Size of the image.
 
@@ -226,34 +196,24 @@ def fit_outline(
     support : (8,) float64
         See `support`.
     """
-    chosen = near_outline(expected, t_us, x_px, y_px, reference_us, gate_px, MOST_EVENTS, True)
+    chosen = near_outline(expected, events, reference_us, gate_px, MOST_EVENTS, True)
     nothing = np.full(5, np.nan), np.zeros((5, 5)), 0.0, np.zeros(8)
     if chosen.size < LEAST_EVENTS:
         return nothing
-    tau_s, x, y = relative_events(chosen, t_us, x_px, y_px, reference_us)
+    tau_s, x, y = relative_events(chosen, events, reference_us)
     circle, covariance, scatter, weight = fit_circle(expected, prior_std, ellipticity, tau_s, x, y, gate_px, 0.6, 9)
     if not (np.all(np.isfinite(circle)) and circle[4] > 1.0 and weight >= LEAST_WEIGHT and scatter <= MOST_SCATTER_PX):
         return nothing
-    early_px = EARLY_SHARE * circle[4]
-    around_px = max(4.0 * ON_OUTLINE_PX, early_px)
-    around = near_outline(circle, t_us, x_px, y_px, reference_us, around_px, MOST_AROUND, False)
-    tau_s, x, y = relative_events(around, t_us, x_px, y_px, reference_us)
-    found = support(circle, ellipticity, tau_s, x, y, on[around], width_px, height_px, ON_OUTLINE_PX, early_px, SECTORS)
-    return circle, covariance, scatter, found
+    around_px = max(4.0 * ON_OUTLINE_PX, EARLY_SHARE * circle[4])
+    around = near_outline(circle, events, reference_us, around_px, MOST_AROUND, False)
+    tau_s, x, y = relative_events(around, events, reference_us)
+    on = events[3][around]
+    return circle, covariance, scatter, support(circle, ellipticity, tau_s, x, y, on, width_px, height_px)
 
 
 @njit(cache=True, nogil=True)
 def find_moving_circle(
-    x_px: float,
-    y_px: float,
-    radius_px: float,
-    t_us: NDArray[np.int64],
-    xs_px: NDArray[np.uint16],
-    ys_px: NDArray[np.uint16],
-    on: NDArray[np.bool_],
-    reference_us: float,
-    span_s: float,
-    fastest_px_s: float,
+    x_px: float, y_px: float, radius_px: float, events: Events, reference_us: float, span_s: float, fastest_px_s: float
 ) -> tuple[Floats, float]:
     """Circle at this place and of this radius that moves as most events say.
 
@@ -261,16 +221,10 @@ def find_moving_circle(
 
     Parameters
     ----------
-    x_px, y_px, radius_px : float
+    x_px, y_px, radius_px, reference_us : float
         Place and radius at the reference time.
-    t_us, xs_px, ys_px, on : (n,) int64, uint16, uint16, bool
-        The events.
-    reference_us : float
-        Reference time.
     span_s : float
         Time that the events go back.
-    fastest_px_s : float
-        Bound of the velocity.
 
     Returns
     -------
@@ -280,27 +234,22 @@ def find_moving_circle(
         Width of the last vote: what a Hough circle may be off, about 2 px on balls of 20 px.
     """
     circle = np.array([x_px, y_px, 0.0, 0.0, radius_px])
-    chosen = in_square(xs_px, ys_px, x_px, y_px, 1.3 * radius_px + fastest_px_s * span_s)
-    stride = max(1, chosen.size // MOST_VOTERS) | 1
-    chosen = chosen[::stride].copy()
+    chosen = in_square(events[1], events[2], x_px, y_px, 1.3 * radius_px + fastest_px_s * span_s)
+    chosen = chosen[:: max(1, chosen.size // MOST_VOTERS) | 1].copy()
     gate, span = 0.3 * radius_px, fastest_px_s
     if chosen.size < LEAST_EVENTS:
         circle[:] = np.nan
         return circle, gate
-    tau_s, x, y = relative_events(chosen, t_us, xs_px, ys_px, reference_us)
+    tau_s, x, y = relative_events(chosen, events, reference_us)
     for turn in range(2):
         if turn == 1:
             gate, span = max(2.0, 0.15 * radius_px), 0.3 * radius_px / span_s
         step = gate / span_s
         m = math.ceil(span / step)
         votes = np.zeros((2 * m + 1, 2 * m + 1))
-        vote_velocity(votes, circle, tau_s, x, y, on[chosen], step, gate)
-        best, row, column = 0.0, 0, 0
-        for j in range(2 * m + 1):
-            for i in range(2 * m + 1):
-                if abs(votes[j, i]) > best:
-                    best, row, column = abs(votes[j, i]), j, i
-        if best > 0.0:
+        vote_velocity(votes, circle, tau_s, x, y, events[3][chosen], step, gate)
+        row, column = divmod(np.argmax(np.abs(votes)), 2 * m + 1)
+        if votes[row, column] != 0.0:
             circle[2] += (column - m) * step
             circle[3] += (row - m) * step
     return circle, gate

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from .arrays import Floats, Integers, PlacedEvents
 
 NEIGHBOURS = 64  # at most; a logo's edge leaves 10 to 40 events of one polarity in three pixels around an event
 FEWEST = 6  # points for the three unknowns of a plane: as many again to judge it by
@@ -18,53 +17,25 @@ SPREAD_PX = 0.6  # two pixels wide: (1, 1) would be 0.5
 
 
 @numba.njit(cache=True, nogil=True)
-def near_in_time(
-    rows: NDArray[np.int64],
-    k: int,
-    t_us: NDArray[np.int64],
-    x_px: Floats,
-    y_px: Floats,
-    on: NDArray[np.bool_],
-    reach_px: float,
-    reach_us: float,
-) -> int:
-    """Write the indices of event k's neighbours (k included) into `rows`, and into nothing else.
+def near_in_time(rows: Integers, k: int, events: PlacedEvents, reach_px: float, reach_us: float) -> int:
+    """Write the indices of event k's neighbours (k included) into `rows` (m,), and return their number.
 
-    Parameters
-    ----------
-    rows : (m,) int64
-        Output: of the neighbours before and of those after k at most m / 2 each, nearest in time first.
-    k : int
-        The event.
-    t_us, x_px, y_px, on : (n,) int64, float64, float64, bool
-        The events, in order of time.
-    reach_px, reach_us : float
-        A neighbour has k's polarity and lies within these.
-
-    Returns
-    -------
-    int
-        Number of indices written.
+    A neighbour has k's polarity and lies within reach_px and reach_us. Of those before and of those after k there are
+    at most m / 2 each, nearest in time first.
     """
-    half, n = rows.size // 2, t_us.size
+    t_us, x_px, y_px, on = events
     reach2 = reach_px * reach_px
     rows[0] = k
-    count = 1
-    for j in range(k - 1, -1, -1):
-        if t_us[k] - t_us[j] > reach_us or count >= half:
-            break
-        dx, dy = x_px[j] - x_px[k], y_px[j] - y_px[k]
-        if on[j] == on[k] and dx * dx + dy * dy <= reach2:
-            rows[count] = j
-            count += 1
-    last = count + half
-    for j in range(k + 1, n):
-        if t_us[j] - t_us[k] > reach_us or count >= last:
-            break
-        dx, dy = x_px[j] - x_px[k], y_px[j] - y_px[k]
-        if on[j] == on[k] and dx * dx + dy * dy <= reach2:
-            rows[count] = j
-            count += 1
+    count, last = 1, rows.size // 2
+    for step in (-1, 1):
+        j = k + step
+        while 0 <= j < t_us.size and abs(t_us[j] - t_us[k]) <= reach_us and count < last:
+            dx, dy = x_px[j] - x_px[k], y_px[j] - y_px[k]
+            if on[j] == on[k] and dx * dx + dy * dy <= reach2:
+                rows[count] = j
+                count += 1
+            j += step
+        last = count + rows.size // 2
     return count
 
 
@@ -74,19 +45,9 @@ def fit_plane(
 ) -> tuple[float, float, float, float]:
     """Fit a plane t = a x + b y + c, robustly.
 
-    Weighted least squares, once with equal weights and then once a scale in scales_us with bisquare weights
-    (1 - (residual / scale)^2)^2, zero beyond the scale.
-
-    Parameters
-    ----------
-    x_px, y_px, t_us : (n,) float64
-        The points.
-    scales_us : (k,) float64
-        Widths of the weights.
-    fewest : int
-        Points that must have weight.
-    spread_px : float
-        Least spread of the points (1 sigma) in every direction of the image.
+    Weighted least squares of the points (n,), once with equal weights and then once a scale in scales_us (k,) with
+    bisquare weights (1 - (residual / scale)^2)^2, zero beyond the scale. There is none where fewer than `fewest`
+    points have weight, or these spread by less than spread_px (1 sigma) in any direction of the image.
 
     Returns
     -------
@@ -136,10 +97,7 @@ def fit_plane(
 
 @numba.njit(cache=True, nogil=True)
 def plane_flow(
-    t_us: NDArray[np.int64],
-    x_px: Floats,
-    y_px: Floats,
-    on: NDArray[np.bool_],
+    events: PlacedEvents,
     first: int,
     last: int,
     stride: int,
@@ -147,7 +105,7 @@ def plane_flow(
     reach_us: float,
     scales_us: Floats,
     speed_max_px_s: float,
-) -> tuple[NDArray[np.int64], Floats, Floats]:
+) -> tuple[Integers, Floats, Floats]:
     """Normal flow of every stride-th event of first..last-1; the neighbours come from all events.
 
     A plane needs FEWEST points spread by SPREAD_PX; its residuals may not exceed a third of the last scale (twice that
@@ -155,16 +113,10 @@ def plane_flow(
 
     Parameters
     ----------
-    t_us, x_px, y_px, on : (n,) int64, float64, float64, bool
-        The events, in order of time.
-    first, last, stride : int
-        Events that are asked for.
     reach_px, reach_us : float
         Neighbourhood, see `near_in_time`.
     scales_us : (k,) float64
         See `fit_plane`.
-    speed_max_px_s : float
-        Bound of the speed.
 
     Returns
     -------
@@ -175,12 +127,13 @@ def plane_flow(
     speeds : (m,) float64
         px/s.
     """
+    t_us, x_px, y_px, _ = events
     rows, found = np.empty(NEIGHBOURS, np.int64), np.empty(max(last - first, 0), np.int64)
     directions, speeds = np.empty((found.size, 2)), np.empty(found.size)
     x, y, t = np.empty(NEIGHBOURS), np.empty(NEIGHBOURS), np.empty(NEIGHBOURS)
     count = 0
     for k in range(first + stride // 2, last, stride):
-        size = near_in_time(rows, k, t_us, x_px, y_px, on, reach_px, reach_us)
+        size = near_in_time(rows, k, events, reach_px, reach_us)
         if size < FEWEST:
             continue
         for i in range(size):

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from .arrays import Floats
 
 
 @numba.njit(cache=True, nogil=True)
 def moving_average(signal: Floats, weight: float) -> Floats:
     """Exponential moving average (n,): each value moves it by `weight` of the difference; starts at the first."""
-    average = np.empty_like(signal)
-    level = signal[0] if signal.size else 0.0
-    for i in range(signal.size):
-        level += weight * (signal[i] - level)
-        average[i] = level
+    average = signal.copy()
+    for i in range(1, signal.size):
+        average[i] = average[i - 1] + weight * (signal[i] - average[i - 1])
     return average
 
 
@@ -81,14 +78,9 @@ def shortest_period(correlation: Floats, shortest: int, share: float) -> int:
 
     A rotation's multiples repeat as well as the rotation itself; its parts (the letters of the logo) repeat worse.
     """
-    highest = 0.0
-    for lag in range(max(shortest, 1), correlation.size - 1):
-        value = correlation[lag]
-        if value > correlation[lag - 1] and value >= correlation[lag + 1] and value > highest:
-            highest = value
-    if highest > 0.0:
-        for lag in range(max(shortest, 1), correlation.size - 1):
-            value = correlation[lag]
-            if value > correlation[lag - 1] and value >= correlation[lag + 1] and value >= share * highest:
-                return lag
-    return 0
+    before, here, after = correlation[:-2], correlation[1:-1], correlation[2:]
+    peaks = 1 + np.flatnonzero((here > before) & (here >= after) & (here > 0.0))
+    peaks = peaks[peaks >= shortest]
+    if not peaks.size:
+        return 0
+    return int(peaks[correlation[peaks] >= share * correlation[peaks].max()][0])

@@ -12,19 +12,13 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from .arrays import Floats, Integers
 
 
 @numba.njit(cache=True, nogil=True)
 def intersect_ball(
-    rays: Floats,
-    t_us: NDArray[np.int64],
-    first_us: float,
-    last_us: float,
-    centres_m: Floats,
-    ball_radius_m: float,
+    rays: Floats, t_us: Integers, first_us: float, last_us: float, centres_m: Floats, ball_radius_m: float
 ) -> tuple[Floats, Floats]:
     """Intersect rays with the visible side of a moving ball.
 
@@ -38,8 +32,6 @@ def intersect_ball(
         Times of the first and the last centre.
     centres_m : (k, 3) float64
         The ball's centre at k times spread evenly; linear in between, the same throughout if k = 1.
-    ball_radius_m : float
-        Radius of the ball.
 
     Returns
     -------
@@ -67,10 +59,9 @@ def intersect_ball(
             back = np.sqrt(depth2)
             ex, ey, ez = ex - back * rx, ey - back * ry, ez - back * rz
         length = np.sqrt(ex * ex + ey * ey + ez * ez)
-        normals[i, 0], normals[i, 1], normals[i, 2] = ex / length, ey / length, ez / length
-        points[i, 0] = cx + ball_radius_m * normals[i, 0]
-        points[i, 1] = cy + ball_radius_m * normals[i, 1]
-        points[i, 2] = cz + ball_radius_m * normals[i, 2]
+        ex, ey, ez = ex / length, ey / length, ez / length
+        normals[i] = ex, ey, ez
+        points[i] = cx + ball_radius_m * ex, cy + ball_radius_m * ey, cz + ball_radius_m * ez
     return points, normals
 
 
@@ -87,18 +78,15 @@ def surface_velocity(points_m: Floats, normals: Floats, vx_px_s: Floats, vy_px_s
         Points on the ball and outward unit normals, camera frame.
     vx_px_s, vy_px_s : (n,) float64
         Image velocities, the ball's own motion taken off.
-    focal_px : float
-        Focal length.
     """
-    n = points_m.shape[0]
-    velocity = np.empty((n, 3))
-    for i in range(n):
+    velocity = np.empty_like(points_m)
+    for i in range(points_m.shape[0]):
         z = points_m[i, 2]
         rx, ry = points_m[i, 0] / z, points_m[i, 1] / z
         ex, ey, ez = normals[i, 0], normals[i, 1], normals[i, 2]
         a, b = vx_px_s[i] * z / focal_px, vy_px_s[i] * z / focal_px
         along = -(a * ex + b * ey) / (ex * rx + ey * ry + ez)
-        velocity[i, 0], velocity[i, 1], velocity[i, 2] = a + rx * along, b + ry * along, along
+        velocity[i] = a + rx * along, b + ry * along, along
     return velocity
 
 
@@ -108,15 +96,12 @@ def spin_rows(points_m: Floats, normals: Floats, directions: Floats, focal_px: f
 
     From d . J (spin x R e) = spin . (R e x J^T d). The other arguments as in `surface_velocity`.
     """
-    n = points_m.shape[0]
-    rows = np.empty((n, 3))
-    for i in range(n):
+    rows = np.empty_like(points_m)
+    for i in range(points_m.shape[0]):
         z = points_m[i, 2]
         scale = focal_px * ball_radius_m / z
         jx, jy = scale * directions[i, 0], scale * directions[i, 1]
         jz = -(jx * points_m[i, 0] + jy * points_m[i, 1]) / z
         ex, ey, ez = normals[i, 0], normals[i, 1], normals[i, 2]
-        rows[i, 0] = ey * jz - ez * jy
-        rows[i, 1] = ez * jx - ex * jz
-        rows[i, 2] = ex * jy - ey * jx
+        rows[i] = ey * jz - ez * jy, ez * jx - ex * jz, ex * jy - ey * jx
     return rows

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from .arrays import Floats
 
 
 @numba.njit(cache=True, nogil=True)
@@ -44,10 +43,8 @@ def sampled_spin(
 
     Parameters
     ----------
-    rows : (n, 3) float64
-        Constraint rows.
-    speeds : (n,) float64
-        Right-hand sides, > 0.
+    rows, speeds : (n, 3), (n,) float64
+        Constraints; their right-hand sides are > 0.
     share : float
         Scale of `support`.
     spin_max_rad_s : float
@@ -57,10 +54,8 @@ def sampled_spin(
 
     Returns
     -------
-    spin : (3,) float64
-        Zero where there is none.
-    support : float
-        0 where there is none.
+    spin, support : (3,) float64, float
+        Zeros where there is none.
     """
     best, best_support = np.zeros(3), 0.0
     n = speeds.size
@@ -73,10 +68,8 @@ def sampled_spin(
             m[i, 0], m[i, 1], m[i, 2], b[i] = rows[pick, 0], rows[pick, 1], rows[pick, 2], speeds[pick]
             size *= np.sqrt(m[i, 0] ** 2 + m[i, 1] ** 2 + m[i, 2] ** 2)
         spin, determinant = solve3(m, b)
-        if (
-            abs(determinant) < 1e-3 * size
-            or spin[0] ** 2 + spin[1] ** 2 + spin[2] ** 2 > spin_max_rad_s * spin_max_rad_s
-        ):
+        square = spin[0] ** 2 + spin[1] ** 2 + spin[2] ** 2
+        if abs(determinant) < 1e-3 * size or square > spin_max_rad_s * spin_max_rad_s:
             continue
         found = support(rows, speeds, spin, share)
         if found > best_support:
@@ -98,8 +91,6 @@ def robust_spin(
         Constraints and the standard deviations of their right-hand sides.
     start : (3,) float64
         Spin to begin with.
-    rounds : int
-        Number of reweightings.
 
     Returns
     -------

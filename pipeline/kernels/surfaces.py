@@ -4,43 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+
+from .arrays import Bytes, Integers, Pixels
 
 # No event yet: so long ago that no span reaches it, and no difference of times overflows.
 NEVER_US = np.int64(-(1 << 62))
 
 
 @njit(cache=True, nogil=True)
-def update_last_times(
-    last_us: NDArray[np.int64], t_us: NDArray[np.int64], x_px: NDArray[np.uint16], y_px: NDArray[np.uint16]
-) -> None:
-    """Store the times of events, in order of time, in `last_us` only.
-
-    Parameters
-    ----------
-    last_us : (height, width) int64
-        Time of each pixel's last event, NEVER_US at the start.
-    t_us, x_px, y_px : (n,) int64, uint16, uint16
-        The events.
-    """
+def update_last_times(last_us: Integers, t_us: Integers, x_px: Pixels, y_px: Pixels) -> None:
+    """Store the times of events in `last_us` (height, width), which holds NEVER_US at the start, and only there."""
     for i in range(t_us.size):
         last_us[y_px[i], x_px[i]] = t_us[i]
 
 
 @njit(cache=True, nogil=True)
-def render(values: NDArray[np.uint8], last_us: NDArray[np.int64], end_us: int, span_us: int, linear: bool) -> None:
-    """Write the pixels with an event in [end - span, end) into `values`.
+def render(values: Bytes, last_us: Integers, end_us: int, span_us: int, linear: bool) -> None:
+    """Write the pixels with an event in [end - span, end) into `values` (height, width), which must hold zeros.
 
-    Parameters
-    ----------
-    values : (height, width) uint8
-        Output, which must hold zeros.
-    last_us : (height, width) int64
-        As kept by `update_last_times`.
-    end_us, span_us : int
-        End and length of the interval.
-    linear : bool
-        255 (1 - age / span) with age = end - time, rounded half up; otherwise 255.
+    Their value is 255 or, if `linear`, 255 (1 - age / span) with age = end - time, rounded half up.
     """
     flat, last = values.reshape(-1), last_us.reshape(-1)
     start_us = end_us - span_us

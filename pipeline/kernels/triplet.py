@@ -12,31 +12,20 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from .arrays import Floats, Integers, PlacedEvents
 
 
 @numba.njit(cache=True, nogil=True)
 def earlier_neighbours(
-    t_us: NDArray[np.int64],
-    x_px: Floats,
-    y_px: Floats,
-    on: NDArray[np.bool_],
-    near_px: float,
-    reach_px: float,
-    reach_us: float,
-    speed_max_px_s: float,
-    most: int,
+    events: PlacedEvents, near_px: float, reach_px: float, reach_us: float, speed_max_px_s: float, most: int
 ) -> NDArray[np.int32]:
     """Latest earlier neighbours of each event.
 
     Parameters
     ----------
-    t_us, x_px, y_px, on : (n,) int64, float64, float64, bool
-        The events, in order of time.
-    near_px, reach_px, reach_us : float
-        A neighbour has the same polarity, is near_px..reach_px away and at most reach_us older.
-    speed_max_px_s : float
-        Bound of the velocity between the two.
+    near_px, reach_px, reach_us, speed_max_px_s : float
+        A neighbour has the same polarity, is near_px..reach_px away and at most reach_us older, and the velocity
+        between the two is not higher.
     most : int
         The search back stops at so many neighbours.
 
@@ -45,6 +34,7 @@ def earlier_neighbours(
     (n, most) int32
         Indices, latest first, -1 where there are fewer.
     """
+    t_us, x_px, y_px, on = events
     n = t_us.size
     neighbours = np.full((n, most), -1, np.int32)
     near2, reach2, speed_px_us = near_px * near_px, reach_px * reach_px, speed_max_px_s * 1e-6
@@ -66,19 +56,12 @@ def earlier_neighbours(
 
 @numba.njit(cache=True, nogil=True)
 def triplet_flow(
-    t_us: NDArray[np.int64],
-    x_px: Floats,
-    y_px: Floats,
-    neighbours: NDArray[np.int32],
-    mismatch_px: float,
-    mismatch_share: float,
-) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    t_us: Integers, x_px: Floats, y_px: Floats, neighbours: NDArray[np.int32], mismatch_px: float, mismatch_share: float
+) -> tuple[Floats, Floats, Integers]:
     """Flow of the events that end a triplet.
 
     Parameters
     ----------
-    t_us, x_px, y_px : (n,) int64, float64, float64
-        The events.
     neighbours : (n, most) int32
         As from `earlier_neighbours`.
     mismatch_px : float

@@ -109,11 +109,7 @@ class ColumnTypes:
     def _pixels(self, name: str, column: NDArray[Any], first_row: int) -> NDArray[Any]:
         if column.dtype.kind == "f":
             self._check(
-                ~(np.abs(column) < 2**31) | (column != np.floor(column)),
-                name,
-                column,
-                first_row,
-                "is no whole pixel",
+                ~(np.abs(column) < 2**31) | (column != np.floor(column)), name, column, first_row, "is no whole pixel"
             )
             column = column.astype(np.int64)
         if column.dtype.kind == "i" and column.size and column.min() < 0:

@@ -46,10 +46,7 @@ class RecordingInMemory:
         return digest.hexdigest()
 
     def read(
-        self,
-        start_us: int | None = None,
-        end_us: int | None = None,
-        on_progress: Callable[[float], None] | None = None,
+        self, start_us: int | None = None, end_us: int | None = None, on_progress: Callable[[float], None] | None = None
     ) -> EventBatch:
         """The events of [start_us, end_us), all by default."""
         first, last = (self.data.t_us[0], self.data.t_us[-1] + 1) if len(self.data) else (0, 0)

@@ -241,10 +241,7 @@ class Recording:
             inside = columns[mask]
             reading.damage.outside_events += int(np.count_nonzero(~mask))
         return EventBatch(
-            inside.t_us,
-            inside.x.astype(np.uint16, copy=False),
-            inside.y.astype(np.uint16, copy=False),
-            inside.on,
+            inside.t_us, inside.x.astype(np.uint16, copy=False), inside.y.astype(np.uint16, copy=False), inside.on
         )
 
     def _refuse_small_sensor(self) -> None:

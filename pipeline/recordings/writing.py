@@ -71,7 +71,7 @@ def write_recording(
             triggers=lambda: triggers or Triggers.none(),
             truth=lambda: truth,
             t_offset_us=t_offset_us,
-        ),
+        )
     )
 
 
@@ -138,7 +138,7 @@ def convert(
             triggers=triggers,
             truth=truth,
             t_offset_us=recording.t_offset_us,
-        ),
+        )
     )
 
 

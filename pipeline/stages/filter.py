@@ -59,11 +59,11 @@ def step(parameters: FilterParameters, state: FilterState, packet: Packet) -> Fi
     logo = (MODES[parameters.logo_mode], parameters.logo_threshold_us)
     if surface[0] == logo[0] == kernels.OFF:
         return FilterResult(events, events)
-    rows, logo_rows = kernels.filter_events(state.last, state.width_px, *events.columns, *surface, *logo)
-    surface_events = events if surface[0] == kernels.OFF else EventBatch(*take_events(rows, *events.columns))
+    rows, logo_rows = kernels.filter_events(state.last, state.width_px, events.columns, *surface, *logo)
+    surface_events = events if surface[0] == kernels.OFF else EventBatch(*take_events(rows, events.columns))
     if logo == surface:
         return FilterResult(surface_events, surface_events)
-    logo_events = events if logo[0] == kernels.OFF else EventBatch(*take_events(logo_rows, *events.columns))
+    logo_events = events if logo[0] == kernels.OFF else EventBatch(*take_events(logo_rows, events.columns))
     return FilterResult(surface_events, logo_events)
 
 

@@ -173,7 +173,7 @@ def _ended_slices(
     while state.slice_start_us + t_acc_us <= end_us:
         piece = state.events.between(state.slice_start_us, state.slice_start_us + t_acc_us)
         neighbours = earlier_neighbours(
-            piece.t_us, piece.x_px, piece.y_px, piece.on, TRIPLET_NEAR_PX, parameters.reach_px, 0.5 * t_acc_us,
+            (piece.t_us, piece.x_px, piece.y_px, piece.on), TRIPLET_NEAR_PX, parameters.reach_px, 0.5 * t_acc_us,
             bound_px_s, TRIPLET_NEIGHBOURS,
         )  # fmt: skip
         flow_x, flow_y, triplets = triplet_flow(
@@ -205,13 +205,13 @@ def _planes(
     scales_us, ball_px_s = np.array(PLANE_SCALES) * t_acc_us, ball.mean[2:4]
     ball_speed_px_s = float(np.linalg.norm(ball_px_s))
     rows, directions, speeds = plane_flow(
-        events.t_us, events.x_px, events.y_px, events.on, first, last, stride, parameters.reach_px, reach_us,
+        (events.t_us, events.x_px, events.y_px, events.on), first, last, stride, parameters.reach_px, reach_us,
         scales_us, bound_px_s,
     )  # fmt: skip
     if ball_speed_px_s == 0.0:
         return events[rows], directions, speeds, np.zeros(rows.size, np.bool_)
     image_rows, along, absolute = plane_flow(
-        events.t_us, events.x_px + events.centre_x_px, events.y_px + events.centre_y_px, events.on, first, last,
+        (events.t_us, events.x_px + events.centre_x_px, events.y_px + events.centre_y_px, events.on), first, last,
         stride, parameters.reach_px, reach_us, scales_us, bound_px_s + ball_speed_px_s,
     )  # fmt: skip
     relative = absolute - along @ ball_px_s

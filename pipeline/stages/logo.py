@@ -186,7 +186,7 @@ def _logo_events(
     """
     x, y, vx, vy, radius_px = ball.mean.tolist()
     rows, inside, likes, others = logo_rows(
-        *events.columns,
+        events.columns,
         ball.t_us + ball.latency_us,
         (x, y),
         (vx, vy),
@@ -196,7 +196,7 @@ def _logo_events(
     )
     if (vx or vy) and others > MIXED_OUTLINE * likes:
         rows, inside = rows[inside], inside[inside]
-    return EventBatch(*take_events(rows, *events.columns)), inside
+    return EventBatch(*take_events(rows, events.columns)), inside
 
 
 def _of_outline(x_px: Floats, y_px: Floats, on: NDArray[np.bool_], ball: BallTrack) -> NDArray[np.bool_]:

@@ -45,7 +45,8 @@ def hough_near(
     window = surface.cleaned(x0, y0, x1, y1)
     corner = round(x_px) - reach_px, round(y_px) - reach_px
     limits = first_radius, radii
-    return _circle(kernels.best_in_window(window, x0, y0, EDGE_LEVEL, MOST_PIXELS, *corner, 2 * reach_px + 1, *limits))
+    columns, rows = kernels.bright_pixels(window, EDGE_LEVEL, MOST_PIXELS)
+    return _circle(kernels.best_circle(columns + x0, rows + y0, *corner, 2 * reach_px + 1, *limits))
 
 
 def candidates(

@@ -70,8 +70,8 @@ class OtherBalls:
             rings.append(tracked)
         for ring in rings:
             margin = 0.3 * ring[4] + 2.0  # for trails, and for errors of the older ones
-            rows = kernels.outside_circle(ring, events.t_us, events.x_px, events.y_px, end_us, margin)
-            events = EventBatch(*take_events(rows, *events.columns))
+            rows = kernels.outside_circle(ring, events.columns, end_us, margin)
+            events = EventBatch(*take_events(rows, events.columns))
         _, found = look(surface, events, end_us, camera, limits, MOST_RIVALS)
         self.known += [(end_us, one) for one, _ in found]
         return found[0] if found and found[0][0].trusted else None

@@ -52,7 +52,7 @@ def test_the_mask(benchmark: Any) -> None:
     x, y = (rng.integers(600, 680, n).astype(np.uint16) for _ in range(2))
     on = rng.random(n) < 0.5
     circle = (4900.0, (640.0, 640.0), (5000.0, -3000.0), 14.5, 16.5, (16.0, 19.0))
-    benchmark.pedantic(lambda: logo_rows(t, x, y, on, *circle), rounds=30, warmup_rounds=2)
+    benchmark.pedantic(lambda: logo_rows((t, x, y, on), *circle), rounds=30, warmup_rounds=2)
     fast_ns = benchmark.stats.stats.median / n * 1e9
 
     def by_numpy() -> None:
@@ -89,7 +89,7 @@ def test_triplet_matching_of_a_slice(benchmark: Any) -> None:
 
     def run() -> None:
         for s in slices:
-            near = earlier_neighbours(t[s], x[s], y[s], on[s], 0.7, 3.0, 1000.0, 16_000.0, 12)
+            near = earlier_neighbours((t[s], x[s], y[s], on[s]), 0.7, 3.0, 1000.0, 16_000.0, 12)
             triplet_flow(t[s], x[s], y[s], near, 0.5, 0.2)
 
     benchmark.pedantic(run, rounds=20, warmup_rounds=2)

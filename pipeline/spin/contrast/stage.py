@@ -70,12 +70,7 @@ class ContrastParameters(ParameterGroup):
     )
     axis_std_deg: float = tunable(12.0, 0.1, 180.0, 0.5, "deg", "largest stated error of the axis (1 sigma)")
     magnitude_std_rps: float = tunable(
-        3.0,
-        0.01,
-        1000.0,
-        0.1,
-        "rps",
-        "largest stated error of the magnitude (1 sigma); a tenth of it if that is more",
+        3.0, 0.01, 1000.0, 0.1, "rps", "largest stated error of the magnitude (1 sigma); a tenth of it if that is more"
     )
     curves: bool = switch(True, "score over magnitude and over axis directions, for the viewer")
 

@@ -29,7 +29,7 @@ def passed_rows(
     rows, logo_rows = kernels.filter_events(
         last,
         WIDTH,
-        *read_only(t.astype(np.int64), x.astype(np.uint16), y.astype(np.uint16), on.astype(np.bool_)),
+        read_only(t.astype(np.int64), x.astype(np.uint16), y.astype(np.uint16), on.astype(np.bool_)),
         MODES.index(one[0]),
         one[1],
         MODES.index(other[0]),
@@ -97,6 +97,6 @@ def test_rows_are_taken_from_every_column() -> None:
         rng.random(1000) < 0.5,
     )
     for rows in (np.flatnonzero(rng.random(1000) < 0.3), np.empty(0, np.int64)):
-        for column, kept in zip(columns, take_events(rows, *columns), strict=True):
+        for column, kept in zip(columns, take_events(rows, columns), strict=True):
             assert kept.dtype == column.dtype
             assert np.array_equal(kept, column[rows])

@@ -91,9 +91,9 @@ def test_active_cells_equal_the_twin(height: int, width: int, cell: int, events:
 def test_the_best_circle_is_the_peak_of_the_vote(seed: int) -> None:
     rng = np.random.default_rng(seed)
     xs, ys = rng.integers(0, 40, (2, int(rng.integers(0, 60))))
-    votes = reference.vote((9, 11, 4), xs, ys, 15, 16, 6)
+    votes = reference.vote((11, 11, 4), xs, ys, 15, 16, 6)
     support, a, b, k = reference.peak(votes, 6)
-    found = hough.best_circle(xs, ys, 15, 16, 11, 9, 6, 4)
+    found = hough.best_circle(xs, ys, 15, 16, 11, 6, 4)
     if support == 0.0:
         assert found == (0.0, 0.0, 0.0, 0.0)
         return

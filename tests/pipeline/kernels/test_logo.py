@@ -24,14 +24,14 @@ def test_equals_its_twin(seed: int, velocity: tuple[float, float], radius: float
     x, y = (rng.integers(0, 90, 100).astype(np.uint16) for _ in range(2))
     events = read_only(t, x, y, rng.random(100) < 0.5)
     circle = (float(start_us + 4900), (45.3, 44.6), velocity, radius, radius + rim_px, (radius + 4.0, radius + 9.0))
-    rows, inside, *polarities = logo_rows(*events, *circle)
+    rows, inside, *polarities = logo_rows(events, *circle)
     assert (rows.tolist(), inside.tolist(), *polarities) == naive_logo_rows(*events, *circle)
 
 
 def test_the_outline_itself_is_outside() -> None:
     x, y = np.array([13, 10, 12], np.uint16), np.array([14, 15, 14], np.uint16)
     t, on = np.zeros(3, np.int64), np.ones(3, np.bool_)
-    rows, _, _, _ = logo_rows(*read_only(t, x, y, on), 0.0, (10.0, 10.0), (0.0, 0.0), 5.0, 0.0, (0.0, 0.0))
+    rows, _, _, _ = logo_rows(read_only(t, x, y, on), 0.0, (10.0, 10.0), (0.0, 0.0), 5.0, 0.0, (0.0, 0.0))
     assert rows.tolist() == [2]
 
 

@@ -37,7 +37,7 @@ def test_neighbours_are_all_within_reach_and_the_nearest_in_time(seed: int, reac
     x, y, on = rng.uniform(0, 6, 80), rng.uniform(0, 6, 80), rng.random(80) < 0.5
     rows = np.empty(8, np.int64)
     k = int(rng.integers(0, 80))
-    found = set(rows[: near_in_time(rows, k, t, x, y, on, 2.0, float(reach_us))].tolist())
+    found = set(rows[: near_in_time(rows, k, (t, x, y, on), 2.0, float(reach_us))].tolist())
     fits = (on == on[k]) & (np.hypot(x - x[k], y - y[k]) <= 2.0) & (np.abs(t - t[k]) <= reach_us)
     before = [j for j in range(k - 1, -1, -1) if fits[j]][:3]
     after = [j for j in range(k + 1, 80) if fits[j]][:4]
@@ -50,7 +50,7 @@ def test_a_straight_edge_has_its_normal_flow(speed: float, angle: float) -> None
     t, x, y, on = moving_edge(speed, angle, jitter_us=0.05e6 / speed)
     t_acc_us = 10e6 / speed
     rows, direction, found = plane_flow(
-        t, x, y, on, 0, t.size, 1, 3.0, 0.6 * t_acc_us, SCALES_US / 2000 * t_acc_us, 20_000.0
+        (t, x, y, on), 0, t.size, 1, 3.0, 0.6 * t_acc_us, SCALES_US / 2000 * t_acc_us, 20_000.0
     )
     inside = (np.abs(x[rows] - 5.5) < 3) & (np.abs(y[rows] - 5.5) < 3)
     assert inside.sum() > 20
@@ -61,7 +61,7 @@ def test_a_straight_edge_has_its_normal_flow(speed: float, angle: float) -> None
 
 def test_every_second_event_and_the_speed_bound() -> None:
     t, x, y, on = moving_edge(4000.0, 0.4)
-    everything = (t, x, y, on, 0, t.size)
+    everything = ((t, x, y, on), 0, t.size)
     scales = SCALES_US * 1.25
     all_rows = plane_flow(*everything, 1, 3.0, 1500.0, scales, 20_000.0)[0]
     some_rows = plane_flow(*everything, 2, 3.0, 1500.0, scales, 20_000.0)[0]
@@ -72,5 +72,5 @@ def test_every_second_event_and_the_speed_bound() -> None:
 def test_a_single_row_of_pixels_makes_no_plane() -> None:
     t, x, y, on = moving_edge(4000.0, 0.4)
     line = y == 5
-    rows = plane_flow(t[line], x[line], y[line], on[line], 0, int(line.sum()), 1, 3.0, 1500.0, SCALES_US, 20_000.0)[0]
+    rows = plane_flow((t[line], x[line], y[line], on[line]), 0, int(line.sum()), 1, 3.0, 1500.0, SCALES_US, 20_000.0)[0]
     assert rows.size == 0

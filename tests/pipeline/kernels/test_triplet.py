@@ -31,7 +31,7 @@ def test_equals_its_twin(events: list[tuple[int, int, int, bool]], most: int) ->
     t = np.cumsum([e[0] for e in events]).astype(np.int64)
     x, y = (np.array([e[c] for e in events], np.float64) * 0.7 for c in (1, 2))
     on = np.array([e[3] for e in events], np.bool_)
-    neighbours = earlier_neighbours(t, x, y, on, *LIMITS, most)
+    neighbours = earlier_neighbours((t, x, y, on), *LIMITS, most)
     slow = naive_neighbours(t, x, y, on, *LIMITS, most)
     assert [[int(j) for j in row if j >= 0] for row in neighbours] == slow
     vx, vy, triplets = triplet_flow(t, x, y, neighbours, 0.5, 0.3)
@@ -44,7 +44,7 @@ def test_equals_its_twin(events: list[tuple[int, int, int, bool]], most: int) ->
 @pytest.mark.parametrize("speed", [1500.0, 6000.0])
 def test_a_straight_edge_has_the_flow_across_it(speed: float, angle: float) -> None:
     t, x, y, on = moving_edge(speed, angle, jitter_us=20.0)
-    neighbours = earlier_neighbours(t, x, y, on, 0.7, 3.0, 3e6 / speed, 20_000.0, 12)
+    neighbours = earlier_neighbours((t, x, y, on), 0.7, 3.0, 3e6 / speed, 20_000.0, 12)
     vx, vy, triplets = triplet_flow(t, x, y, neighbours, 0.5, 0.2)
     inside = (triplets > 0) & (np.abs(x - 5.5) < 3) & (np.abs(y - 5.5) < 3)
     assert inside.sum() > 15
@@ -56,6 +56,6 @@ def test_no_flow_of_scattered_events() -> None:
     rng = np.random.default_rng(1)
     t = np.sort(rng.integers(0, 200_000, 60))
     x, y, on = rng.uniform(0, 40, 60), rng.uniform(0, 40, 60), rng.random(60) < 0.5
-    neighbours = earlier_neighbours(t, x, y, on, *LIMITS, 12)
+    neighbours = earlier_neighbours((t, x, y, on), *LIMITS, 12)
     _, _, triplets = triplet_flow(t, x, y, neighbours, 0.5, 0.2)
     assert not triplets.any()

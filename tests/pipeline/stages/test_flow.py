@@ -56,7 +56,7 @@ def test_slices_follow_each_other_from_the_shots_start_and_belong_to_the_tick_th
             start_us = 5000 + number * t_acc_us
             own = (t >= start_us) & (t < start_us + t_acc_us)
             bound = flow.speed_bound_px_s
-            near = earlier_neighbours(t[own], x[own], y[own], on[own], 0.7, 3.0, t_acc_us / 2, bound, 12)
+            near = earlier_neighbours((t[own], x[own], y[own], on[own]), 0.7, 3.0, t_acc_us / 2, bound, 12)
             vx, vy, triplets = triplet_flow(t[own], x[own], y[own], near, 0.5, 0.2)
             here = flow.slice_index == number
             np.testing.assert_array_equal(flow.vx_px_s[here], vx[triplets > 0])

@@ -42,7 +42,7 @@ def circle_in(image: NDArray[np.bool_] | NDArray[np.uint8]) -> tuple[float, floa
     """Centre x and y, radius and share of the outline of the circle that the set pixels of an image draw best."""
     columns, rows = hough.bright_pixels(np.ascontiguousarray(image).view(np.uint8), 1, 4000)
     height, width = image.shape
-    return hough.best_circle(columns, rows, -20, -20, width + 40, height + 40, 4, 20)
+    return hough.best_circle(columns, rows, -20, -20, max(width, height) + 40, 4, 20)
 
 
 @given(

@@ -29,12 +29,6 @@ def _write(path: Path, content: RecordingContent) -> None:
 
 FORMATS.register(
     RecordingFormat(
-        name="hdf5",
-        label="HDF5",
-        suffixes=(".h5", ".hdf5"),
-        sniff=_sniff,
-        open=_open,
-        write=_write,
-        keeps_truth=True,
+        name="hdf5", label="HDF5", suffixes=(".h5", ".hdf5"), sniff=_sniff, open=_open, write=_write, keeps_truth=True
     )
 )

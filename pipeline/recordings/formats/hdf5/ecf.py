@@ -77,10 +77,7 @@ class EcfRows:
 
 def _empty_block(events: int) -> EcfBlock:
     return EcfBlock(
-        np.empty(events, np.int64),
-        np.empty(events, np.uint16),
-        np.empty(events, np.uint16),
-        np.empty(events, np.uint8),
+        np.empty(events, np.int64), np.empty(events, np.uint16), np.empty(events, np.uint16), np.empty(events, np.uint8)
     )
 
 
@@ -204,12 +201,7 @@ def _four_values(data: Bytes, at: int, size: int) -> tuple[int, int, int, int]:
     bits = 2 * size
     low, half, most = (1 << bits) - 1, (1 << 2 * bits) - 1, (1 << 3 * bits) - 1
     a, b, c = _number(data, at, size), _number(data, at + size, size), _number(data, at + 2 * size, size)
-    return (
-        a >> bits,
-        (a & low) | ((b >> 2 * bits) << bits),
-        (b & half) | ((c >> 3 * bits) << 2 * bits),
-        c & most,
-    )
+    return (a >> bits, (a & low) | ((b >> 2 * bits) << bits), (b & half) | ((c >> 3 * bits) << 2 * bits), c & most)
 
 
 @njit(cache=True, nogil=True)

@@ -76,13 +76,7 @@ def _following(words: NDArray[Any], at: int, bits: int, final: bool) -> int:
 
 @njit(cache=True, nogil=True)
 def take_time_high(
-    state: NDArray[np.int64],
-    words: NDArray[Any],
-    at: int,
-    bits: int,
-    low_bits: int,
-    unchecked_steps: int,
-    final: bool,
+    state: NDArray[np.int64], words: NDArray[Any], at: int, bits: int, low_bits: int, unchecked_steps: int, final: bool
 ) -> bool:
     """Take the TIME_HIGH word words[at] into state[HIGH] and state[TIME_KNOWN].
 
