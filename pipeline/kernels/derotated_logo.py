@@ -32,23 +32,10 @@ def _place(direction: float, side: int) -> float:
 
 @njit(cache=True, nogil=True)
 def count_derotated(density: Singles, normals: Floats, on: Flags, seconds: Floats, spin_rps: Floats) -> None:
-    """Fill `density` with turned events.
+    """Fill `density` with events of these unit normals (n, 3), each turned by the spin for so many seconds.
 
     Counts first, then spreads the few cells that have any: 3 x as fast as turning the events and smoothing the whole
     cube with numpy.
-
-    Parameters
-    ----------
-    density : (side, side, side, 3) float32
-        Output.
-    normals : (n, 3) float64
-        Unit normals of the events.
-    on : (n,) bool
-        Polarity.
-    seconds : (n,) float64
-        Time for which each event is turned by the spin; negative turns back.
-    spin_rps : (3,) float64
-        The spin.
     """
     side = density.shape[0]
     density[:] = 0.0
@@ -80,18 +67,9 @@ def count_derotated(density: Singles, normals: Floats, on: Flags, seconds: Float
 
 @njit(cache=True, nogil=True)
 def sample_density(found: Singles, density: Singles, directions: Floats, frame: Floats) -> None:
-    """Fill `found` with the densities of OFF and ON in every direction, linear between the centres of the cells.
+    """Fill `found` (2, n) with the densities of OFF and ON, linear between the centres of the cells.
 
-    Parameters
-    ----------
-    found : (2, n) float32
-        Output.
-    density : (side, side, side, 3) float32
-        As made by `count_derotated`.
-    directions : (n, 3) float64
-        Unit vectors in the frame whose axes, in that of the density, are the rows of `frame`.
-    frame : (3, 3) float64
-        These axes.
+    The directions (n, 3) are in the frame whose axes, in that of the density, are the rows of `frame`.
     """
     side = density.shape[0]
     for n in range(directions.shape[0]):
@@ -128,27 +106,14 @@ def full_count(counts: Singles) -> float:
 
 @njit(cache=True, nogil=True)
 def colour_counts(picture: Bytes, places: Integers, counts: Singles, colours: Singles, ground: Singles) -> None:
-    """Write the ground's colour, shifted towards others by counts, into places of `picture`.
+    """Write the ground's colour, shifted towards those of k kinds of events, into n places of `picture` (m, 3).
 
-    Noise below a tenth of the full count has no colour, and from the full count on there is all of it.
-
-    Parameters
-    ----------
-    picture : (m, 3) uint8
-        Output.
-    places : (n,) int64
-        Pixels to write.
-    counts : (k, n) float32
-        Counts of each of k kinds of events.
-    colours : (k, 3) float32
-        Their colours.
-    ground : (3,) float32
-        Colour where there are no events.
+    Of the counts (k, n), noise below a tenth of the full count has no colour, and from the full count on there is all
+    of it.
     """
     scale = np.zeros(counts.shape[0])
     for k in range(counts.shape[0]):
-        full = full_count(counts[k])
-        scale[k] = 1.0 / full if full > 0.0 else 0.0
+        scale[k] = 1.0 / max(full_count(counts[k]), 1e-30)  # all counts are 0 where that one is
     for n in range(places.size):
         red, green, blue = ground[0], ground[1], ground[2]
         for k in range(counts.shape[0]):
@@ -158,9 +123,8 @@ def colour_counts(picture: Bytes, places: Integers, counts: Singles, colours: Si
                 green += strength * (colours[k, 1] - ground[1])
                 blue += strength * (colours[k, 2] - ground[2])
         at = places[n]
-        picture[at, 0] = np.uint8(min(max(red, 0.0), 255.0))
-        picture[at, 1] = np.uint8(min(max(green, 0.0), 255.0))
-        picture[at, 2] = np.uint8(min(max(blue, 0.0), 255.0))
+        for channel, value in enumerate((red, green, blue)):
+            picture[at, channel] = np.uint8(min(max(value, 0.0), 255.0))
 
 
 class Canvas(NamedTuple):
@@ -199,16 +163,12 @@ def paint(
 
     Parameters
     ----------
-    pictures : tuple of (m, pixels, 3) uint8
-        Output, one array a kind.
-    canvases, frames : tuple of Canvas, tuple of (m, 3, 3) float64
-        Of every kind; the rows of a frame are the axes of the picture's frame.
+    pictures, canvases, frames : tuple of (m, pixels, 3) uint8, of Canvas, of (m, 3, 3) float64
+        Output, canvas, and frames at the moments of each kind; the rows of a frame are the axes of the picture's.
     normals, on, seconds : (e, 3) float64, (e,) bool, (e,) float64
         The events, as in `count_derotated`.
     seen : (m, 2) int64
         First event of each moment, and the one after its last.
-    spins_rps : (m, 3) float64
-        Spin of each moment.
     """
     density = np.empty((CELLS, CELLS, CELLS, 3), np.float32)
     for moment in range(spins_rps.shape[0]):

@@ -23,24 +23,7 @@ NO_LINE = 2.0
 
 @numba.njit(cache=True, nogil=True)
 def derotated_normals(normals: Floats, t_us: Integers, common_us: int, spin_rad_s: Floats) -> Floats:
-    """Normals at one common time, if the ball turns with this spin.
-
-    Parameters
-    ----------
-    normals : (n, 3) float64
-        Unit normals at the times of the events.
-    t_us : (n,) int64
-        These times.
-    common_us : int
-        Time to which the normals are turned.
-    spin_rad_s : (3,) float64
-        Angular velocity.
-
-    Returns
-    -------
-    (n, 3) float64
-        Unit normals at common_us.
-    """
+    """Normals (n, 3) turned from their own times (n,) to common_us, if the ball turns with this spin."""
     derotated = np.empty((t_us.size, 3))
     ax, ay, az, speed = axis_and_length(spin_rad_s)
     for i in range(t_us.size):
@@ -55,17 +38,9 @@ def derotated_normals(normals: Floats, t_us: Integers, common_us: int, spin_rad_
 def fit_moving_line(u: Floats, v: Floats, t_s: Floats, width_rad: float) -> tuple[float, float, float, float, float]:
     """Fit a line (nu, nv) . (u, v) = c + drift t to points, robustly.
 
-    Total least squares in (u, v): the normal is the direction in which the points spread least once their linear
-    dependence on t is taken out. Once with equal weights, then ROUNDS - 1 times with bisquare weights.
-
-    Parameters
-    ----------
-    u, v : (n,) float64
-        Places in the tangent plane, rad.
-    t_s : (n,) float64
-        Times.
-    width_rad : float
-        Width of the bisquare weights, rad.
+    Total least squares in (u, v), rad in the tangent plane: the normal is the direction in which the points (n,) spread
+    least once their linear dependence on t is taken out. Once with equal weights, then ROUNDS - 1 times with bisquare
+    weights of width_rad.
 
     Returns
     -------
@@ -151,20 +126,12 @@ def derotated_constraints(
 
     Parameters
     ----------
-    t_us : (n,) int64
-        Times of the events, rising.
-    normals : (n, 3) float64
-        Unit normals where the events are on the ball.
-    on : (n,) bool
-        Polarity.
+    t_us, normals, on : (n,) int64, (n, 3) float64, (n,) bool
+        Rising times of the events, unit normals where they are on the ball, and polarity.
     spin_rad_s : (3,) float64
         Guess of the spin.
-    stride : int
-        A constraint is looked for at every so many-th event.
-    reach_rad, width_rad : float
-        Distance of neighbours, and width of the fit's weights, on the unit sphere, rad.
-    reach_us : float
-        Time between neighbours.
+    reach_rad, reach_us, width_rad : float
+        Distance of neighbours on the unit sphere and in time, and width of the fit's weights.
     sharpest : float
         Lines less sharp than this are left out.
 
@@ -195,9 +162,9 @@ def derotated_constraints(
             sign = 1.0 if ez >= 0.0 else -1.0
             p = -1.0 / (sign + ez)
             q = ex * ey * p
-            frame[0, 0], frame[0, 1], frame[0, 2] = ex, ey, ez
-            frame[1, 0], frame[1, 1], frame[1, 2] = 1.0 + sign * ex * ex * p, sign * q, -sign * ex
-            frame[2, 0], frame[2, 1], frame[2, 2] = q, sign + ey * ey * p, -ey
+            frame[0] = ex, ey, ez
+            frame[1] = 1.0 + sign * ex * ex * p, sign * q, -sign * ex
+            frame[2] = q, sign + ey * ey * p, -ey
             size = _gather(near, own, own_us, k, frame, reach_rad, reach_us)
             if size < FEWEST:
                 continue
@@ -210,9 +177,7 @@ def derotated_constraints(
             nx = nu * frame[1, 0] + nv * frame[2, 0]
             ny = nu * frame[1, 1] + nv * frame[2, 1]
             nz = nu * frame[1, 2] + nv * frame[2, 2]
-            lines[count, 0] = ey * nz - ez * ny
-            lines[count, 1] = ez * nx - ex * nz
-            lines[count, 2] = ex * ny - ey * nx
+            lines[count] = ey * nz - ez * ny, ez * nx - ex * nz, ex * ny - ey * nx
             events[count], speeds[count], variances[count], sizes[count] = members[k], drift, variance, size
             count += 1
     events = events[:count].copy()
@@ -229,14 +194,8 @@ def position_response(normals: Floats, sights: Floats, rows: Floats, spin_rad_s:
 
     Parameters
     ----------
-    normals : (n, 3) float64
-        The unit normals e.
-    sights : (n, 3) float64
-        Unit vectors s to the camera.
-    rows : (n, 3) float64
-        Constraint rows e x n as from `derotated_constraints`.
-    spin_rad_s : (3,) float64
-        The spin.
+    normals, sights, rows : (n, 3) float64
+        Unit normals e, unit vectors s to the camera, and constraint rows e x n as from `derotated_constraints`.
     radius_px : float
         Radius r of the ball.
 
@@ -272,8 +231,7 @@ def position_response(normals: Floats, sights: Floats, rows: Floats, spin_rad_s:
                 for axis in range(3):
                     off[axis] = -e[axis] + s[axis] / facing
                     bent[axis] = -turn[axis] - s[axis] * facing_rate / (facing * facing)
-            change = 0.0
-            change += line[0] * (bent[0] - (wy * off[2] - wz * off[1]))
+            change = line[0] * (bent[0] - (wy * off[2] - wz * off[1]))
             change += line[1] * (bent[1] - (wz * off[0] - wx * off[2]))
             change += line[2] * (bent[2] - (wx * off[1] - wy * off[0]))
             response[i, which] = change / radius_px

@@ -67,9 +67,7 @@ def peak(votes: Pixels, radius0_px: int) -> tuple[float, int, int, int]:
 @njit(cache=True, nogil=True)
 def bright_pixels(image: Bytes, least: int, most_pixels: int) -> tuple[Integers, Integers]:
     """Columns and rows (m,) int64 of the pixels of at least this value, thinned evenly to most_pixels."""
-    count = 0
-    for value in image.flat:
-        count += value >= least
+    count = int(np.count_nonzero(image >= least))
     stride = max(1, -(-count // max(most_pixels, 1))) | 1  # odd: even ones would pick out whole columns
     xs = np.empty(-(-count // stride), np.int64)
     ys = np.empty(xs.size, np.int64)
@@ -117,20 +115,13 @@ def active_cells(values: Bytes, x_px: Pixels, y_px: Pixels, least: int, cell_px:
             row = y_px[i] // cell_px + 1
             active[row, x_px[i] // cell_px + 1] = 1
             first, last = min(first, row), max(last, row)
-    xs = np.empty(rows * columns, np.int64)
-    ys = np.empty(rows * columns, np.int64)
+    xs, ys = np.empty(rows * columns, np.int64), np.empty(rows * columns, np.int64)
     m = 0
     for b in range(first, last + 1):
         for a in range(1, columns + 1):
-            if active[b, a]:
-                around = 0
-                for j in range(b - 1, b + 2):
-                    for i in range(a - 1, a + 2):
-                        around += active[j, i]
-                if around > 1:
-                    xs[m] = a - 1
-                    ys[m] = b - 1
-                    m += 1
+            if active[b, a] and active[b - 1 : b + 2, a - 1 : a + 2].sum() > 1:
+                xs[m], ys[m] = a - 1, b - 1
+                m += 1
     return xs[:m].copy(), ys[:m].copy()
 
 
@@ -145,9 +136,7 @@ def refined(votes: Pixels, a: int, b: int, k: int) -> tuple[float, float, float]
                 # Squared, so that the even floor of votes under the peak weighs little.
                 weight = float(votes[j, i, n]) ** 2
                 total += weight
-                sum_a += weight * i
-                sum_b += weight * j
-                sum_k += weight * n
+                sum_a, sum_b, sum_k = sum_a + weight * i, sum_b + weight * j, sum_k + weight * n
     if total == 0.0:
         return float(a), float(b), float(k)
     return sum_a / total, sum_b / total, sum_k / total

@@ -24,8 +24,6 @@ def logo_rows(
     ----------
     reference_us : float
         The time stamp that an event of the scene with the ball at `centre_px` carries.
-    centre_px, velocity_px_s : (x, y) float
-        Centre of the ball at the reference time, and its velocity.
     mask_px : float
         Radius within which every event counts.
     rim_px : float

@@ -226,5 +226,6 @@ def in_square(x_px: Pixels, y_px: Pixels, centre_x_px: float, centre_y_px: float
 def relative_events(chosen: Integers, events: Events, reference_us: float) -> tuple[Floats, Floats, Floats]:
     """Seconds after the reference time, columns and rows of the chosen events, (m,) float64 each."""
     t_us, x_px, y_px, _ = events
-    tau_s = (t_us[chosen] - reference_us) * 1e-6
+    tau_s = np.empty(chosen.size)
+    tau_s[:] = (t_us[chosen] - reference_us) * 1e-6
     return tau_s, x_px[chosen].astype(np.float64), y_px[chosen].astype(np.float64)

@@ -3,7 +3,14 @@
 Nothing else of this package is meant to be imported from outside.
 """
 
-from .formats import FORMATS, RecordingContent, RecordingFormat, format_to_write, readable_suffixes, writable_suffixes
+from .formats.registry import (
+    FORMATS,
+    RecordingContent,
+    RecordingFormat,
+    format_to_write,
+    readable_suffixes,
+    writable_suffixes,
+)
 from .opening import open_recording
 from .reader import Damage, FormatReader, ReadPass, Triggers, UncheckedEvents
 from .recording import Recording

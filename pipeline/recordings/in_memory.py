@@ -17,16 +17,10 @@ class RecordingInMemory:
 
     Attributes
     ----------
-    data : EventBatch
-        All events.
-    width_px, height_px : int
-        Size of the sensor.
     path : Path
         Name for people; no file.
     attributes : dict
         Camera values as a file would state them (`camera.focal_length_mm` ...).
-    truth : Truth, optional
-        Ground truth of a simulation.
     """
 
     data: EventBatch
@@ -49,5 +43,4 @@ class RecordingInMemory:
         self, start_us: int | None = None, end_us: int | None = None, on_progress: Callable[[float], None] | None = None
     ) -> EventBatch:
         """The events of [start_us, end_us), all by default."""
-        first, last = (self.data.t_us[0], self.data.t_us[-1] + 1) if len(self.data) else (0, 0)
-        return self.data.between(int(first) if start_us is None else start_us, int(last) if end_us is None else end_us)
+        return self.data.between(-(2**63) if start_us is None else start_us, 2**63 - 1 if end_us is None else end_us)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import RecordingError
-from .formats import FORMATS, HEAD_BYTES
+from .formats.registry import FORMATS, HEAD_BYTES
 from .reader import Progress
 from .recording import Recording
 from .sensor import stated_resolution
@@ -39,12 +39,12 @@ def open_recording(
     Returns
     -------
     Recording
-        The recording, of which only the header has been read, or once all events when nothing states the sensor.
+        Only the header has been read, or once all events when nothing states the sensor.
 
     Raises
     ------
     RecordingError
-        In one line for everything that cannot be read.
+        For everything that cannot be read.
     """
     path = Path(path)
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -15,16 +16,7 @@ class TimeOrder:
 
     An event may come up to 10 ms behind the latest one before it (readout of several event buffers, a wrong
     time word): so the last 10 ms are held back until more has come. Events further behind are refused
-    (RecordingError) where order is strict, and dropped and counted otherwise, because earlier events are handed on.
-
-    Parameters
-    ----------
-    path : Path
-        File that messages name.
-    reading : ReadPass
-        Pass in which damage is counted.
-    strict : bool
-        Whether events too far behind are refused.
+    (RecordingError) if `strict`, and dropped and counted in `reading` otherwise, because earlier events are handed on.
     """
 
     def __init__(self, path: Path, reading: ReadPass, strict: bool) -> None:
@@ -36,10 +28,16 @@ class TimeOrder:
         self._latest_us = -(2**63)  # of all events so far
         self._before_us = -(2**63)  # of the event just before, in file order
 
-    def push(self, new: UncheckedEvents) -> UncheckedEvents | None:
+    def sorted(self, parts: Iterable[UncheckedEvents]) -> Iterator[UncheckedEvents]:
+        """Yield the events of all parts in order of time, in parts that are not empty."""
+        for part in parts:
+            if sure := self._push(part):
+                yield sure
+        if any(map(len, self._held)):
+            yield self._joined()
+
+    def _push(self, new: UncheckedEvents) -> UncheckedEvents | None:
         """Take the next events; returns those that no later event can precede, None when there are none."""
-        if not len(new):
-            return None
         t_us = new.t_us
         backward = int(np.count_nonzero(t_us[1:] < t_us[:-1])) + (int(t_us[0]) < self._before_us)
         in_order = not backward and int(t_us[0]) >= self._latest_us
@@ -55,17 +53,14 @@ class TimeOrder:
             self._first_us = min(self._first_us, int(new.t_us.min()))
         if self._first_us > self._latest_us - MAX_DISORDER_US:
             return None
-        known = self._sorted()
+        known = self._joined()
         sure = int(np.searchsorted(known.t_us, self._latest_us - MAX_DISORDER_US, side="right"))
         self._held, self._held_in_order = [known[sure:]], True
         self._first_us = int(known.t_us[sure]) if sure < len(known) else 2**63 - 1
         return known[:sure]
 
-    def finish(self) -> UncheckedEvents | None:
-        """Return the events held back, None when there are none."""
-        return self._sorted() if self._held else None
-
-    def _sorted(self) -> UncheckedEvents:
+    def _joined(self) -> UncheckedEvents:
+        """The events held back, in order of time."""
         known = UncheckedEvents.joined(self._held)
         return known if self._held_in_order else known[np.argsort(known.t_us, kind="stable")]
 

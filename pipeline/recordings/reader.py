@@ -5,11 +5,11 @@ from __future__ import annotations
 import zipfile
 import zlib
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,62 +30,57 @@ FILE_ERRORS = (
 )
 
 
+def _count(sentence: str) -> int:
+    """Field of `Damage` with its sentence for people."""
+    count: int = field(default=0, metadata={"sentence": sentence})
+    return count
+
+
 @dataclass(slots=True)
 class Damage:
-    """Counts of everything wrong that a full pass over a recording found; all zero in a sound file.
+    """Counts of everything wrong that a full pass over a recording found; all zero in a sound file."""
 
-    Attributes
-    ----------
-    bad_words : int
-        RAW words of no known type (skipped).
-    backward_steps : int
-        Events earlier than the event before them in the file.
-    late_events : int
-        Of these, events of RAW files more than 10 ms behind (dropped; other files are refused).
-    time_jumps : int
-        RAW time words that the next one contradicts (ignored).
-    untimed_events : int
-        RAW events before the first time or row, or under an unconfirmed time (dropped).
-    outside_events : int
-        Events outside the sensor (dropped).
-    lost_bytes : int
-        Bytes at the file's end that make no whole word (a cut file).
-    """
-
-    bad_words: int = 0
-    backward_steps: int = 0
-    late_events: int = 0
-    time_jumps: int = 0
-    untimed_events: int = 0
-    outside_events: int = 0
-    lost_bytes: int = 0
-
-    def as_dict(self) -> dict[str, int]:
-        """Name and count of every kind."""
-        return asdict(self)
+    bad_words: int = _count("{} words of no known type were skipped")
+    backward_steps: int = _count("time steps backwards {} times; events up to 10 ms late were put in order")
+    # Of these; only in RAW files, others are refused.
+    late_events: int = _count("{} events more than 10 ms behind earlier ones were dropped")
+    time_jumps: int = _count("{} time words that the next one contradicts were ignored")
+    untimed_events: int = _count("{} events without a sure time or row were dropped")
+    outside_events: int = _count("{} events outside the sensor were dropped")
+    lost_bytes: int = _count("{} bytes at the end make no whole word: the file was cut")
 
     def sentences(self) -> list[str]:
         """One sentence for people for every kind that occurred."""
-        texts = {
-            "bad_words": "{} words of no known type were skipped",
-            "backward_steps": "time steps backwards {} times; events up to 10 ms late were put in order",
-            "late_events": "{} events more than 10 ms behind earlier ones were dropped",
-            "time_jumps": "{} time words that the next one contradicts were ignored",
-            "untimed_events": "{} events without a sure time or row were dropped",
-            "outside_events": "{} events outside the sensor were dropped",
-            "lost_bytes": "{} bytes at the end make no whole word: the file was cut",
-        }
-        return [texts[name].format(count) for name, count in self.as_dict().items() if count]
+        counts = ((kind, getattr(self, kind.name)) for kind in fields(self))
+        return [kind.metadata["sentence"].format(count) for kind, count in counts if count]
+
+
+class _Columns:
+    """Columns of the same length, as many as slots."""
+
+    __slots__: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(getattr(self, self.__slots__[0]))
+
+    def __getitem__(self, rows: slice | NDArray[Any]) -> Self:
+        return type(self)(*(getattr(self, name)[rows] for name in self.__slots__))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Concatenation of at least one part."""
+        if len(parts) == 1:
+            return parts[0]
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls.__slots__))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Triggers:
+class Triggers(_Columns):
     """Edges on the camera's trigger input.
 
     Attributes
     ----------
     t_us : (n,) int64
-        Time of the edge.
     value : (n,) uint8
         1 for a rising edge, 0 for a falling one.
     id : (n,) uint8
@@ -99,26 +94,11 @@ class Triggers:
     @classmethod
     def none(cls) -> Triggers:
         """No edges at all."""
-        return cls.joined([])
-
-    @classmethod
-    def joined(cls, parts: list[Triggers]) -> Triggers:
-        """Concatenation in the order given."""
-        return cls(
-            np.concatenate([np.empty(0, np.int64), *(p.t_us for p in parts)]),
-            np.concatenate([np.empty(0, np.uint8), *(p.value for p in parts)]),
-            np.concatenate([np.empty(0, np.uint8), *(p.id for p in parts)]),
-        )
-
-    def __len__(self) -> int:
-        return self.t_us.size
-
-    def __getitem__(self, rows: slice | NDArray[Any]) -> Triggers:
-        return Triggers(self.t_us[rows], self.value[rows], self.id[rows])
+        return cls(np.empty(0, np.int64), np.empty(0, np.uint8), np.empty(0, np.uint8))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class UncheckedEvents:
+class UncheckedEvents(_Columns):
     """Events as they are in a file: not yet in order of time, perhaps outside the sensor.
 
     Attributes
@@ -133,23 +113,10 @@ class UncheckedEvents:
     y: NDArray[Any]
     on: NDArray[np.bool_]
 
-    def __len__(self) -> int:
-        return self.t_us.size
-
-    def __getitem__(self, rows: slice | NDArray[Any]) -> UncheckedEvents:
-        return UncheckedEvents(self.t_us[rows], self.x[rows], self.y[rows], self.on[rows])
-
-    @classmethod
-    def joined(cls, parts: list[UncheckedEvents]) -> UncheckedEvents:
-        """Concatenation of at least one part."""
-        if len(parts) == 1:
-            return parts[0]
-        return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in ("t_us", "x", "y", "on")))
-
 
 @dataclass(slots=True)
 class ReadPass:
-    """One pass over a file: the request, and the counts so far.
+    """One pass over a file: the request, and what the reader found so far.
 
     Attributes
     ----------
@@ -157,14 +124,10 @@ class ReadPass:
         Most events that a reader hands over at once.
     start_us, end_us : int or None
         A reader may leave out events that lie surely outside [start_us, end_us).
-    on_progress : callable or None
-        Called with the share done.
     first_row : int
-        Number of the first event that the reader gave, set by the reader.
-    damage : Damage
-        Counts, added to by the reader.
+        Number of the first event that the reader gave.
     triggers : list of Triggers
-        Edges found so far, added to by the reader.
+        Edges found so far.
     """
 
     max_events: int = CHUNK_EVENTS
@@ -187,11 +150,6 @@ class ReadPass:
 
 class FormatReader(ABC):
     """Reader of one file of one format.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
 
     Attributes
     ----------

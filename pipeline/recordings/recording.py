@@ -6,7 +6,6 @@ import hashlib
 import os
 from collections.abc import Iterator
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
@@ -37,10 +36,12 @@ class Recording:
 
     Attributes
     ----------
-    path : Path
-        The file.
     format : str
         Format and encoding for people, like "EVT3 RAW".
+    width_px, height_px : int
+        Size of the sensor.
+    sensor_from : str
+        Origin of this size: "file", "command line", "system_ID 49" or "guess".
     attributes : dict of str to str or float
         Root attributes or header lines of the file; `camera.focal_length_mm` and the like among them.
     t_offset_us : int or None
@@ -55,32 +56,16 @@ class Recording:
         self._reader = reader
         self._asked = asked
         self._sensor_warnings: list[str] = []
-        self._sensor = self._chosen_sensor(on_progress)
         self._pass: ReadPass | None = None
         self._whole = False  # whether _pass saw the whole file
-        self.path: Path = reader.path
-        self.format: str = reader.format
-        self.attributes: dict[str, str | float] = dict(reader.attributes)
-        self.t_offset_us: int | None = reader.t_offset_us
-        self.events: int | None = reader.events
+        sensor = self._chosen_sensor(on_progress)
+        self.width_px, self.height_px, self.sensor_from = sensor.width_px, sensor.height_px, sensor.origin
+        self.path, self.format = reader.path, reader.format
+        self.attributes = dict(reader.attributes)
+        self.t_offset_us, self.events = reader.t_offset_us, reader.events
 
     def __repr__(self) -> str:
         return f"Recording({self.format}, {self.width_px} x {self.height_px} px, {self.path})"
-
-    @property
-    def width_px(self) -> int:
-        """Columns of the sensor."""
-        return self._sensor.width_px
-
-    @property
-    def height_px(self) -> int:
-        """Rows of the sensor."""
-        return self._sensor.height_px
-
-    @property
-    def sensor_from(self) -> str:
-        """Origin of the sensor's size: "file", "command line", "system_ID 49" or "guess"."""
-        return self._sensor.origin
 
     @cached_property
     def truth(self) -> Truth | None:
@@ -104,7 +89,7 @@ class Recording:
     @property
     def triggers(self) -> Triggers:
         """Edges on the trigger input in the whole file; makes a pass over it unless there was one."""
-        return Triggers.joined(self._scanned().triggers)
+        return Triggers.joined([Triggers.none(), *self._scanned().triggers])
 
     def scan(self, on_progress: Progress | None = None) -> None:
         """Read the whole file once, for `damage`, `triggers` and `warnings`."""
@@ -112,19 +97,10 @@ class Recording:
             pass
 
     def chunks(self, max_events: int = CHUNK_EVENTS, on_progress: Progress | None = None) -> Iterator[EventBatch]:
-        """Yield all events in order of time, in constant memory.
+        """Yield all events in order of time, in constant memory: 1 to max_events at once.
 
-        Parameters
-        ----------
-        max_events : int
-            Most events at once; there is at least one.
-        on_progress : callable, optional
-            Called with the share done, 0..1.
-
-        Raises
-        ------
-        RecordingError
-            On the way, for what cannot be repaired; `Damage` counts what can.
+        Raises RecordingError on the way, for what cannot be repaired; `Damage` counts what can. `on_progress` is called
+        with the share done, 0..1.
         """
         return self._batches(ReadPass(max_events, on_progress=on_progress))
 
@@ -138,7 +114,7 @@ class Recording:
         start_us, end_us : int, optional
             Only events of [start_us, end_us), in the file's time; from the start, or to the end, without them.
         on_progress : callable, optional
-            Called with the share done, 0..1.
+            As of `chunks`.
 
         Raises
         ------
@@ -213,41 +189,29 @@ class Recording:
         whole = reading.start_us is None and reading.end_us is None
         start_us = -(2**63) if reading.start_us is None else reading.start_us
         end_us = 2**63 - 1 if reading.end_us is None else reading.end_us
-        for columns in self._ordered(reading, order):
-            batch = self._on_sensor(columns, reading).between(start_us, end_us) if columns else EventBatch.empty()
+        for columns in order.sorted(self._reader.columns(reading)):
+            batch = self._on_sensor(columns, reading).between(start_us, end_us)
             for first in range(0, len(batch), reading.max_events):
                 yield batch[first : first + reading.max_events]
-            if columns and int(columns.t_us[-1]) >= end_us:
+            if int(columns.t_us[-1]) >= end_us:
                 break
         if whole or not self._whole:
             self._pass, self._whole = reading, whole
 
-    def _ordered(self, reading: ReadPass, order: TimeOrder) -> Iterator[UncheckedEvents | None]:
-        for columns in self._reader.columns(reading):
-            yield order.push(columns)
-        yield order.finish()
-
     def _on_sensor(self, columns: UncheckedEvents, reading: ReadPass) -> EventBatch:
         """Events on the sensor; others are dropped as damage, or show that --sensor is too small."""
-        if columns.x.max() < self.width_px and columns.y.max() < self.height_px:
-            inside = columns
-        else:
+        if columns.x.max() >= self.width_px or columns.y.max() >= self.height_px:
             stated = self._reader.stated
-            if self._asked is not None and not (
-                stated is not None and self._asked.holds(stated.width_px, stated.height_px)
-            ):
-                self._refuse_small_sensor()
-            mask = (columns.x < self.width_px) & (columns.y < self.height_px)
-            inside = columns[mask]
-            reading.damage.outside_events += int(np.count_nonzero(~mask))
-        return EventBatch(
-            inside.t_us, inside.x.astype(np.uint16, copy=False), inside.y.astype(np.uint16, copy=False), inside.on
-        )
-
-    def _refuse_small_sensor(self) -> None:
-        extent = self._extent_px(None)
-        size = smallest_known(*extent) or extent
-        raise RecordingError(
-            f"--sensor {self.width_px}x{self.height_px} is too small, the events reach over {extent[0]} x "
-            f"{extent[1]} pixels: {size[0]}x{size[1]} holds them: {self.path}"
-        )
+            holds_stated = stated and stated.width_px <= self.width_px and stated.height_px <= self.height_px
+            if self._asked is not None and not holds_stated:
+                extent = self._extent_px(None)
+                size = smallest_known(*extent) or extent
+                raise RecordingError(
+                    f"--sensor {self.width_px}x{self.height_px} is too small, the events reach over {extent[0]} x "
+                    f"{extent[1]} pixels: {size[0]}x{size[1]} holds them: {self.path}"
+                )
+            inside = (columns.x < self.width_px) & (columns.y < self.height_px)
+            reading.damage.outside_events += int(np.count_nonzero(~inside))
+            columns = columns[inside]
+        x, y = (column.astype(np.uint16, copy=False) for column in (columns.x, columns.y))
+        return EventBatch(columns.t_us, x, y, columns.on)

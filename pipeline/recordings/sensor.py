@@ -22,10 +22,6 @@ class Resolution:
     height_px: int
     origin: str
 
-    def holds(self, columns_px: int, rows_px: int) -> bool:
-        """Whether pixels of that many columns and rows all lie on this sensor."""
-        return columns_px <= self.width_px and rows_px <= self.height_px
-
 
 def stated_resolution(width: object, height: object, origin: str) -> Resolution:
     """Resolution from two values of a file or of the user; raises RecordingError for nonsense."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,28 +24,18 @@ HOT_NEIGHBOUR = 2
 
 @dataclass(frozen=True, slots=True)
 class RecordingInfo:
-    """Result of `summary`.
+    """Result of `summary`; None where there are no events, or no duration, to tell it from.
 
     Attributes
     ----------
     path, format, width_px, height_px, sensor_from, attributes, t_offset_us, warnings
         As of `Recording`.
-    events : int
-        Number of events.
-    first_us, last_us : int or None
-        Times of the first and last event; None without events.
     duration_us : int
-        Last less first, 0 without events.
-    on_share : float or None
-        Share of ON events, None without events.
-    mean_rate_hz : float or None
-        Events a second over the duration; None when that is 0.
-    peak_rate_hz : float or None
-        The same in the fullest millisecond, None without events.
-    hot_pixels : int
-        Number of hot pixels (see HOT_EVENTS).
-    hot_share : float
-        Their share of the events.
+        Last time less first, 0 without events.
+    mean_rate_hz, peak_rate_hz : float or None
+        Events a second over the duration, and in the fullest millisecond.
+    hot_pixels, hot_share : int, float
+        Number of hot pixels (see HOT_EVENTS), and their share of the events.
     triggers : int
         Number of edges on the trigger input.
     damage : dict of str to int
@@ -104,7 +94,7 @@ def summary(recording: Recording, on_progress: Progress | None = None) -> Record
         hot_pixels=hot_pixels,
         hot_share=hot_events / events if events else 0.0,
         triggers=len(recording.triggers),
-        damage=recording.damage.as_dict(),
+        damage=asdict(recording.damage),
         t_offset_us=recording.t_offset_us,
         attributes=recording.attributes,
         warnings=recording.warnings,
@@ -130,8 +120,7 @@ class _EventStatistics:
         self.events += len(batch)
         self.on += int(np.count_nonzero(batch.on))
         pixels = batch.y_px.astype(np.intp) * self._width_px + batch.x_px
-        flat = self._counts.reshape(-1)
-        flat += np.bincount(pixels, minlength=flat.size)
+        self._counts += np.bincount(pixels, minlength=self._counts.size).reshape(self._counts.shape)
         bins, counts = _runs(batch.t_us // PEAK_BIN_US)
         if self._bin == bins[0]:
             counts[0] += self._bin_events

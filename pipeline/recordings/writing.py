@@ -13,11 +13,12 @@ from ..errors import RecordingError
 from ..events import EventBatch
 from ..files import atomic_file
 from ..results import Truth
-from .formats import RecordingContent, format_to_write
+from .formats.registry import RecordingContent, format_to_write
 from .opening import open_recording
 from .reader import Progress, Triggers
 from .sensor import MAX_SIZE_PX
 
+# Attributes about the encoding of a file, which every format states itself.
 ENCODING_KEYS = ("format", "evt", "geometry", "width", "height", "end")
 # Raised by h5py and zipfile when the disk is full or the place is no good, besides OSError.
 WRITE_ERRORS = (RuntimeError, ValueError, MemoryError)
@@ -41,18 +42,12 @@ def write_recording(
 
     Parameters
     ----------
-    path : str or Path
-        The file.
     events : EventBatch or iterable of EventBatch
         Events in order of time; batches are written as they come.
-    width_px, height_px : int
-        Size of the sensor.
     attributes : mapping of str to str or float, optional
         Statements about camera and scene.
     truth : Truth, optional
         Simulator's truth, whose label has one value an event.
-    triggers : Triggers, optional
-        Edges of the trigger input.
     t_offset_us : int, optional
         Offset of the file's time in DSEC recordings.
 
@@ -89,8 +84,6 @@ def convert(
 
     Parameters
     ----------
-    source, target : str or Path
-        Recording to read and file to write.
     sensor : (width_px, height_px), optional
         Size of the sensor, where the file does not state it.
     on_progress : callable, optional
@@ -134,7 +127,7 @@ def convert(
             batches=batches(),
             width_px=recording.width_px,
             height_px=recording.height_px,
-            attributes={name: value for name, value in recording.attributes.items() if name not in ENCODING_KEYS},
+            attributes=recording.attributes,
             triggers=triggers,
             truth=truth,
             t_offset_us=recording.t_offset_us,
@@ -150,9 +143,10 @@ def _write(content: RecordingContent) -> None:
         raise RecordingError(
             f"sensor of {content.width_px} x {content.height_px} px: 1 to {MAX_SIZE_PX} are allowed: {path}"
         )
+    attributes = {name: value for name, value in content.attributes.items() if name not in ENCODING_KEYS}
     with atomic_file(path, "recording") as part:
         try:
-            format.write(part, replace(content, batches=_checked(content)))
+            format.write(part, replace(content, batches=_checked(content), attributes=attributes))
         except WRITE_ERRORS as error:
             raise OSError(" ".join(str(error).split())) from error
 

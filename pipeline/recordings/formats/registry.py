@@ -23,8 +23,6 @@ class RecordingContent:
         File as messages name it; what is written has a temporary name.
     batches : iterable of EventBatch
         Events in order of time and on the sensor, to be iterated once.
-    width_px, height_px : int
-        Size of the sensor.
     attributes : mapping of str to str or float
         Statements about camera and scene, without those about the encoding of another file.
     triggers : callable returning Triggers
@@ -51,8 +49,6 @@ class RecordingFormat:
 
     Attributes
     ----------
-    name : str
-        Unique name in the registry.
     label : str
         Name for people.
     suffixes : tuple of str

@@ -8,12 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...kernels.arrays import Floats, Integers
 from .events import (
     BallUncertainty,
     ContrastEstimate,
     ContrastSettings,
-    Floats,
-    Integers,
     SphereEvents,
     offset_slopes,
     segmented_window,

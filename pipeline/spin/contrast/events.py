@@ -8,10 +8,9 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from ...kernels.arrays import Flags, Floats, Integers
+
 GOLDEN_RATIO = 0.6180339887498949  # its multiples modulo 1 spread as evenly as any sequence can
 
 
@@ -106,7 +105,7 @@ class SphereEvents:
     def __len__(self) -> int:
         return self.t_s.size
 
-    def at(self, rows: Integers | NDArray[np.bool_]) -> SphereEvents:
+    def at(self, rows: Integers | Flags) -> SphereEvents:
         """Select the events of a mask or of indices."""
         normals, facing = (np.ascontiguousarray(table[:, rows]) for table in (self.normals, self.facing))
         return SphereEvents(self.t_s[rows], normals, self.polarity[rows], facing, self.radius_px[rows])

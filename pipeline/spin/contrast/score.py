@@ -25,21 +25,10 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from ...kernels.arrays import Flags, Floats, Integers, Singles
 from ...kernels.rotation import axis_and_length, orthonormal_axes, rotate
-from .events import (
-    EventColumns,
-    Floats,
-    Integers,
-    ScoreWindow,
-    SphereEvents,
-    segment_starts,
-    shifted_normals,
-    take_columns,
-)
-
-Map = NDArray[np.float32]
+from .events import EventColumns, ScoreWindow, SphereEvents, segment_starts, shifted_normals, take_columns
 
 TURN = 2.0 * math.pi
 # The quadratic B-spline's overlap with itself in two dimensions, mean over its place on the grid (11/20 each):
@@ -114,7 +103,9 @@ def _spline(offset: float) -> tuple[float, float, float]:
 
 
 @numba.njit(cache=True, nogil=True)
-def _splat(density: Map, places: Floats, polarity: Integers, first: int, last: int, size: int, weight: float) -> None:
+def _splat(
+    density: Singles, places: Floats, polarity: Integers, first: int, last: int, size: int, weight: float
+) -> None:
     """Add one splat of this weight a place [first, last) to the flat maps, size x size cells a polarity."""
     for k in range(first, last):
         x, y = places[0, k], places[1, k]
@@ -199,7 +190,7 @@ def scores(spins_rad_s: Floats, window: ScoreWindow, sigma_rad: float, floor: fl
     return values
 
 
-def burst_mask(events: SphereEvents) -> NDArray[np.bool_]:
+def burst_mask(events: SphereEvents) -> Flags:
     """Mask (n,) of the events that come in bursts where they are on the disc: the logo's edges do, shading does not.
 
     The log ratio of a ball that does not turn, BURST_S against the whole stretch: an event that is no denser than

@@ -17,7 +17,8 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from .events import EventColumns, Floats, Integers, segmented_window
+from ...kernels.arrays import Floats, Integers
+from .events import EventColumns, segmented_window
 from .score import CELLS_PER_SIGMA, TURN, Objective, changed_spin, difference_steps, score, scores_near, spin_axes
 
 SLOWEST_RPS = 3.0

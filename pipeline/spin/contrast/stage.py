@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...kernels.arrays import Floats
 from ...parameters import ParameterGroup, switch, tunable
 from ...results import MethodResult, Packet, ReadOnlyArrays, SpinEstimate
 from ...stage import Context, SpinMethod
@@ -27,7 +27,6 @@ from .events import BallUncertainty, ContrastEstimate, ContrastSettings, SphereE
 
 METHOD, FLOW_METHOD = "contrast", "normal_flow"
 
-Floats = NDArray[np.float64]
 
 # Full estimates when the shot is so old, then each time it is half as old again; in between the last answer is
 # followed, which costs a tenth.

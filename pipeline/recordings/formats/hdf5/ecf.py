@@ -33,15 +33,7 @@ class EcfBlock(NamedTuple):
 
 
 class EcfRows:
-    """Rows of an ECF-compressed dataset of events.
-
-    Parameters
-    ----------
-    data : h5py.Dataset
-        Chunked dataset with ECF as its only filter.
-    path : Path
-        File that messages name.
-    """
+    """Rows of a chunked dataset of events with ECF as its only filter."""
 
     def __init__(self, data: h5py.Dataset, path: Path) -> None:
         self._data, self._path = data, path
@@ -92,20 +84,7 @@ def _number(data: Bytes, at: int, size: int) -> int:
 
 @njit(cache=True, nogil=True)
 def decode_ecf(out: EcfBlock, data: Bytes) -> int:
-    """Decode a block into `out`.
-
-    Parameters
-    ----------
-    out : EcfBlock
-        Arrays that the events are written to.
-    data : (n + PAD_BYTES,) uint8
-        The block, followed by zeros.
-
-    Returns
-    -------
-    int
-        Number of events, or DAMAGED.
-    """
+    """Decode a block, followed by PAD_BYTES zeros, into `out`; returns the number of events, or DAMAGED."""
     end = data.size - PAD_BYTES
     if end < 12:
         return DAMAGED
@@ -113,20 +92,17 @@ def decode_ecf(out: EcfBlock, data: Bytes) -> int:
     count = head >> 2
     if count > out.t.size:
         return DAMAGED
+    # Each part begins where the one before ends, beyond the end of the block where that is cut.
     at = _times(out.t, count, data, 12, _number(data, 4, 8))
-    if at == DAMAGED:
-        return DAMAGED
     if head & ALL_PACKED:
         at = _packed(out, count, data, at, 4)
     else:
         at = _runs(out.y, count, data, at, 2, 5)
-        if at != DAMAGED and head & X_P_PACKED:
+        if head & X_P_PACKED:
             at = _packed(out, count, data, at, 2)
-        elif at != DAMAGED:
-            at = _columns_masked(out.x, count, data, at)
-            if at != DAMAGED:
-                at = _runs(out.p, count, data, at, 1, 7)
-    return DAMAGED if at == DAMAGED or at > end else count
+        else:
+            at = _runs(out.p, count, data, _columns_masked(out.x, count, data, at), 1, 7)
+    return count if at <= end else DAMAGED
 
 
 @njit(cache=True, nogil=True)
@@ -136,12 +112,12 @@ def _times(t: NDArray[np.int64], count: int, data: Bytes, at: int, now: int) -> 
     done, shift, long_step = 0, 0, 0
     while done < count:
         if at >= end:
-            return DAMAGED
+            return data.size
         step, run = int(data[at]) >> 4, int(data[at]) & 15
         at += 1
         if step == 15:
             if shift > 56:
-                return DAMAGED
+                return data.size
             long_step |= run << shift
             shift += 4
             continue
@@ -163,7 +139,7 @@ def _runs(values: NDArray[Any], count: int, data: Bytes, at: int, size: int, run
     done = 0
     while done < count:
         if at >= end:
-            return DAMAGED
+            return data.size
         word = _number(data, at, size)
         at += size
         run = word & full
@@ -183,7 +159,7 @@ def _columns_masked(x: NDArray[np.uint16], count: int, data: Bytes, at: int) -> 
     done = 0
     while done < count:
         if at >= end:
-            return DAMAGED
+            return data.size
         word = _number(data, at, 2)
         at += 2
         x[done] = word >> 5
@@ -210,7 +186,7 @@ def _packed(out: EcfBlock, count: int, data: Bytes, at: int, size: int) -> int:
     end = data.size - PAD_BYTES
     for first in range(0, count, 4):
         if at >= end:
-            return DAMAGED
+            return data.size
         values = _four_values(data, at, size)
         at += 3 * size
         for k in range(min(4, count - first)):

@@ -15,7 +15,6 @@ from ...column_types import COLUMN_TYPES, columns_of
 from ..registry import RecordingContent
 
 CHUNK_EVENTS = 1 << 15  # 256 kB of times: fits the 1 MB cache of HDF5, and a window reads little more
-SENSOR_KEYS = ("width", "height", "geometry")
 
 
 def write_hdf5(path: Path, content: RecordingContent) -> None:
@@ -44,8 +43,7 @@ def write_hdf5(path: Path, content: RecordingContent) -> None:
                 events += len(batch)
                 disk.raise_error()
             for name, value in content.attributes.items():
-                if name not in SENSOR_KEYS:
-                    file.attrs[name] = value.replace("\0", "") if isinstance(value, str) else value
+                file.attrs[name] = value.replace("\0", "") if isinstance(value, str) else value
             truth = content.truth()
             if truth is not None:
                 _write_truth(file, truth, events, content.path)

@@ -6,19 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from .decoding import (
-    BAD_WORDS,
-    EVENTS,
-    HIGH,
-    MAX_COORDINATE,
-    OUTSIDE,
-    TIME_HIGH,
-    TIME_KNOWN,
-    TRIGGERS,
-    UNTIMED,
-    Decoded,
-    take_time_high,
-)
+from . import decoding
+from .decoding import MAX_COORDINATE, TIME_HIGH, Decoded, take_time_high
 
 CD_OFF, CD_ON, EXT_TRIGGER, OTHERS, CONTINUED = 0x0, 0x1, 0xA, 0xE, 0xF
 HIGH_BITS, LOW_BITS = 28, 6
@@ -50,7 +39,7 @@ def decode_evt2(out: Decoded, heads: NDArray[np.uint32], masks: NDArray[np.uint3
     state = out.state
     last_start, trigger_room = out.t_us.size - MAX_EVENTS_PER_WORD, out.trigger_t_us.size
     events, triggers, done = 0, 0, heads.size
-    high_us, time_known = state[HIGH] << LOW_BITS, state[TIME_KNOWN] != 0
+    high_us, time_known = state[decoding.HIGH] << LOW_BITS, state[decoding.TIME_KNOWN] != 0
     vectors = masks.size > 0
     for i in range(heads.size):
         if events > last_start or triggers >= trigger_room:
@@ -65,9 +54,9 @@ def decode_evt2(out: Decoded, heads: NDArray[np.uint32], masks: NDArray[np.uint3
             while mask:
                 if mask & 1:
                     if not time_known:
-                        state[UNTIMED] += 1
+                        state[decoding.UNTIMED] += 1
                     elif x > MAX_COORDINATE:
-                        state[OUTSIDE] += 1
+                        state[decoding.OUTSIDE] += 1
                     else:
                         out.t_us[events] = now_us
                         out.x_px[events] = x
@@ -80,7 +69,7 @@ def decode_evt2(out: Decoded, heads: NDArray[np.uint32], masks: NDArray[np.uint3
             if not take_time_high(state, heads, i, HIGH_BITS, LOW_BITS, UNCHECKED_STEPS, final):
                 done = i
                 break
-            high_us, time_known = state[HIGH] << LOW_BITS, state[TIME_KNOWN] != 0
+            high_us, time_known = state[decoding.HIGH] << LOW_BITS, state[decoding.TIME_KNOWN] != 0
         elif kind == EXT_TRIGGER:
             if time_known:
                 out.trigger_t_us[triggers] = high_us | ((word >> 22) & LOW_MASK)
@@ -88,6 +77,6 @@ def decode_evt2(out: Decoded, heads: NDArray[np.uint32], masks: NDArray[np.uint3
                 out.trigger_id[triggers] = (word >> 8) & 0x1F
                 triggers += 1
         elif kind not in (OTHERS, CONTINUED):
-            state[BAD_WORDS] += 1
-    state[EVENTS], state[TRIGGERS] = events, triggers
+            state[decoding.BAD_WORDS] += 1
+    state[decoding.EVENTS], state[decoding.TRIGGERS] = events, triggers
     return done

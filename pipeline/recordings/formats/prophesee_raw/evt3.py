@@ -6,23 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from .decoding import (
-    BAD_WORDS,
-    COLUMN,
-    EVENTS,
-    HIGH,
-    LOW,
-    MAX_COORDINATE,
-    ON,
-    OUTSIDE,
-    ROW,
-    TIME_HIGH,
-    TIME_KNOWN,
-    TRIGGERS,
-    UNTIMED,
-    Decoded,
-    take_time_high,
-)
+from . import decoding
+from .decoding import MAX_COORDINATE, TIME_HIGH, Decoded, take_time_high
 
 ADDR_Y, ADDR_X, VECT_BASE_X, VECT_12, VECT_8, TIME_LOW = 0x0, 0x2, 0x3, 0x4, 0x5, 0x6
 CONTINUED_4, EXT_TRIGGER, OTHERS, CONTINUED_12 = 0x7, 0xA, 0xE, 0xF
@@ -54,9 +39,9 @@ def decode_evt3(out: Decoded, words: NDArray[np.uint16], final: bool) -> int:
     state = out.state
     last_start, trigger_room = t_us.size - MAX_EVENTS_PER_WORD, out.trigger_t_us.size
     events, triggers, done = 0, 0, words.size
-    row, column, polarity = state[ROW], state[COLUMN], state[ON] != 0
-    now_us = (state[HIGH] << TIME_BITS) | state[LOW]
-    time_known = state[TIME_KNOWN] != 0
+    row, column, polarity = state[decoding.ROW], state[decoding.COLUMN], state[decoding.ON] != 0
+    now_us = (state[decoding.HIGH] << TIME_BITS) | state[decoding.LOW]
+    time_known = state[decoding.TIME_KNOWN] != 0
     for i in range(words.size):
         if events > last_start or triggers >= trigger_room:
             done = i
@@ -71,20 +56,20 @@ def decode_evt3(out: Decoded, words: NDArray[np.uint16], final: bool) -> int:
                 on[events] = value >> 11 != 0
                 events += 1
             else:
-                state[UNTIMED] += 1
+                state[decoding.UNTIMED] += 1
         elif kind == ADDR_Y:
             row = value & 0x7FF
         elif kind == TIME_LOW:
-            state[LOW] = value
-            now_us = (state[HIGH] << TIME_BITS) | value
+            state[decoding.LOW] = value
+            now_us = (state[decoding.HIGH] << TIME_BITS) | value
         elif kind in (VECT_12, VECT_8):
             width = 12 if kind == VECT_12 else 8
             for bit in range(width):
                 if (value >> bit) & 1:
                     if not (time_known and row >= 0 and column >= 0):
-                        state[UNTIMED] += 1
+                        state[decoding.UNTIMED] += 1
                     elif column + bit > MAX_COORDINATE:
-                        state[OUTSIDE] += 1
+                        state[decoding.OUTSIDE] += 1
                     else:
                         t_us[events] = now_us
                         x_px[events] = column + bit
@@ -97,14 +82,14 @@ def decode_evt3(out: Decoded, words: NDArray[np.uint16], final: bool) -> int:
             column = value & 0x7FF
             polarity = value >> 11 != 0
         elif kind == TIME_HIGH:
-            before = state[HIGH]
+            before = state[decoding.HIGH]
             if not take_time_high(state, words, i, TIME_BITS, TIME_BITS, UNCHECKED_STEPS, final):
                 done = i
                 break
-            if state[HIGH] != before:
-                state[LOW] = 0  # the new TIME_LOW comes right after
-            now_us = (state[HIGH] << TIME_BITS) | state[LOW]
-            time_known = state[TIME_KNOWN] != 0
+            if state[decoding.HIGH] != before:
+                state[decoding.LOW] = 0  # the new TIME_LOW comes right after
+            now_us = (state[decoding.HIGH] << TIME_BITS) | state[decoding.LOW]
+            time_known = state[decoding.TIME_KNOWN] != 0
         elif kind == EXT_TRIGGER:
             if time_known:
                 out.trigger_t_us[triggers] = now_us
@@ -112,7 +97,7 @@ def decode_evt3(out: Decoded, words: NDArray[np.uint16], final: bool) -> int:
                 out.trigger_id[triggers] = value >> 8
                 triggers += 1
         elif kind not in (CONTINUED_4, CONTINUED_12, OTHERS):
-            state[BAD_WORDS] += 1
-    state[ROW], state[COLUMN], state[ON] = row, column, polarity
-    state[EVENTS], state[TRIGGERS] = events, triggers
+            state[decoding.BAD_WORDS] += 1
+    state[decoding.ROW], state[decoding.COLUMN], state[decoding.ON] = row, column, polarity
+    state[decoding.EVENTS], state[decoding.TRIGGERS] = events, triggers
     return done

@@ -21,7 +21,6 @@ TIME_MASK = (1 << evt3.TIME_BITS) - 1
 HIGH_STEP = 1 << (evt3.TIME_BITS - 2)  # TIME_HIGH runs ahead in quarter turns, which no decoder mistakes for steps back
 # Absolute times are counted up to from 0 in whole turns; later ones would need megabytes of time words.
 LIMIT_US = 1 << 40
-OWN_KEYS = ("format", "evt", "geometry", "width", "height", "end")
 
 
 class Encoded(NamedTuple):
@@ -56,10 +55,12 @@ def write_raw(path: Path, content: RecordingContent) -> None:
 
 
 def _header(content: RecordingContent) -> bytes:
-    lines = {key: value for key, value in content.attributes.items() if key not in OWN_KEYS}
-    lines["evt"] = "3.0"
-    lines["format"] = f"EVT3;height={content.height_px};width={content.width_px}"
-    lines["geometry"] = f"{content.width_px}x{content.height_px}"
+    lines = {
+        **content.attributes,
+        "evt": "3.0",
+        "format": f"EVT3;height={content.height_px};width={content.width_px}",
+        "geometry": f"{content.width_px}x{content.height_px}",
+    }
     text = "".join(f"% {key} {' '.join(str(value).split())}\n" for key, value in lines.items())
     return (text + "% end\n").encode()
 
