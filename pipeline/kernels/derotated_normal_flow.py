@@ -182,10 +182,9 @@ def derotated_constraints(
             count += 1
     events = events[:count].copy()
     rows = derotated_normals(lines[:count], 2 * common_us - t_us[events], common_us, spin_rad_s)
-    for i in range(count):
-        for axis in range(3):
-            speeds[i] += rows[i, axis] * spin_rad_s[axis]
-    return events, rows, speeds[:count].copy(), variances[:count].copy(), sizes[:count].copy()
+    wx, wy, wz = spin_rad_s
+    speeds = speeds[:count] + rows[:, 0] * wx + rows[:, 1] * wy + rows[:, 2] * wz
+    return events, rows, speeds, variances[:count].copy(), sizes[:count].copy()
 
 
 @numba.njit(cache=True, nogil=True)

@@ -64,22 +64,11 @@ def peak(votes: Pixels, radius0_px: int) -> tuple[float, int, int, int]:
     return best, best_a, best_b, best_k
 
 
-@njit(cache=True, nogil=True)
 def bright_pixels(image: Bytes, least: int, most_pixels: int) -> tuple[Integers, Integers]:
     """Columns and rows (m,) int64 of the pixels of at least this value, thinned evenly to most_pixels."""
-    count = int(np.count_nonzero(image >= least))
-    stride = max(1, -(-count // max(most_pixels, 1))) | 1  # odd: even ones would pick out whole columns
-    xs = np.empty(-(-count // stride), np.int64)
-    ys = np.empty(xs.size, np.int64)
-    seen = 0
-    for y in range(image.shape[0]):
-        for x in range(image.shape[1]):
-            if image[y, x] >= least:
-                if seen % stride == 0:
-                    xs[seen // stride] = x
-                    ys[seen // stride] = y
-                seen += 1
-    return xs, ys
+    rows, columns = np.nonzero(image >= least)
+    stride = max(1, -(-rows.size // max(most_pixels, 1))) | 1  # odd: even ones would pick out whole columns
+    return columns[::stride].copy(), rows[::stride].copy()
 
 
 @njit(cache=True, nogil=True)

@@ -72,12 +72,9 @@ def outline_like(
     Their places (n,) are relative to the ball's centre. Marked are those within 60 degrees of its velocity (or of the
     opposite) and at least least_radius_px from the centre.
     """
-    out = np.empty(x_px.size, np.bool_)
     vx, vy = velocity_px_s
-    quarter, least2 = 0.25 * (vx * vx + vy * vy), least_radius_px * least_radius_px
-    for i in range(x_px.size):
-        across2 = x_px[i] * x_px[i] + y_px[i] * y_px[i]
-        ahead = x_px[i] * vx + y_px[i] * vy
-        # ahead > speed * cos(60 degrees) * distance from the centre, without a root
-        out[i] = ((ahead > 0.0) == on[i]) & (ahead * ahead > quarter * across2) & (across2 > least2)
-    return out
+    across2, ahead = x_px * x_px + y_px * y_px, x_px * vx + y_px * vy
+    # ahead > speed * cos(60 degrees) * distance from the centre, without a root
+    near = ahead * ahead > 0.25 * (vx * vx + vy * vy) * across2
+    like: Flags = ((ahead > 0.0) == on) & near & (across2 > least_radius_px * least_radius_px)
+    return like

@@ -43,14 +43,11 @@ def near_outline(
 @njit(cache=True, nogil=True)
 def residuals(circle: Floats, ellipticity: Floats, tau_s: Floats, x_px: Floats, y_px: Floats) -> Floats:
     """Distances (n,) in px of events from the outline, > 0 outside."""
-    out = np.empty(tau_s.size, np.float64)
-    for i in range(tau_s.size):
-        dx = x_px[i] - (circle[0] + circle[2] * tau_s[i])
-        dy = y_px[i] - (circle[1] + circle[3] * tau_s[i])
-        square = dx * dx + dy * dy + 1e-18
-        bulge = (ellipticity[0] * (dx * dx - dy * dy) + ellipticity[1] * 2.0 * dx * dy) / square
-        out[i] = math.sqrt(square) - circle[4] * (1.0 + bulge)
-    return out
+    dx, dy = x_px - (circle[0] + circle[2] * tau_s), y_px - (circle[1] + circle[3] * tau_s)
+    square = dx * dx + dy * dy + 1e-18
+    bulge = (ellipticity[0] * (dx * dx - dy * dy) + ellipticity[1] * 2.0 * dx * dy) / square
+    distances: Floats = np.sqrt(square) - circle[4] * (1.0 + bulge)
+    return distances
 
 
 @njit(cache=True, nogil=True)

@@ -44,13 +44,8 @@ def low_passed(signal: Floats, cutoff_cycles: float) -> Floats:
 @numba.njit(cache=True, nogil=True)
 def falling_crossings(signal: Floats) -> Floats:
     """Places (m,), in samples, of the falls from above zero to zero or below; linear in between."""
-    places = np.empty(signal.size)
-    count = 0
-    for i in range(signal.size - 1):
-        if signal[i] > 0.0 >= signal[i + 1]:
-            places[count] = i + signal[i] / (signal[i] - signal[i + 1])
-            count += 1
-    return places[:count].copy()
+    last = np.flatnonzero((signal[:-1] > 0.0) & (signal[1:] <= 0.0))
+    return last + signal[last] / (signal[last] - signal[last + 1])
 
 
 @numba.njit(cache=True, nogil=True)

@@ -3,36 +3,19 @@
 Nothing else of this package is meant to be imported from outside.
 """
 
-from .formats.registry import (
-    FORMATS,
-    RecordingContent,
-    RecordingFormat,
-    format_to_write,
-    readable_suffixes,
-    writable_suffixes,
-)
-from .opening import open_recording
-from .reader import Damage, FormatReader, ReadPass, Triggers, UncheckedEvents
-from .recording import Recording
-from .summary import RecordingInfo, summary
-from .writing import convert, write_recording
-
-__all__ = [
-    "FORMATS",
-    "Damage",
-    "FormatReader",
-    "ReadPass",
-    "Recording",
-    "RecordingContent",
-    "RecordingFormat",
-    "RecordingInfo",
-    "Triggers",
-    "UncheckedEvents",
-    "convert",
-    "format_to_write",
-    "open_recording",
-    "readable_suffixes",
-    "summary",
-    "writable_suffixes",
-    "write_recording",
-]
+from .formats.registry import FORMATS as FORMATS
+from .formats.registry import RecordingContent as RecordingContent
+from .formats.registry import RecordingFormat as RecordingFormat
+from .formats.registry import format_to_write as format_to_write
+from .formats.registry import readable_suffixes as readable_suffixes
+from .formats.registry import writable_suffixes as writable_suffixes
+from .opening import open_recording as open_recording
+from .reader import FormatReader as FormatReader
+from .reader import ReadPass as ReadPass
+from .reader import Triggers as Triggers
+from .reader import UncheckedEvents as UncheckedEvents
+from .recording import Recording as Recording
+from .summary import RecordingInfo as RecordingInfo
+from .summary import summary as summary
+from .writing import convert as convert
+from .writing import write_recording as write_recording

@@ -21,12 +21,7 @@ NAMES = {
     "p": ("p", "polarity", "polarities", "pol", "on", "event_p"),
 }
 # As Spinscope writes them.
-COLUMN_TYPES: dict[str, np.dtype[Any]] = {
-    "t": np.dtype("<i8"),
-    "x": np.dtype("<u2"),
-    "y": np.dtype("<u2"),
-    "p": np.dtype("u1"),
-}
+COLUMN_TYPES = {name: np.dtype(code) for name, code in zip("txyp", ("<i8", "<u2", "<u2", "u1"), strict=True)}
 EXPANSION_LIMIT = 500  # events pack 3 to 50 times; only constant columns come near deflate's 1032
 EXPANSION_FREE_BYTES = 1 << 28
 LAST_US = 1 << 62  # leaves room to add and subtract
@@ -59,22 +54,13 @@ class ColumnTypes:
 
     Whole-number times are microseconds. Floating times are seconds if any of those looked at has a fraction, and
     microseconds otherwise; `warning` says which was assumed.
-
-    Parameters
-    ----------
-    path : Path
-        File that messages name.
-    t_type : dtype
-        Type of the times in the file.
-    sampled_times : (n,) array of t_type
-        Times looked at to tell seconds from microseconds.
     """
 
-    def __init__(self, path: Path, t_type: np.dtype[Any], sampled_times: NDArray[Any]) -> None:
+    def __init__(self, path: Path, sampled_times: NDArray[Any]) -> None:
         self.path = path
         self.warning: str | None = None
         self._seconds = False
-        if t_type.kind == "f":
+        if sampled_times.dtype.kind == "f":
             finite = sampled_times[np.isfinite(sampled_times)]
             self._seconds = bool(np.any(finite != np.floor(finite)))
             unit = "seconds (they have fractions)" if self._seconds else "microseconds (they are whole)"
@@ -108,9 +94,8 @@ class ColumnTypes:
 
     def _pixels(self, name: str, column: NDArray[Any], first_row: int) -> NDArray[Any]:
         if column.dtype.kind == "f":
-            self._check(
-                ~(np.abs(column) < 2**31) | (column != np.floor(column)), name, column, first_row, "is no whole pixel"
-            )
+            broken = ~(np.abs(column) < 2**31) | (column != np.floor(column))
+            self._check(broken, name, column, first_row, "is no whole pixel")
             column = column.astype(np.int64)
         if column.dtype.kind == "i" and column.size and column.min() < 0:
             self._check(column < 0, name, column, first_row, "is negative; pixels count from 0")

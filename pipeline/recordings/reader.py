@@ -80,11 +80,8 @@ class Triggers(_Columns):
 
     Attributes
     ----------
-    t_us : (n,) int64
-    value : (n,) uint8
-        1 for a rising edge, 0 for a falling one.
-    id : (n,) uint8
-        Number of the input.
+    value, id : (n,) uint8
+        1 for a rising edge, 0 for a falling one; number of the input.
     """
 
     t_us: NDArray[np.int64]
@@ -99,14 +96,7 @@ class Triggers(_Columns):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UncheckedEvents(_Columns):
-    """Events as they are in a file: not yet in order of time, perhaps outside the sensor.
-
-    Attributes
-    ----------
-    t_us : (n,) int64
-    x, y : (n,) integers
-    on : (n,) bool
-    """
+    """Events (n,) as they are in a file: not yet in order of time, perhaps outside the sensor."""
 
     t_us: NDArray[np.int64]
     x: NDArray[Any]
@@ -163,10 +153,8 @@ class FormatReader(ABC):
         Assumptions made on opening.
     stated : Resolution or None
         Size of the sensor where the file states it.
-    t_offset_us : int or None
-        DSEC's offset of the file's time.
-    events : int or None
-        Number of events when the file tells without a pass.
+    t_offset_us, events : int or None
+        DSEC's offset of the file's time; number of events when the file tells without a pass.
     """
 
     format: str

@@ -14,7 +14,7 @@ from ..events import EventBatch
 from ..results import Truth
 from .order import TimeOrder
 from .reader import CHUNK_EVENTS, Damage, FormatReader, Progress, ReadPass, Triggers, UncheckedEvents
-from .sensor import Resolution, guessed_resolution, smallest_known
+from .sensor import KNOWN_SENSORS, Resolution, smallest_known
 
 HASH_ALL_BYTES = 64 << 20
 HASH_BLOCK_BYTES = 1 << 20
@@ -167,14 +167,19 @@ class Recording:
             return self._asked
         if self._reader.stated is not None:
             return self._reader.stated
-        extent = self._extent_px(on_progress)
-        sensor = guessed_resolution(*extent)
+        columns_px, rows_px = self._extent_px(on_progress)
+        size = smallest_known(columns_px, rows_px)
+        if size is None:
+            largest = KNOWN_SENSORS[-1]
+            raise RecordingError(
+                f"the events reach over {columns_px} x {rows_px} pixels, more than the largest known sensor "
+                f"({largest[0]} x {largest[1]}): state it with --sensor WxH"
+            )
         self._sensor_warnings.append(
-            f"the file does not state its sensor: taken as {sensor.width_px} x {sensor.height_px}, the "
-            f"smallest known one that holds the events (they reach over {extent[0]} x {extent[1]} pixels); "
-            "--sensor WxH states it"
+            f"the file does not state its sensor: taken as {size[0]} x {size[1]}, the smallest known one that holds "
+            f"the events (they reach over {columns_px} x {rows_px} pixels); --sensor WxH states it"
         )
-        return sensor
+        return Resolution(*size, "guess")
 
     def _extent_px(self, on_progress: Progress | None) -> tuple[int, int]:
         """One more than the largest x and y of all events, (0, 0) without events; a pass over the file."""

@@ -56,15 +56,3 @@ def smallest_known(columns_px: int, rows_px: int) -> tuple[int, int] | None:
     """Width and height of the smallest known sensor with these columns and rows, None if there is none."""
     fitting = [s for s in KNOWN_SENSORS if columns_px <= s[0] and rows_px <= s[1]]
     return min(fitting, key=lambda s: s[0] * s[1]) if fitting else None
-
-
-def guessed_resolution(columns_px: int, rows_px: int) -> Resolution:
-    """Resolution of the smallest known sensor with these columns and rows; raises RecordingError without one."""
-    size = smallest_known(columns_px, rows_px)
-    if size is None:
-        largest = KNOWN_SENSORS[-1]
-        raise RecordingError(
-            f"the events reach over {columns_px} x {rows_px} pixels, more than the largest known sensor "
-            f"({largest[0]} x {largest[1]}): state it with --sensor WxH"
-        )
-    return Resolution(*size, "guess")

@@ -78,12 +78,9 @@ def summary(recording: Recording, on_progress: Progress | None = None) -> Record
     duration_us = 0 if first_us is None or last_us is None else last_us - first_us
     hot_pixels, hot_events = statistics.hot()
     events = statistics.events
+    stated = ("path", "format", "width_px", "height_px", "sensor_from", "t_offset_us", "attributes", "warnings")
     return RecordingInfo(
-        path=recording.path,
-        format=recording.format,
-        width_px=recording.width_px,
-        height_px=recording.height_px,
-        sensor_from=recording.sensor_from,
+        **{name: getattr(recording, name) for name in stated},
         events=events,
         first_us=first_us,
         last_us=last_us,
@@ -95,9 +92,6 @@ def summary(recording: Recording, on_progress: Progress | None = None) -> Record
         hot_share=hot_events / events if events else 0.0,
         triggers=len(recording.triggers),
         damage=asdict(recording.damage),
-        t_offset_us=recording.t_offset_us,
-        attributes=recording.attributes,
-        warnings=recording.warnings,
     )
 
 
@@ -121,7 +115,9 @@ class _EventStatistics:
         self.on += int(np.count_nonzero(batch.on))
         pixels = batch.y_px.astype(np.intp) * self._width_px + batch.x_px
         self._counts += np.bincount(pixels, minlength=self._counts.size).reshape(self._counts.shape)
-        bins, counts = _runs(batch.t_us // PEAK_BIN_US)
+        bins = batch.t_us // PEAK_BIN_US
+        starts = np.flatnonzero(np.diff(bins, prepend=bins[0] - 1))
+        counts = np.diff(starts, append=bins.size)
         if self._bin == bins[0]:
             counts[0] += self._bin_events
         self.peak_events = max(self.peak_events, int(counts.max()))
@@ -136,9 +132,3 @@ class _EventStatistics:
         events = self._counts[rows, columns]
         hot = events > HOT_RATIO * neighbour
         return int(np.count_nonzero(hot)), int(events[hot].sum())
-
-
-def _runs(rising: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Run-length encoding of a rising column: values and counts."""
-    starts = np.flatnonzero(np.concatenate([[True], rising[1:] != rising[:-1]]))
-    return rising[starts], np.diff(np.append(starts, rising.size))

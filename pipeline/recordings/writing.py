@@ -20,8 +20,6 @@ from .sensor import MAX_SIZE_PX
 
 # Attributes about the encoding of a file, which every format states itself.
 ENCODING_KEYS = ("format", "evt", "geometry", "width", "height", "end")
-# Raised by h5py and zipfile when the disk is full or the place is no good, besides OSError.
-WRITE_ERRORS = (RuntimeError, ValueError, MemoryError)
 
 
 def write_recording(
@@ -147,7 +145,7 @@ def _write(content: RecordingContent) -> None:
     with atomic_file(path, "recording") as part:
         try:
             format.write(part, replace(content, batches=_checked(content), attributes=attributes))
-        except WRITE_ERRORS as error:
+        except (RuntimeError, ValueError, MemoryError) as error:  # of h5py and zipfile, as when the disk is full
             raise OSError(" ".join(str(error).split())) from error
 
 

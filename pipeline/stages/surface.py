@@ -99,7 +99,7 @@ class LastEventSurface:
     def update(self, packet: Packet, events: EventBatch) -> NDArray[np.uint8]:
         """Remember the tick's events and return the (height, width) uint8 surface at its end."""
         values = np.zeros(self._last_us.shape, np.uint8)
-        surfaces.update_last_times(self._last_us, events.t_us, events.x_px, events.y_px)
+        self._last_us[events.y_px, events.x_px] = events.t_us  # of a pixel's events the last one stays
         surfaces.render(values, self._last_us, packet.end_us, self._span_us, self._is_linear)
         return values
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...errors import RecordingError
 from ..column_types import COLUMN_TYPES, ColumnTypes, check_expansion, check_types, columns_of, named_columns
 from ..reader import FormatReader, ReadPass, UncheckedEvents, file_errors
-from ..sensor import Resolution, resolution_or_none
+from ..sensor import resolution_or_none
 from .registry import FORMATS, RecordingContent, RecordingFormat
 
 SAMPLED_ROWS = 1 << 16  # times looked at to tell seconds from microseconds
@@ -33,7 +33,8 @@ class NpzReader(FormatReader):
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         with file_errors(path, "NPZ"), zipfile.ZipFile(path) as archive:
-            arrays = {name: NpzArray(archive, name, path) for name in _array_names(archive)}
+            names = [name.removesuffix(".npy") for name in archive.namelist() if name.endswith(".npy")]
+            arrays = {name: NpzArray(archive, name, path) for name in names}
             self._members, self._fields = _chosen(arrays, path)
             used = [arrays[member] for member in dict.fromkeys(self._members.values())]
             if len({array.shape for array in used}) > 1 or any(len(array.shape) != 1 for array in used):
@@ -47,27 +48,24 @@ class NpzReader(FormatReader):
             if self._fields:
                 types = {c: types[c][name] for c, name in self._fields.items()}
             check_types(path, types)
-            self.stated = _stated_sensor(archive, arrays, self.warnings)
-            self.t_offset_us = _scalar(archive, arrays, "t_offset")
-            with NpzColumns(archive, self._members, self._fields) as reader:
-                first_times = reader.next_rows(min(used[0].shape[0], SAMPLED_ROWS))[0]
-        self._types = ColumnTypes(path, types["t"], first_times)
+            width, height, self.t_offset_us = (_scalar(archive, arrays, n) for n in ("width", "height", "t_offset"))
+            if width is not None and height is not None:
+                self.stated = resolution_or_none(width, height, self.warnings)
+            blocks = _blocks(archive, self._members, self._fields, self.events, SAMPLED_ROWS)
+            first_times = next(blocks, (np.empty(0, types["t"]),))[0]
+        self._types = ColumnTypes(path, first_times)
         if self._types.warning:
             self.warnings.append(self._types.warning)
 
     def columns(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
         """Yield the events; packed columns can only be read from their start."""
-        rows = self.events or 0
-        with (
-            file_errors(self.path, "NPZ"),
-            zipfile.ZipFile(self.path) as archive,
-            NpzColumns(archive, self._members, self._fields) as reader,
-        ):
-            for row in range(0, rows, reading.max_events):
-                upto = min(row + reading.max_events, rows)
-                block = self._types.columns(row, *reader.next_rows(upto - row))
+        rows, row = self.events or 0, 0
+        with file_errors(self.path, "NPZ"), zipfile.ZipFile(self.path) as archive:
+            for columns in _blocks(archive, self._members, self._fields, rows, reading.max_events):
+                block = self._types.columns(row, *columns)
                 yield block
-                reading.report(upto, rows)
+                row += len(block)
+                reading.report(row, rows)
                 if reading.is_past(int(block.t_us[-1])):
                     return
 
@@ -78,7 +76,7 @@ class NpzArray:
     def __init__(self, archive: zipfile.ZipFile, name: str, path: Path) -> None:
         info = archive.getinfo(f"{name}.npy")
         with archive.open(info) as file:
-            self.shape, _, self.dtype = _npy_header(file)
+            self.shape, self.dtype = _npy_header(file)
             self._header_bytes = file.tell()
         self.name, self.packed_bytes, self._stored_bytes = name, info.compress_size, info.file_size
         if self.dtype.hasobject:
@@ -97,43 +95,26 @@ class NpzArray:
             )
 
 
-class NpzColumns:
-    """Stream of t, x, y and p, each read from its own place in the archive."""
-
-    def __init__(self, archive: zipfile.ZipFile, members: dict[str, str], fields: dict[str, str]) -> None:
-        self._archive, self._members, self._fields = archive, members, fields
-        self._open = ExitStack()
-        self._files: dict[str, tuple[IO[bytes], np.dtype[Any]]] = {}
-
-    def __enter__(self) -> NpzColumns:
-        for member in dict.fromkeys(self._members.values()):
-            file = self._open.enter_context(self._archive.open(f"{member}.npy"))
-            self._files[member] = (file, _npy_header(file)[2])
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._open.close()
-
-    def next_rows(self, count: int) -> tuple[NDArray[Any], ...]:
-        """Read t, x, y and p of the next rows."""
-        blocks = {
-            member: np.frombuffer(file.read(count * dtype.itemsize), dtype, count)
-            for member, (file, dtype) in self._files.items()
-        }
-        if self._fields:
-            return tuple(np.ascontiguousarray(blocks[self._members[c]][self._fields[c]]) for c in "txyp")
-        return tuple(blocks[self._members[c]] for c in "txyp")
+def _blocks(
+    archive: zipfile.ZipFile, members: dict[str, str], fields: dict[str, str], rows: int, most: int
+) -> Iterator[tuple[NDArray[Any], ...]]:
+    """Yield t, x, y and p in blocks of `most` rows or fewer, each array read from its own place in the archive."""
+    with ExitStack() as stack:
+        files = {name: stack.enter_context(archive.open(f"{name}.npy")) for name in set(members.values())}
+        types = {name: _npy_header(file)[1] for name, file in files.items()}
+        for row in range(0, rows, most):
+            count = min(most, rows - row)
+            blocks = {n: np.frombuffer(f.read(count * types[n].itemsize), types[n], count) for n, f in files.items()}
+            if fields:
+                yield tuple(np.ascontiguousarray(blocks[members[c]][fields[c]]) for c in "txyp")
+            else:
+                yield tuple(blocks[members[c]] for c in "txyp")
 
 
-def _array_names(archive: zipfile.ZipFile) -> list[str]:
-    return [name.removesuffix(".npy") for name in archive.namelist() if name.endswith(".npy")]
-
-
-def _npy_header(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
-    version = npy.read_magic(file)
-    read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-    shape, fortran, dtype = read(file)
-    return shape, fortran, dtype
+def _npy_header(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    read = npy.read_array_header_1_0 if npy.read_magic(file) == (1, 0) else npy.read_array_header_2_0
+    shape, _, dtype = read(file)
+    return shape, dtype
 
 
 def _chosen(arrays: dict[str, NpzArray], path: Path) -> tuple[dict[str, str], dict[str, str]]:
@@ -149,17 +130,12 @@ def _chosen(arrays: dict[str, NpzArray], path: Path) -> tuple[dict[str, str], di
     raise RecordingError(f"NPZ file holds no events (it has {present}): arrays t, x, y, p are needed: {path}")
 
 
-def _stated_sensor(archive: zipfile.ZipFile, arrays: dict[str, NpzArray], warnings: list[str]) -> Resolution | None:
-    width, height = (_scalar(archive, arrays, name) for name in ("width", "height"))
-    return None if width is None or height is None else resolution_or_none(width, height, warnings)
-
-
 def _scalar(archive: zipfile.ZipFile, arrays: dict[str, NpzArray], name: str) -> int | None:
     array = arrays.get(name)
     if array is None or array.dtype.kind not in "iu" or array.unpacked_bytes != array.dtype.itemsize:
         return None
     with archive.open(f"{name}.npy") as file:
-        dtype = _npy_header(file)[2]
+        dtype = _npy_header(file)[1]
         return int(np.frombuffer(file.read(dtype.itemsize), dtype, 1)[0])
 
 

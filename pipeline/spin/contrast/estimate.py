@@ -55,6 +55,14 @@ REFINED = 0.65
 MAP_MAGNITUDES, MAP_DIRECTIONS = 41, 100
 
 
+class Stretch(NamedTuple):
+    """Number of events in a stretch of time, its middle and its length."""
+
+    events: int
+    reference_s: float
+    span_s: float
+
+
 def estimate_spin(
     events: SphereEvents,
     ball: BallUncertainty,
@@ -70,10 +78,6 @@ def estimate_spin(
     ----------
     events : SphereEvents
         The logo's events of one stretch of time.
-    ball : BallUncertainty
-        How well the ball's place is known.
-    settings : ContrastSettings
-        Numbers of the method.
     starts_rps : (k, 3) float64, optional
         Spins to try first.
     searching : bool
@@ -88,20 +92,19 @@ def estimate_spin(
     """
     if len(events) < settings.min_events:
         return ContrastEstimate(None, None, len(events))
-    events, reference_s, span_s = _centred(events)
-    moving = _without_static_events(events, span_s, settings)
+    events, stretch = _centred(events)
+    moving = _without_static_events(events, stretch.span_s, settings)
     spins = np.empty((0, 3)) if starts_rps is None else np.asarray(starts_rps, np.float64).reshape(-1, 3) * TURN
     searching = searching or not len(spins)
     if searching:
         found = grid_search(moving.columns, settings.fastest_rps, settings.floor, settings.search_events, 6)
         spins = maximise_over_growing_segments(moving, np.concatenate([spins, found]), settings)
-    seen_again = span_s * float(np.linalg.norm(spins[0])) > SCAN_FROM_TURNS * TURN
+    seen_again = stretch.span_s * float(np.linalg.norm(spins[0])) > SCAN_FROM_TURNS * TURN
     if scanning and (not searching or seen_again):
         spins = alias_scan(moving, spins, settings)
     spins, margins = _ranked(events, spins, settings)
     some = _off_rim(events, settings).thinned(settings.refine_events)
     spins[0], _, _, _ = maximise(_objective(some, settings, settings.sigma_rad), spins[0], NO_OFFSETS, 1)
-    stretch = (len(events), reference_s, span_s)
     return _refined(some, spins, margins, ball, settings, stretch, np.zeros(3), 4)
 
 
@@ -110,18 +113,17 @@ def follow_spin(
 ) -> ContrastEstimate:
     """Refine an estimate on an earlier, somewhat shorter stretch with a part of these events; its rivals stay."""
     assert before.spin_rps is not None
-    events, reference_s, span_s = _centred(events)
+    events, stretch = _centred(events)
     some = _off_rim(events, settings).thinned(settings.follow_events)
     spins = np.concatenate([before.spin_rps[None], before.rivals_rps]) * TURN
     margins = np.concatenate([[0.0], before.margins])
-    stretch = (len(events), reference_s, span_s)
     return _refined(some, spins, margins, ball, settings, stretch, before.offsets_px, 1)
 
 
-def _centred(events: SphereEvents) -> tuple[SphereEvents, float, float]:
-    """The events with times from the middle of the stretch; that middle, and the stretch's length, in s."""
-    reference_s = 0.5 * float(events.t_s[0] + events.t_s[-1])
-    return replace(events, t_s=events.t_s - reference_s), reference_s, float(events.t_s[-1] - events.t_s[0])
+def _centred(events: SphereEvents) -> tuple[SphereEvents, Stretch]:
+    """The events with times from the middle of their stretch."""
+    stretch = Stretch(len(events), 0.5 * float(events.t_s[0] + events.t_s[-1]), float(events.t_s[-1] - events.t_s[0]))
+    return replace(events, t_s=events.t_s - stretch.reference_s), stretch
 
 
 def _off_rim(events: SphereEvents, settings: ContrastSettings) -> SphereEvents:
@@ -232,20 +234,19 @@ def _refined(
     margins: Floats,
     ball: BallUncertainty,
     settings: ContrastSettings,
-    stretch: tuple[int, float, float],
+    stretch: Stretch,
     offsets_px: Floats,
     iterations: int,
 ) -> ContrastEstimate:
-    """The estimate around spins_rad_s[0], with the ball's offsets; `events` are thinned from stretch[0]."""
-    given, reference_s, span_s = stretch
+    """The estimate around spins_rad_s[0], with the ball's offsets; `events` are thinned from those of the stretch."""
     objective = _objective(events, settings, FINE * settings.sigma_rad)._replace(
         slopes=offset_slopes(events.normals, events.facing, events.radius_px),
         prior_px=np.array([ball.centre_std_px, ball.centre_std_px, ball.radius_std_px]),
         weight=settings.score_weight,
     )
     spin, offsets, sharp, model = maximise(objective, spins_rad_s[0], offsets_px, iterations)
-    covariance = _spin_covariance(objective, model, settings.repeats * len(events) / given)
-    covariance += _drift_covariance(events, ball, span_s)
+    covariance = _spin_covariance(objective, model, settings.repeats * len(events) / stretch.events)
+    covariance += _drift_covariance(events, ball, stretch.span_s)
     along = np.outer(spin, spin) / (spin @ spin)
     oblique = max(1.0, RIM_COSINE / max(float(_view_cosine(events).mean()), RIM_COSINE / MOST_OBLIQUE))
     covariance += (AXIS_FLOOR * settings.sigma_rad * oblique) ** 2 * (spin @ spin) * (np.eye(3) - along)
@@ -254,21 +255,15 @@ def _refined(
     shuffled = window.events._replace(t_s=np.random.default_rng(0).permutation(events.t_s))
     chance = objective._replace(window=window._replace(events=shuffled))
     by_chance = scores_near(np.empty((1, len(events))), chance, spin, offsets, np.zeros((1, 6)))
-    gaps = spins_rad_s[1:] - spins_rad_s[0]
+    contrast = (sharp - float(by_chance[0])) / len(events)
+    rivals, margins = spins_rad_s[1:], margins[1:]
+    gaps = rivals - spins_rad_s[0]
     near = np.linalg.norm(gaps, axis=1) < NEAR * np.linalg.norm(spins_rad_s[0])
-    for gap, margin in zip(gaps[near], margins[1:][near], strict=True):
+    for gap, margin in zip(gaps[near], margins[near], strict=True):
         covariance += np.outer(gap, gap) / (1.0 + math.exp(min(float(margin), 50.0)))
+    spin_rps, rivals_rps = spin / TURN, rivals[~near] / TURN
     return ContrastEstimate(
-        spin / TURN,
-        covariance / TURN**2,
-        given,
-        reference_s,
-        span_s,
-        spins_rad_s[1:][~near] / TURN,
-        margins[1:][~near],
-        offsets,
-        (sharp - float(by_chance[0])) / len(events),
-        events.patch_rad,
+        spin_rps, covariance / TURN**2, *stretch, rivals_rps, margins[~near], offsets, contrast, events.patch_rad
     )
 
 

@@ -20,15 +20,11 @@ class ContrastSettings:
 
     Attributes
     ----------
-    fastest_rps : float
-        Highest spin looked for.
     sigma_rad : float
         Kernel of the refinement; 1.5 and 2 times that for what leads up to it. A pixel of a 17 px ball is 0.06 rad;
         pixels report within about 0.1 ms, 0.03 rad at 50 rps.
     floor : float
         Density in coinciding events, see `score`.
-    min_events : int
-        Logo events needed.
     refine_events, search_events, scan_events, follow_events : int
         Events looked at by the refinement, the grid search, the alias scan and `follow_spin`.
     score_weight : float
@@ -54,12 +50,8 @@ class EventColumns(NamedTuple):
 
     Attributes
     ----------
-    t_s : (n,) float64
-        Time from the reference, rising within a segment.
-    normals : (3, n) float64
-        Outward unit normals where the events are on the ball.
-    polarity : (n,) int64
-        0 OFF, 1 ON.
+    t_s, normals, polarity
+        As of `SphereEvents`; rising within a segment, from the reference time on.
     starts : (k + 1,) int64
         Index of each segment's first event, and n.
     """

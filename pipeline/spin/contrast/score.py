@@ -122,25 +122,16 @@ def _splat(
 
 @numba.njit(cache=True, nogil=True)
 def score(log_ratios: Floats, spin_rad_s: Floats, window: ScoreWindow, cell_rad: float, floor: float) -> float:
-    """Score of one spin (3,); each event's log((I + floor) / (B + floor)) is written into `log_ratios` (n,).
+    """Score of one spin; each event's log((I + floor) / (B + floor)) is written into `log_ratios` (n,).
 
     Parameters
     ----------
-    log_ratios : (n,) float64
-        Output.
-    spin_rad_s : (3,) float64
-        Angular velocity.
     window : ScoreWindow
         The events draw I; the same at permuted times draw B. Each segment has a map of its own.
     cell_rad : float
         Width of the map's cells, radians near its middle.
     floor : float
         Density in units of coinciding events that is added to both, against ratios of small numbers.
-
-    Returns
-    -------
-    float
-        Sum of the log ratios.
     """
     events, permuted = window.events, window.permuted
     size = int(4.0 / cell_rad) + 5
@@ -199,14 +190,10 @@ def burst_mask(events: SphereEvents) -> Flags:
     t_s, normals, polarity, _ = events.columns
     starts = segment_starts(t_s, BURST_S)
     rows = np.arange(0, t_s.size, max(1, t_s.size // USUAL_EVENTS))
-    count = starts.size - 1
-    usual = EventColumns(
-        np.zeros(count * rows.size),
-        np.tile(normals[:, rows], count),
-        np.tile(polarity[rows], count),
-        np.arange(count + 1) * rows.size,
-    )
-    window = ScoreWindow(EventColumns(t_s, normals, polarity, starts), usual, np.tile(rows, count))
+    every = np.tile(rows, starts.size - 1)
+    everywhere = np.ascontiguousarray(normals[:, every])
+    usual = EventColumns(np.zeros(every.size), everywhere, polarity[every], np.arange(starts.size) * rows.size)
+    window = ScoreWindow(EventColumns(t_s, normals, polarity, starts), usual, every)
     log_ratios = np.empty(t_s.size)
     score(log_ratios, np.zeros(3), window, BURST_SIGMA_RAD * CELLS_PER_SIGMA, BURST_FLOOR)
     return log_ratios > BURST_LOG_RATIO
@@ -221,8 +208,6 @@ class Objective(NamedTuple):
         Events of one segment.
     slopes : (3, 3, n) float64
         `offset_slopes` of these events; (3, 3, 0) where no offsets are looked at.
-    sigma_rad, floor : float
-        Kernel, and density floor.
     prior_px : (0,) or (3,) float64
         1 sigma of the offsets of centre x, y and radius.
     weight : float

@@ -164,8 +164,8 @@ class LocalModel(NamedTuple):
     ----------
     spin_rad_s : (3,) float64
         Where the differences were taken.
-    steps, value, gradient, curvature : (c,), float, (c,), (c, c)
-        Differences' steps, score and its derivatives (the curvature is positive at a maximum).
+    value, gradient, curvature : float, (c,), (c, c)
+        Score and its derivatives (the curvature is positive at a maximum).
     scatter : (c, c) float64
         Sum of d_i d_i' with d_i the slope of an event's own share.
     """
@@ -186,11 +186,10 @@ def local_model(objective: Objective, spin_rad_s: Floats, offsets_px: Floats, sc
     Hall and Hausman, 1974): the correlations are taken from there, the sizes from second differences, kept within a
     factor CURVATURE_TRUST of their median, since differences over a sharp maximum can go wrong, even negative.
     """
-    steps = difference_steps(objective, spin_rad_s)
+    steps = scale * difference_steps(objective, spin_rad_s)
     count, n = steps.size, objective.window.events.t_s.size
     changes = np.zeros((2 * count + 1, count))
     for k in range(count):
-        steps[k] *= scale
         changes[1 + k, k], changes[1 + count + k, k] = steps[k], -steps[k]
     shares = np.empty((2 * count + 1, n))
     values = scores_near(shares, objective, spin_rad_s, offsets_px, changes)
@@ -242,13 +241,11 @@ def cholesky_solve(matrix: Floats, right: Floats) -> Floats:
 def _newton_step(objective: Objective, model: LocalModel, offsets_px: Floats) -> Floats:
     """Change (c,), in units of the steps, to the maximum of the model of weighted score less the prior's cost."""
     curvature, gradient = objective.weight * model.curvature, objective.weight * model.gradient
-    largest = 0.0
     for k in range(offsets_px.size):
         precision = (model.steps[3 + k] / objective.prior_px[k]) ** 2
         curvature[3 + k, 3 + k] += precision
         gradient[3 + k] -= precision * offsets_px[k] / model.steps[3 + k]
-    for k in range(gradient.size):
-        largest = max(largest, curvature[k, k])
+    largest = max(np.diag(curvature).max(), 0.0)
     for k in range(gradient.size):
         curvature[k, k] += 0.02 * largest + 1e-12
     return cholesky_solve(curvature, gradient)
@@ -272,14 +269,10 @@ def maximise(
             if scale == 1.0:
                 usual = model
         change = _newton_step(objective, model, offsets_px)
-        square = 0.0
-        for k in range(change.size):
-            square += change[k] ** 2
-        length = math.sqrt(square)
+        length = math.sqrt(np.sum(change**2))
         whole = min(1.0, 2.0 / max(length, 1e-12))  # the model is not to be believed farther than a kernel
         changes, gains = np.empty((2, change.size)), np.empty(2)
-        for k in range(change.size):
-            changes[0, k], changes[1, k] = whole * change[k] * model.steps[k], 0.5 * whole * change[k] * model.steps[k]
+        changes[0], changes[1] = whole * change * model.steps, 0.5 * whole * change * model.steps
         values = scores_near(shares, objective, spin_rad_s, offsets_px, changes)
         for m in range(2):
             gains[m] = objective.weight * (values[m] - model.value)

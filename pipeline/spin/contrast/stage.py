@@ -80,8 +80,6 @@ class ContrastResult(ReadOnlyArrays):
 
     Attributes
     ----------
-    estimate : SpinEstimate
-        The spin, or the reason for refusing.
     best_rps : (3,) float64
         The best spin, also of a refused answer; NaN without one.
     rivals_rps : (k, 3) float64
@@ -100,8 +98,8 @@ class ContrastResult(ReadOnlyArrays):
         Whether this tick made a full estimate, or followed the last one.
     magnitudes_rps, magnitude_scores : (m,) float64
         The score an event along the best axis, at the last full estimate.
-    directions, direction_scores : (d, 3)
-        And (d,) float64, the same over all axes at the best magnitude.
+    directions, direction_scores : (d, 3) and (d,) float64
+        The same over all axes at the best magnitude.
     """
 
     estimate: SpinEstimate
@@ -212,14 +210,8 @@ def _take(
 
 
 def _joined(state: ContrastState) -> SphereEvents:
-    parts = [part for _, part in state.parts]
-    return SphereEvents(
-        np.concatenate([part.t_s for part in parts]),
-        np.concatenate([part.normals for part in parts], axis=1),
-        np.concatenate([part.polarity for part in parts]),
-        np.concatenate([part.facing for part in parts], axis=1),
-        np.concatenate([part.radius_px for part in parts]),
-    )
+    names = SphereEvents.__slots__
+    return SphereEvents(*(np.concatenate([getattr(p, name) for _, p in state.parts], axis=-1) for name in names))
 
 
 def _uncertainty(state: ContrastState) -> BallUncertainty:
@@ -256,16 +248,15 @@ def _estimate(
         starts += [state.answer.spin_rps, *state.answer.rivals_rps]
     if normal_flow_rps is not None and np.any(normal_flow_rps):
         starts.append(normal_flow_rps)
+    starts_rps, ball = np.array(starts).reshape(-1, 3), _uncertainty(state)
     answer = None
     if starts:
         scanning = not _settled(parameters, state)
-        answer = estimate_spin(
-            events, _uncertainty(state), settings, starts_rps=np.array(starts), searching=False, scanning=scanning
-        )
+        answer = estimate_spin(events, ball, settings, starts_rps=starts_rps, searching=False, scanning=scanning)
     worth_it = len(events) >= SEARCH_MORE * state.searched
     if answer is None or (worth_it and _doubt(parameters, answer) is not None):
         state.searched = len(events)
-        answer = estimate_spin(events, _uncertainty(state), settings, starts_rps=np.array(starts) if starts else None)
+        answer = estimate_spin(events, ball, settings, starts_rps=starts_rps)
     state.answer, state.reason = answer, _doubt(parameters, answer)
 
 
@@ -326,7 +317,8 @@ def _result(
     answer = state.answer
     if answer is None or answer.spin_rps is None or answer.covariance_rps2 is None:
         return _nothing(SpinEstimate.refused(METHOD, state.reason or "no estimate yet", count))
-    estimate = SpinEstimate(METHOD, answer.spin_rps.copy(), answer.covariance_rps2.copy(), None, count)
+    best_rps = answer.spin_rps.copy()
+    estimate = SpinEstimate(METHOD, best_rps, answer.covariance_rps2.copy(), None, count)
     if state.reason is not None:
         # Where nothing turns, the normal flow has seen no pattern either, but noise.
         against = FLOW_METHOD if answer.contrast < parameters.min_gain else None
@@ -334,28 +326,19 @@ def _result(
     elif (sigmas := _apart(estimate, flow)) > parameters.flow_sigmas:
         reason = f"the normal flow says {_words(flow.vector_rps)}, {sigmas:.0f} sigma from {_words(answer.spin_rps)}"
         estimate = SpinEstimate.refused(METHOD, reason, count, against=FLOW_METHOD)
-    half_us = 0.5e6 * answer.span_s
+    rivals_rps, margins, offsets_px = answer.rivals_rps.copy(), answer.margins.copy(), answer.offsets_px.copy()
+    curves = (column.copy() for column in state.score_map)
+    middle_us, half_us = answer.reference_s * 1e6, 0.5e6 * answer.span_s
+    stretch_us = round(middle_us - half_us), round(middle_us + half_us), middle_us
     return ContrastResult(
-        estimate,
-        answer.spin_rps.copy(),
-        answer.rivals_rps.copy(),
-        answer.margins.copy(),
-        round(answer.reference_s * 1e6 - half_us),
-        round(answer.reference_s * 1e6 + half_us),
-        answer.reference_s * 1e6,
-        answer.offsets_px.copy(),
-        answer.contrast,
-        full,
-        *(column.copy() for column in state.score_map),
+        estimate, best_rps, rivals_rps, margins, *stretch_us, offsets_px, answer.contrast, full, *curves
     )
 
 
 def _nothing(estimate: SpinEstimate) -> ContrastResult:
     """Nothing to see of a shot."""
-    curves = (column.copy() for column in ScoreMap.empty())
-    none, no_spins = np.empty(0), np.empty((0, 3))
-    unknown = np.full(3, np.nan)
-    return ContrastResult(estimate, unknown, no_spins, none, 0, 0, math.nan, np.zeros(3), 0.0, False, *curves)
+    unknown, no_spins, none = np.full(3, np.nan), np.empty((0, 3)), np.empty(0)
+    return ContrastResult(estimate, unknown, no_spins, none, 0, 0, math.nan, np.zeros(3), 0.0, False, *ScoreMap.empty())
 
 
 def is_trusted(estimates: Mapping[str, SpinEstimate]) -> bool:

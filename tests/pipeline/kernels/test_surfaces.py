@@ -28,7 +28,7 @@ def test_every_tick_equals_the_twin(
     last_us = np.full((4, 6), surfaces.NEVER_US)
     for end_us in range(start_us + tick_us, start_us + 5 * tick_us + 1, tick_us):
         now = (t >= end_us - tick_us) & (t < end_us)
-        surfaces.update_last_times(last_us, t[now], x[now], y[now])
+        last_us[y[now], x[now]] = t[now]
         values = np.zeros((4, 6), np.uint8)
         surfaces.render(values, last_us, end_us, span_us, linear)
         expected = recent_events(t.tolist(), x.tolist(), y.tolist(), (4, 6), end_us, span_us, linear)

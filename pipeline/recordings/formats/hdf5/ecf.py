@@ -68,9 +68,7 @@ class EcfRows:
 
 
 def _empty_block(events: int) -> EcfBlock:
-    return EcfBlock(
-        np.empty(events, np.int64), np.empty(events, np.uint16), np.empty(events, np.uint16), np.empty(events, np.uint8)
-    )
+    return EcfBlock._make(np.empty(events, dtype) for dtype in (np.int64, np.uint16, np.uint16, np.uint8))
 
 
 @njit(cache=True, nogil=True)

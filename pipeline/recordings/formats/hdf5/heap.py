@@ -7,6 +7,7 @@ by their sizes; a free space of size 0 does not end.
 
 from __future__ import annotations
 
+import re
 import struct
 from pathlib import Path
 
@@ -24,13 +25,10 @@ def check_heap(path: Path) -> None:
         for start in dict.fromkeys((0, max(0, size - SEARCHED_BYTES))):
             file.seek(start)
             data = file.read(SEARCHED_BYTES)
-            at = data.find(SIGNATURE)
-            while at >= 0:
-                if not terminates(data[at:]):
-                    raise RecordingError(
-                        f"HDF5 file is damaged (a heap of texts without end): copy or export it again: {path}"
-                    )
-                at = data.find(SIGNATURE, at + 1)
+            if not all(terminates(data[found.start() :]) for found in re.finditer(SIGNATURE, data)):
+                raise RecordingError(
+                    f"HDF5 file is damaged (a heap of texts without end): copy or export it again: {path}"
+                )
 
 
 def terminates(heap: bytes) -> bool:

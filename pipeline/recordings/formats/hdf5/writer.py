@@ -14,7 +14,8 @@ from ....results import Truth
 from ...column_types import COLUMN_TYPES, columns_of
 from ..registry import RecordingContent
 
-CHUNK_EVENTS = 1 << 15  # 256 kB of times: fits the 1 MB cache of HDF5, and a window reads little more
+# 256 kB of times fit the 1 MB cache of HDF5, and a window reads little more; shuffling makes them a quarter smaller.
+STORAGE: dict[str, Any] = {"chunks": (1 << 15,), "shuffle": True, "compression": "gzip"}
 
 
 def write_hdf5(path: Path, content: RecordingContent) -> None:
@@ -24,15 +25,7 @@ def write_hdf5(path: Path, content: RecordingContent) -> None:
             file.attrs["width"], file.attrs["height"] = content.width_px, content.height_px
             # Kept open to the end: datasets closed earlier would be laid out differently in the file.
             columns = {
-                name: file.create_dataset(
-                    f"events/{name}",
-                    (0,),
-                    dtype,
-                    maxshape=(None,),
-                    chunks=(CHUNK_EVENTS,),
-                    shuffle=True,  # a quarter smaller
-                    compression="gzip",
-                )
+                name: file.create_dataset(f"events/{name}", (0,), dtype, maxshape=(None,), **STORAGE)
                 for name, dtype in COLUMN_TYPES.items()
             }
             events = 0

@@ -82,14 +82,8 @@ def take_time_high(
 
     Parameters
     ----------
-    state : (STATE_SIZE,) int64
-        State of the decoder.
-    words : (n,) uint16 or uint32
-        Words with the type in the bits above `bits`.
-    at : int
-        Index of the word.
     bits, low_bits : int
-        Bits of TIME_HIGH, and of the low part below it.
+        Bits of TIME_HIGH, which has the type above them, and of the low part below it.
     unchecked_steps : int
         Steps ahead that are taken without looking at the next TIME_HIGH; so small that `TimeOrder` repairs a wrong one.
     final : bool

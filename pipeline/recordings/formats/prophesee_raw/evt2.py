@@ -18,23 +18,14 @@ MAX_EVENTS_PER_WORD = 32
 
 @njit(cache=True, nogil=True)
 def decode_evt2(out: Decoded, heads: NDArray[np.uint32], masks: NDArray[np.uint32], final: bool) -> int:
-    """Decode words into `out`.
+    """Decode words into `out` as `decode_evt3` does; returns the number of words done.
 
     Parameters
     ----------
-    out : Decoded
-        Arrays written to, with room for MAX_EVENTS_PER_WORD events or more.
     heads : (n,) uint32
         Type, low time, x, y.
     masks : (n,) uint32
         EVT2.1's other half, bit k = there is an event at x + k; (0,) for EVT2.
-    final : bool
-        Whether these are the last words of the file.
-
-    Returns
-    -------
-    int
-        Number of words done, as `decode_evt3`.
     """
     state = out.state
     last_start, trigger_room = out.t_us.size - MAX_EVENTS_PER_WORD, out.trigger_t_us.size

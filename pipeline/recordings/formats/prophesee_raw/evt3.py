@@ -18,16 +18,9 @@ MAX_EVENTS_PER_WORD = 12
 
 @njit(cache=True, nogil=True)
 def decode_evt3(out: Decoded, words: NDArray[np.uint16], final: bool) -> int:
-    """Decode words into `out`.
+    """Decode words (n,) into `out`, which has room for MAX_EVENTS_PER_WORD events or more.
 
-    Parameters
-    ----------
-    out : Decoded
-        Arrays written to, with room for MAX_EVENTS_PER_WORD events or more.
-    words : (n,) uint16
-        Words of the file.
-    final : bool
-        Whether these are the last words of the file.
+    final: these are the last words of the file.
 
     Returns
     -------

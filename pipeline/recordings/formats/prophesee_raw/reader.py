@@ -71,16 +71,9 @@ class RawReader(FormatReader):
 
 
 class RawDecoder:
-    """Stream decoder: bytes in blocks of any size in, events out.
+    """Stream decoder of EVT2, EVT2.1 or EVT3: bytes in blocks of any size in, events out.
 
-    Parameters
-    ----------
-    encoding : str
-        EVT2, EVT2.1 or EVT3.
-    legacy : bool
-        EVT2.1 with the half that holds the type first.
-    reading : ReadPass
-        Pass to which damage and triggers are added.
+    `legacy` is EVT2.1 with the half that holds the type first. Damage and triggers are added to `reading`.
     """
 
     def __init__(self, encoding: str, legacy: bool, reading: ReadPass) -> None:
@@ -111,16 +104,9 @@ class RawDecoder:
 
     def _decode(self, data: bytes, final: bool) -> tuple[int, UncheckedEvents]:
         room = max(self._reading.max_events, 4096)
-        out = Decoded(
-            np.empty(room, np.int64),
-            np.empty(room, np.uint16),
-            np.empty(room, np.uint16),
-            np.empty(room, np.bool_),
-            np.empty(TRIGGER_ROOM, np.int64),
-            np.empty(TRIGGER_ROOM, np.uint8),
-            np.empty(TRIGGER_ROOM, np.uint8),
-            self._state,
-        )
+        columns = (np.empty(room, dtype) for dtype in (np.int64, np.uint16, np.uint16, np.bool_))
+        edges = (np.empty(TRIGGER_ROOM, dtype) for dtype in (np.int64, np.uint8, np.uint8))
+        out = Decoded._make([*columns, *edges, self._state])
         if self._encoding == "EVT3":
             used = int(decode_evt3(out, np.frombuffer(data, "<u2"), final))
         else:
@@ -152,10 +138,8 @@ def _encoding(header: dict[str, str], options: dict[str, str], path: Path) -> st
     said = options[""] or header.get("evt", "")
     if said in names:
         return names[said]
-    if not said:
-        why = "its header names no encoding (no line '% evt 3.0' or '% format EVT3')"
-    else:
-        why = f"its encoding is {said[:40]!r}"
+    missing = "its header names no encoding (no line '% evt 3.0' or '% format EVT3')"
+    why = f"its encoding is {said[:40]!r}" if said else missing
     raise RecordingError(
         f"RAW file cannot be decoded, {why}: EVT2, EVT2.1 and EVT3 are read; export it as HDF5: {path}"
     )
