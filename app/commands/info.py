@@ -43,6 +43,7 @@ def information(path: Path, sensor_px: tuple[int, int] | None, on_progress: Prog
 
 def print_information(info: RecordingInfo) -> None:
     """Print a table of the summary, with units."""
+    peak_hz = info.peak_rate_hz
     damage = ", ".join(f"{count:,} {name.replace('_', ' ')}" for name, count in info.damage.items() if count)
     rows = {
         "format": info.format,
@@ -52,9 +53,7 @@ def print_information(info: RecordingInfo) -> None:
         "duration": f"{info.duration_us / 1e6:.6f} s",
         "ON share": "" if info.on_share is None else f"{100 * info.on_share:.1f} %",
         "event rate": "" if info.mean_rate_hz is None else f"{info.mean_rate_hz / 1e6:.3f} Mev/s on average",
-        "peak rate": ""
-        if info.peak_rate_hz is None
-        else f"{info.peak_rate_hz / 1e6:.3f} Mev/s in the fullest millisecond",
+        "peak rate": "" if peak_hz is None else f"{peak_hz / 1e6:.3f} Mev/s in the fullest millisecond",
         "hot pixels": f"{info.hot_pixels:,} with {100 * info.hot_share:.1f} % of the events",
         "triggers": f"{info.triggers:,}",
         "t_offset": "" if info.t_offset_us is None else f"{info.t_offset_us:,} us (not added)",

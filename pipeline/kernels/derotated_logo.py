@@ -123,8 +123,9 @@ def colour_counts(picture: Bytes, places: Integers, counts: Singles, colours: Si
                 green += strength * (colours[k, 1] - ground[1])
                 blue += strength * (colours[k, 2] - ground[2])
         at = places[n]
-        for channel, value in enumerate((red, green, blue)):
-            picture[at, channel] = np.uint8(min(max(value, 0.0), 255.0))
+        picture[at, 0] = np.uint8(min(max(red, 0.0), 255.0))
+        picture[at, 1] = np.uint8(min(max(green, 0.0), 255.0))
+        picture[at, 2] = np.uint8(min(max(blue, 0.0), 255.0))
 
 
 class Canvas(NamedTuple):

@@ -30,9 +30,8 @@ LAST_US = 1 << 62  # leaves room to add and subtract
 def named_columns(present: Iterable[str]) -> dict[str, str] | None:
     """Map t, x, y and p to those of the names present that stand for them; None unless all four are there."""
     there = set(present)
-    found = {c: next((n for n in names if n in there), None) for c, names in NAMES.items()}
-    complete = {c: n for c, n in found.items() if n is not None}
-    return complete if len(complete) == 4 else None
+    found = {c: next(n for n in names if n in there) for c, names in NAMES.items() if not there.isdisjoint(names)}
+    return found if len(found) == 4 else None
 
 
 def columns_of(batch: EventBatch) -> dict[str, NDArray[Any]]:

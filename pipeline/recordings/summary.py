@@ -64,8 +64,7 @@ class RecordingInfo:
 
     def as_dict(self) -> dict[str, Any]:
         """Names and values ready for JSON; the sensor's size as `width` and `height`."""
-        names = {"width_px": "width", "height_px": "height"}
-        values = {names.get(name, name): getattr(self, name) for name in self.__slots__}
+        values = {name.removesuffix("_px"): getattr(self, name) for name in self.__slots__}
         return {**values, "path": str(self.path)}
 
 

@@ -291,7 +291,6 @@ def shifted_normals(normals: Floats, slopes: Floats, offsets_px: Floats) -> Floa
             shifted[row, i] = normals[row, i] + x_px * right[i] + y_px * lower[i] + wider_px * wider[i]
     for i in range(normals.shape[1]):
         shrink = 1.0 / math.sqrt(shifted[0, i] ** 2 + shifted[1, i] ** 2 + shifted[2, i] ** 2)
-        shifted[0, i] *= shrink
-        shifted[1, i] *= shrink
-        shifted[2, i] *= shrink
+        for row in range(3):
+            shifted[row, i] *= shrink
     return shifted

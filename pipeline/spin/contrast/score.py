@@ -274,12 +274,9 @@ def spin_axes(spin_rad_s: Floats) -> Floats:
 @numba.njit(cache=True, nogil=True)
 def difference_steps(objective: Objective, spin_rad_s: Floats) -> Floats:
     """Step of each unknown (c,) that moves the events by about half a kernel: rad/s, then px."""
-    t_s, mean, square = objective.window.events.t_s, 0.0, 0.0
-    for t in t_s:
-        mean += t / t_s.size
-    for t in t_s:
-        square += (t - mean) ** 2 / t_s.size
-    spread_s = max(math.sqrt(square), 1e-5)
+    t_s = objective.window.events.t_s
+    mean = np.sum(t_s / t_s.size)
+    spread_s = max(math.sqrt(np.sum((t_s - mean) ** 2 / t_s.size)), 1e-5)
     magnitude = math.sqrt(spin_rad_s[0] ** 2 + spin_rad_s[1] ** 2 + spin_rad_s[2] ** 2)
     steps = np.full(3 + objective.prior_px.size, OFFSET_STEP_PX)
     steps[0] = min(STEP_SIGMAS * objective.sigma_rad / spread_s, 0.3 * magnitude)

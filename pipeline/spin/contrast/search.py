@@ -195,13 +195,9 @@ def local_model(objective: Objective, spin_rad_s: Floats, offsets_px: Floats, sc
     values = scores_near(shares, objective, spin_rad_s, offsets_px, changes)
     scatter, sizes, gradient = np.empty((count, count)), np.empty(count), np.empty(count)
     for k in range(count):
-        for i in range(n):
-            shares[1 + k, i] = 0.5 * (shares[1 + k, i] - shares[1 + count + k, i])
+        shares[1 + k] = 0.5 * (shares[1 + k] - shares[1 + count + k])
         for j in range(k + 1):
-            total = 0.0
-            for i in range(n):
-                total += shares[1 + k, i] * shares[1 + j, i]
-            scatter[k, j] = scatter[j, k] = total
+            scatter[k, j] = scatter[j, k] = np.sum(shares[1 + k] * shares[1 + j])
         scatter[k, k] = max(scatter[k, k], 1e-12)
         sizes[k] = (2.0 * values[0] - values[1 + k] - values[1 + count + k]) / scatter[k, k]
         gradient[k] = 0.5 * (values[1 + k] - values[1 + count + k])

@@ -37,9 +37,8 @@ class RawReader(FormatReader):
         self._encoding = _encoding(header, options, path)
         self.format = f"{self._encoding} RAW"
         self.stated = _stated_sensor(header, options, self.warnings)
-        self._legacy = False
-        if self._encoding == "EVT2.1":
-            self._legacy = self._is_legacy(options.get("endianness", ""), head[self._start :])
+        two_halves = self._encoding == "EVT2.1"
+        self._legacy = two_halves and self._is_legacy(options.get("endianness", ""), head[self._start :])
 
     def columns(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
         """Yield the events, decoded from the start: only the words before tell the time."""
