@@ -44,6 +44,8 @@ class Recording:
         Origin of this size: "file", "command line", "system_ID 49" or "guess".
     attributes : dict of str to str or float
         Root attributes or header lines of the file; `camera.focal_length_mm` and the like among them.
+    scanned : bool
+        Whether a pass over the whole file was made.
     t_offset_us : int or None
         DSEC's offset of the file's time; reported, never added.
     events : int or None
@@ -57,7 +59,7 @@ class Recording:
         self._asked = asked
         self._sensor_warnings: list[str] = []
         self._pass: ReadPass | None = None
-        self._whole = False  # whether _pass saw the whole file
+        self.scanned = False
         sensor = self._chosen_sensor(on_progress)
         self.width_px, self.height_px, self.sensor_from = sensor.width_px, sensor.height_px, sensor.origin
         self.path, self.format = reader.path, reader.format
@@ -157,7 +159,7 @@ class Recording:
         return digest.hexdigest()
 
     def _scanned(self) -> ReadPass:
-        if self._pass is None or not self._whole:
+        if not self.scanned:
             self.scan()
         assert self._pass is not None
         return self._pass
@@ -200,8 +202,8 @@ class Recording:
                 yield batch[first : first + reading.max_events]
             if int(columns.t_us[-1]) >= end_us:
                 break
-        if whole or not self._whole:
-            self._pass, self._whole = reading, whole
+        if whole or not self.scanned:
+            self._pass, self.scanned = reading, whole
 
     def _on_sensor(self, columns: UncheckedEvents, reading: ReadPass) -> EventBatch:
         """Events on the sensor; others are dropped as damage, or show that --sensor is too small."""

@@ -97,7 +97,7 @@ def convert(
     recording = open_recording(source, sensor=sensor)
     if target.exists() and os.path.samefile(source, target):
         raise RecordingError(f"a recording cannot be converted onto itself: give another name: {target}")
-    read_share, is_read = 0.0, False  # share of the progress before the batches are read
+    read_share = 0.0  # share of the progress before the batches are read
 
     def report(share: float) -> None:
         if on_progress is not None:
@@ -105,15 +105,10 @@ def convert(
 
     def triggers() -> Triggers:
         nonlocal read_share
-        if not is_read:
+        if not recording.scanned:
             recording.scan(lambda share: report(share / 2))
             read_share = 0.5
         return recording.triggers
-
-    def batches() -> Iterator[EventBatch]:
-        nonlocal is_read
-        yield from recording.chunks(on_progress=report)
-        is_read = True
 
     def truth() -> Truth | None:
         damage = recording.damage
@@ -122,7 +117,7 @@ def convert(
     _write(
         RecordingContent(
             path=target,
-            batches=batches(),
+            batches=recording.chunks(on_progress=report),
             width_px=recording.width_px,
             height_px=recording.height_px,
             attributes=recording.attributes,

@@ -56,10 +56,9 @@ class RecordingFormat:
     sniff : callable
         `sniff(path, head)` tells from the first `HEAD_BYTES` bytes, or from the file, whether it is of this format.
     open : callable
-        `open(path)` returns the reader of a file; raises RecordingError when the file cannot be read.
+        `open(path)` returns the reader of a file; raises RecordingError when it cannot be read.
     write : callable or None
-        `write(path, content)` writes a RecordingContent to a new file; raises OSError or RecordingError. None for a
-        format that is only read.
+        `write(path, content)` writes a new file; raises OSError or RecordingError. None for a format only read.
     keeps_truth : bool
         Whether written files hold truth and scene of a simulation.
     """

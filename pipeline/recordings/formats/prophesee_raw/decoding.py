@@ -34,17 +34,9 @@ UNREAD = -2  # it may come in the part of the file that is not read yet
 
 
 class Decoded(NamedTuple):
-    """Output arrays of a decoder, filled from their start, and its state between calls.
+    """Output arrays of a decoder, filled from their start: n events, m triggers, and the state between calls.
 
-    Attributes
-    ----------
-    t_us : (n,) int64
-    x_px, y_px : (n,) uint16
-    on : (n,) bool
-    trigger_t_us : (m,) int64
-    trigger_value, trigger_id : (m,) uint8
-    state : (STATE_SIZE,) int64
-        See the constants for its indices.
+    The indices of the state (STATE_SIZE,) are the constants above.
     """
 
     t_us: NDArray[np.int64]
