@@ -368,7 +368,7 @@ RAW = "tests/pipeline/recordings/test_recordings_raw.py tests/pipeline/recording
 RECORDINGS = [
     Mutant(
         "pipeline/recordings/formats/prophesee_raw/evt3.py",
-        "state[LOW] = 0  # the new TIME_LOW comes right after",
+        "state[decoding.LOW] = 0  # the new TIME_LOW comes right after",
         "pass",
         RAW,
     ),
@@ -422,7 +422,7 @@ RECORDINGS = [
     ),
     Mutant(
         "pipeline/recordings/recording.py",
-        "reading.damage.outside_events += int(np.count_nonzero(~mask))",
+        "reading.damage.outside_events += int(np.count_nonzero(~inside))",
         "pass",
         "tests/pipeline/recordings/test_recordings_columns.py tests/pipeline/recordings/test_recordings_opening.py",
     ),
@@ -552,14 +552,14 @@ KERNELS = [
     ),
     Mutant(
         "pipeline/kernels/logo.py",
-        "(ahead > 0.0) == on[i]",
-        "(ahead > 0.0) != on[i]",
+        "((ahead > 0.0) == on)",
+        "((ahead > 0.0) != on)",
         "tests/pipeline/stages/test_logo.py",
     ),
     Mutant(
         "pipeline/kernels/surfaces.py",
-        "if last[i] >= start_us:",
-        "if last[i] > start_us:",
+        "recent = last_us >= start_us",
+        "recent = last_us > start_us",
         "tests/pipeline/kernels/test_surfaces.py",
     ),
 ]
