@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,7 +36,7 @@ class Hdf5Reader(FormatReader):
             if any(_has_texts(place) for place in table.attribute_places):
                 check_heap(path)
             self.format, self.events = table.format, table.rows
-            self.attributes = _attributes(file)
+            self.attributes = _attributes(file, file.attrs)
             self.stated = _stated_sensor(table.attribute_places, self.warnings)
             self.t_offset_us = _t_offset_us(file)
             first = table.rows_of(0, min(SAMPLED_ROWS, table.rows))[0]
@@ -183,10 +183,11 @@ def _layout(file: h5py.File, path: Path) -> tuple[str, str, dict[str, str], bool
     )
 
 
-def _attributes(place: h5py.Group | h5py.Dataset) -> dict[str, str | float]:
-    """Attributes: numbers and texts as they are, short lists of numbers as "1,2,3"; no others."""
+def _attributes(place: h5py.HLObject, names: Iterable[str]) -> dict[str, str | float]:
+    """Attributes of these names: numbers and texts as they are, short lists of numbers as "1,2,3"; no others."""
     found: dict[str, str | float] = {}
-    for name, value in place.attrs.items():
+    for name in names:
+        value = place.attrs[name]
         if isinstance(value, np.ndarray) and value.size == 1:
             value = value.reshape(-1)[0]
         if isinstance(value, bytes):
@@ -202,7 +203,7 @@ def _attributes(place: h5py.Group | h5py.Dataset) -> dict[str, str | float]:
 
 def _stated_sensor(places: list[h5py.HLObject], warnings: list[str]) -> Resolution | None:
     for place in places:
-        attributes = _attributes(place)
+        attributes = _attributes(place, [name for name in ("width", "height", "geometry") if name in place.attrs])
         if "width" in attributes and "height" in attributes:
             return resolution_or_none(attributes["width"], attributes["height"], warnings)
         if "geometry" in attributes:
