@@ -61,7 +61,7 @@ class TimeOrder:
 
     def _joined(self) -> UncheckedEvents:
         """The events held back, in order of time."""
-        known = UncheckedEvents.joined(self._held)
+        known = UncheckedEvents.concatenate(self._held)
         return known if self._held_in_order else known[np.argsort(known.t_us, kind="stable")]
 
     def _without_late(self, new: UncheckedEvents) -> UncheckedEvents:

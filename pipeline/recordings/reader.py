@@ -5,16 +5,17 @@ from __future__ import annotations
 import zipfile
 import zlib
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordingError
+from ..events import ColumnBatch
 from ..results import Truth
 from .sensor import Resolution
 
@@ -55,27 +56,8 @@ class Damage:
         return [kind.metadata["sentence"].format(count) for kind, count in counts if count]
 
 
-class _Columns:
-    """Columns of the same length, as many as slots."""
-
-    __slots__: tuple[str, ...] = ()
-
-    def __len__(self) -> int:
-        return len(getattr(self, self.__slots__[0]))
-
-    def __getitem__(self, rows: slice | NDArray[Any]) -> Self:
-        return type(self)(*(getattr(self, name)[rows] for name in self.__slots__))
-
-    @classmethod
-    def joined(cls, parts: Sequence[Self]) -> Self:
-        """Concatenation of at least one part."""
-        if len(parts) == 1:
-            return parts[0]
-        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls.__slots__))
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class Triggers(_Columns):
+class Triggers(ColumnBatch):
     """Edges on the camera's trigger input.
 
     Attributes
@@ -84,20 +66,17 @@ class Triggers(_Columns):
         1 for a rising edge, 0 for a falling one; number of the input.
     """
 
+    KINDS: ClassVar = ("i8", "u1", "u1")
     t_us: NDArray[np.int64]
     value: NDArray[np.uint8]
     id: NDArray[np.uint8]
 
-    @classmethod
-    def none(cls) -> Triggers:
-        """No edges at all."""
-        return cls(np.empty(0, np.int64), np.empty(0, np.uint8), np.empty(0, np.uint8))
-
 
 @dataclass(frozen=True, slots=True, eq=False)
-class UncheckedEvents(_Columns):
+class UncheckedEvents(ColumnBatch):
     """Events (n,) as they are in a file: not yet in order of time, perhaps outside the sensor."""
 
+    KINDS: ClassVar = ("i8", "i8", "i8", "?")
     t_us: NDArray[np.int64]
     x: NDArray[Any]
     y: NDArray[Any]

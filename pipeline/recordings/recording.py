@@ -91,7 +91,7 @@ class Recording:
     @property
     def triggers(self) -> Triggers:
         """Edges on the trigger input in the whole file; makes a pass over it unless there was one."""
-        return Triggers.joined([Triggers.none(), *self._scanned().triggers])
+        return Triggers.concatenate(self._scanned().triggers)
 
     def scan(self, on_progress: Progress | None = None) -> None:
         """Read the whole file once, for `damage`, `triggers` and `warnings`."""

@@ -61,7 +61,7 @@ def write_recording(
             width_px=width_px,
             height_px=height_px,
             attributes=attributes or {},
-            triggers=lambda: triggers or Triggers.none(),
+            triggers=lambda: triggers or Triggers.empty(),
             truth=lambda: truth,
             t_offset_us=t_offset_us,
         )
