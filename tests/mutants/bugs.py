@@ -161,19 +161,19 @@ VALUES = [
         "pipeline/session.py",
         "(int(events.t_us[0]), int(events.t_us[-1]) + 1)",
         "(int(events.t_us[0]), int(events.t_us[-1]))",
-        "tests/pipeline/test_session.py",
+        "tests/pipeline/test_session.py -k every_event",
     ),
     Mutant(
         "pipeline/session.py",
         "identity = (self.recording.identity(), (start_us, end_us))",
         "identity = self.recording.identity()",
-        "tests/pipeline/test_session.py",
+        "tests/pipeline/test_session.py -k different_sources",
     ),
     Mutant(
         "pipeline/session.py",
         'f"camera.{name}" in attributes and f"camera.{name}" not in chosen',
         'f"camera.{name}" in attributes',
-        "tests/pipeline/test_session.py",
+        "tests/pipeline/test_session.py -k user_says",
     ),
 ]
 

@@ -18,7 +18,7 @@ from spinscope.pipeline.spin.parameters import SpinParameters
 from spinscope.pipeline.spin.triplet import TripletSpin
 from spinscope.pipeline.stages import logo, rate
 from spinscope.pipeline.stages.filter import FilterResult
-from spinscope.pipeline.stages.flow import FlowResult
+from spinscope.pipeline.stages.flow import FlowEvents, FlowResult
 from spinscope.pipeline.stages.logo import LogoResult
 from spinscope.pipeline.stages.rate import RateParameters, RateResult
 from tests.spinning_ball import CONTEXT, known_ball, packets, spinning_ball
@@ -147,15 +147,13 @@ def flow_of(slices: tuple[int, ...], end_us: tuple[int, ...], seed: int = 0) -> 
     count = sum(slices)
     normals = rng.normal(size=(count, 3)) - [0, 0, 3]
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return FlowResult(
-        t_acc_us=2000, speed_bound_px_s=1e5, radius_px=17.0, t_us=np.repeat(np.array(end_us, np.int64), slices),
-        x_px=np.zeros(count), y_px=np.zeros(count), points_m=np.array([0, 0, 2.0]) + 0.02 * normals, normals=normals,
-        vx_px_s=rng.normal(3000, 100, count), vy_px_s=rng.normal(-1000, 100, count),
-        slice_index=np.repeat(np.arange(len(slices)), slices), normal_t_us=np.empty(0, np.int64),
-        normal_x_px=np.empty(0), normal_y_px=np.empty(0), normal_points_m=np.empty((0, 3)),
-        normal_normals=np.empty((0, 3)), normal_direction=np.empty((0, 2)), normal_speed_px_s=np.empty(0),
-        normal_in_image=np.empty(0, np.bool_),
-    )  # fmt: skip
+    t_us, points_m = np.repeat(np.array(end_us, np.int64), slices), np.array([0, 0, 2.0]) + 0.02 * normals
+    events = FlowEvents(
+        t_us, np.zeros(count), np.zeros(count), np.ones(count, np.bool_), points_m, normals, *np.zeros((3, count))
+    )
+    flow_px_s = rng.normal(3000, 100, count), rng.normal(-1000, 100, count)
+    no_normal_flow = FlowEvents.empty(), np.empty((0, 2)), np.empty(0), np.empty(0, np.bool_)
+    return FlowResult(2000, 1e5, 17.0, events, *flow_px_s, np.repeat(np.arange(len(slices)), slices), *no_normal_flow)
 
 
 NO_FLOW = flow_of((), ())
@@ -208,9 +206,10 @@ def test_the_full_rank_solve_needs_directions_apart(spread_deg: float, status: s
     flow = flow_of((40,), (2000,))
     angle = np.linspace(0, TAU, 40, endpoint=False)
     radius = math.radians(spread_deg)
-    flow.normals[:] = np.stack(
+    normals = np.stack(
         [math.sin(radius) * np.cos(angle), math.sin(radius) * np.sin(angle), np.full(40, -math.cos(radius))], axis=1
     )
+    flow = dataclasses.replace(flow, events=dataclasses.replace(flow.events, normals=normals))
     method = TripletSpin(SpinParameters(triplet_solve="least_squares"), CONTEXT)
     assert method.estimate(5000, flow, SILENT).status == status
 
@@ -218,12 +217,21 @@ def test_the_full_rank_solve_needs_directions_apart(spread_deg: float, status: s
 # Normal flow
 
 
+def seen_at(t_us: np.ndarray, **columns: np.ndarray) -> Any:
+    """Logo events at these times, in the middle of the ball and seen from the camera, but for the columns given."""
+    towards = np.tile([0.0, 0.0, -1.0], (t_us.size, 1))
+    deep = columns.get("deep", np.ones(t_us.size, np.bool_))
+    places = columns.get("normals", towards), columns.get("sights", towards)
+    return normal_flow._Seen(t_us.astype(np.int64), np.zeros(t_us.size, np.bool_), *places, deep)
+
+
 def method_with(events: int = 30, deep: int = 20, planes: int = 12) -> NormalFlowSpin:
     """Normal flow in a shot with so many events, of which so many lie deep, and so many planes."""
     method = NormalFlowSpin(SpinParameters(), CONTEXT)
-    method.t_us = np.arange(events, dtype=np.int64)
-    method.deep = np.arange(events) < deep
-    method.plane_speeds = np.ones(planes)
+    method.seen = seen_at(np.arange(events), deep=np.arange(events) < deep)
+    method.planes = normal_flow._Planes(
+        np.arange(planes), np.zeros((planes, 3)), np.ones(planes), np.ones(planes, bool)
+    )
     method._add = lambda logo, flow: None  # type: ignore[method-assign]
     method._fit = lambda: None  # type: ignore[method-assign]
     return method
@@ -251,8 +259,8 @@ def test_events_count_as_deep_two_pixels_inside_the_mask() -> None:
     method._add(logo_result, NO_FLOW)
     own = ~logo_result.of_outline
     distance_px = np.hypot(logo_result.x_px, logo_result.y_px)[own]
-    np.testing.assert_array_equal(method.deep, distance_px < logo_result.radius_px - logo_result.pad_px - 2.0)
-    assert method.deep.any() and not method.deep.all()
+    np.testing.assert_array_equal(method.seen.deep, distance_px < logo_result.radius_px - logo_result.pad_px - 2.0)
+    assert method.seen.deep.any() and not method.seen.deep.all()
 
 
 def fit(**changes: Any) -> Any:
@@ -269,8 +277,7 @@ def judge(good: Any, covariance_rps2: np.ndarray | None, rhythm: RateResult = SI
     method = NormalFlowSpin(SpinParameters(**values), CONTEXT)
     covariance = None if covariance_rps2 is None else covariance_rps2 * TAU**2
     method._covariance = lambda found: covariance  # type: ignore[method-assign]
-    method.sights = np.array([[0.0, 0.0, -1.0]] * 2)
-    method.t_us = np.array([0, 50_000])
+    method.seen = seen_at(np.array([0, 50_000]))
     return method._judged(good, rhythm)
 
 
@@ -304,10 +311,9 @@ def test_what_the_logo_leaves_open_is_refused() -> None:
 @pytest.mark.parametrize(("least", "is_open"), [(1.1e-4, False), (0.9e-4, True)])
 def test_a_spin_is_open_where_one_direction_weighs_a_ten_thousandth_of_another(least: float, is_open: bool) -> None:
     method = NormalFlowSpin(SpinParameters(), CONTEXT)
-    method.t_us, method.tracks = np.arange(60) * 100, np.array([[17.0, 0.2, 0.2, 50.0]])
-    method.normals = method.sights = np.tile([0.0, 0.0, -1.0], (60, 1))
-    method.normals = method.normals + 0.1 * np.random.default_rng(0).normal(size=(60, 3))
-    method.normals /= np.linalg.norm(method.normals, axis=1, keepdims=True)
+    normals = 0.1 * np.random.default_rng(0).normal(size=(60, 3)) - [0.0, 0.0, 1.0]
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    method.seen, method.tracks = seen_at(np.arange(60) * 100, normals=normals), np.array([[17.0, 0.2, 0.2, 50.0]])
     covariance = method._covariance(fit(matrix=np.diag([least, 0.5, 1.0])))
     assert (covariance is None) == is_open
 
@@ -336,11 +342,11 @@ def test_the_turning_of_the_line_of_sight_is_added_unless_it_looks_along_the_axi
     one, other = np.array([0.8, 0.0, 0.6]), np.array([0.0, -1.0, 0.0])
     turned = math.radians(2.0)
     method = NormalFlowSpin(SpinParameters(), CONTEXT)
-    method.t_us = np.array([0, 20_000, 50_000])
-    method.sights = np.array(
-        [across * (math.cos(a) * one + math.sin(a) * np.cross(axis, one)) + math.sqrt(1 - across**2) * axis
-         for a in (0.0, 0.3, turned)]
-    )  # fmt: skip
+    sights = [
+        across * (math.cos(a) * one + math.sin(a) * np.cross(axis, one)) + math.sqrt(1 - across**2) * axis
+        for a in (0.0, 0.3, turned)
+    ]
+    method.seen = seen_at(np.array([0, 20_000, 50_000]), sights=np.array(sights))
     assert abs(other @ np.cross(axis, one)) > 0.9
     rhythm = dataclasses.replace(SILENT, spin_rps=40.0, spin_std_rps=1e-9)
     spin_rps, _ = method._with_rate(40.0 * axis, np.eye(3) * 1e4, rhythm)
@@ -349,25 +355,23 @@ def test_the_turning_of_the_line_of_sight_is_added_unless_it_looks_along_the_axi
 
 
 def test_normal_flow_forgets_events_and_planes_before_its_window() -> None:
-    method = method_with(events=40, deep=40, planes=20)
-    method.t_us, method.on = np.arange(40, dtype=np.int64) * 500, np.zeros(40, np.bool_)
-    method.normals = method.sights = np.zeros((40, 3))
-    method.plane_t_us = np.tile(np.arange(10, dtype=np.int64) * 1000, 2)  # of the ball's frame and of the image
-    method.plane_rows, method.plane_in_image = np.zeros((20, 3)), np.zeros(20, np.bool_)
+    method = method_with()
+    method.seen = seen_at(np.arange(40) * 500)
+    t_us = np.tile(np.arange(10, dtype=np.int64) * 1000, 2)  # of the ball's frame and of the image
+    method.planes = normal_flow._Planes(t_us, np.zeros((20, 3)), np.ones(20), np.arange(20) >= 10)
     method._forget(5000)
-    assert method.t_us[0] == 5000 and {len(column) for column in (method.on, method.normals, method.deep)} == {30}
-    assert method.plane_t_us.min() == 5000 and {len(method.plane_rows), len(method.plane_speeds)} == {10}
+    assert method.seen.t_us.tolist() == list(range(5000, 20_000, 500))
+    assert method.planes.t_us.tolist() == [5000, 6000, 7000, 8000, 9000] * 2
+    assert method.planes.in_image.sum() == 5
 
 
 def covariance_of(found: Any, position_std_px: float = 0.2, radius_std_px: float = 0.2) -> np.ndarray:
     """What normal flow states of a fit on a ball of 17 px whose place is known so well, (rad/s)^2."""
     rng = np.random.default_rng(6)
     method = NormalFlowSpin(SpinParameters(), CONTEXT)
-    method.t_us = np.arange(60) * 1000
     method.tracks = np.array([[17.0, position_std_px, radius_std_px, 50.0]])
     normals = rng.normal(size=(60, 3)) - [0, 0, 3]
-    method.normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    method.sights = np.tile([0.0, 0.0, -1.0], (60, 1))
+    method.seen = seen_at(np.arange(60) * 1000, normals=normals / np.linalg.norm(normals, axis=1, keepdims=True))
     covariance = method._covariance(found)
     assert covariance is not None
     return covariance
