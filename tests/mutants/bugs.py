@@ -314,7 +314,7 @@ STAGES = [
         "pipeline/stages/fixed_ball.py",
         "radius_px = float(answer[2]) * (1 + short)",
         "radius_px = float(answer[2])",
-        "tests/pipeline/stages/test_fixed_ball.py",
+        "tests/pipeline/stages/test_fixed_ball.py -k all_around",
     ),
 ]
 
@@ -335,7 +335,7 @@ METHODS = [
         "pipeline/spin/normal_flow.py",
         "own = ~logo.of_outline",
         "own = np.ones(len(logo.events), np.bool_)",
-        "tests/pipeline/stages/test_spin.py",
+        "tests/pipeline/stages/test_spin_refusals.py -k evidence",
     ),
     Mutant(
         "pipeline/spin/normal_flow.py",
@@ -678,6 +678,46 @@ VIEWER = [
     ),
 ]
 
+WEB = [
+    Mutant(
+        "app/web/message_queue.py",
+        "if request.serial <= self._newest:",
+        "if request.serial < self._newest:",
+        "tests/app/web/test_client_session.py -k supersedes",
+    ),
+    Mutant(
+        "app/web/message_queue.py",
+        'slot = message.kind, getattr(message, "picture", None) is not None',
+        "slot = message.kind, False",
+        "tests/app/web/test_client_session.py -k unread_picture",
+    ),
+    Mutant(
+        "app/web/jobs.py",
+        'self._put("cancelled")',
+        'self._put("done")',
+        "tests/app/web/test_client_session.py -k a_job_tells",
+    ),
+    Mutant(
+        "app/web/security.py",
+        "if not OWN_HOST.fullmatch(host):",
+        "if not OWN_HOST.match(host):",
+        "tests/app/web/test_application.py -k strangers",
+    ),
+    Mutant(
+        "app/web/presets.py",
+        "return Parameters().with_values(setup_of(opened)).with_values(values)",
+        "return Parameters().with_values(values).with_values(setup_of(opened))",
+        "tests/app/web/test_presets.py",
+    ),
+    Mutant("app/web/presets.py", "line = shlex.join(words)", 'line = " ".join(words)', "tests/app/web/test_presets.py"),
+    Mutant(
+        "app/tuning/parameter_sweep.py",
+        "return sorted({int(value) for value in np.rint(found)})",
+        "return [int(value) for value in np.rint(found)]",
+        "tests/app/web/test_tools.py -k span_the_range",
+    ),
+]
+
 MUTANTS = [
     *CHAIN,
     *VALUES,
@@ -690,4 +730,5 @@ MUTANTS = [
     *EVALUATION,
     *COMMANDS,
     *VIEWER,
+    *WEB,
 ]

@@ -69,9 +69,9 @@ def test_a_mixture_of_opposites_says_both():
     kind = kind_of_spin(np.array([-25.0, 40.0, 30.0]), np.array([8.0, 0.0, 0.0]), LOOKING_DOWN)
     assert kind.name == "backspin"
     assert kind.off_deg == pytest.approx(np.degrees(np.arctan2(np.hypot(25, 30), 40)))
-    assert kind.sentence == "backspin with right sidespin and reverse corkscrew (44° off pure backspin)"
+    assert kind.sentence == "backspin with right sidespin and reverse corkscrew (axis tilted 44° from pure backspin)"
     assert kind_of_spin(np.array([0.5, 40.0, 0.5]), np.array([8.0, 0.0, 0.0]), LOOKING_DOWN).sentence == (
-        "backspin (1° off pure backspin)"
+        "backspin (axis tilted 1° from pure backspin)"
     )
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.events import EventBatch
-from spinscope.pipeline.stages.fixed_ball import find_fixed_ball
+from spinscope.pipeline.stages.fixed_ball import CLOSED_SHORT, _limb, find_fixed_ball
 from tests.track_runs import HEIGHT, WIDTH, merged, sample, setting
 
 
@@ -67,3 +67,14 @@ def test_noise_hot_pixels_and_silence_are_refused() -> None:
     for events in (noise(200_000, 3), pixels, row, EventBatch.empty()):
         with pytest.raises(RecordingError, match="no ball found"):
             find_fixed_ball(events, setting().camera, 5.0, 40.0)
+
+
+def test_a_path_all_around_is_taken_as_short_of_the_limb() -> None:
+    """A path that closes is the logo's own circle, a little inside the ball's outline."""
+    angle = np.linspace(0, 2 * math.pi, 100, endpoint=False)
+    found = _limb(np.round(300 + 15 * np.cos(angle)), np.round(200 + 15 * np.sin(angle)), 5.0, 40.0)
+    assert found is not None
+    circle, std_px = found
+    assert (circle.x_px, circle.y_px) == (pytest.approx(300, abs=0.5), pytest.approx(200, abs=0.5))
+    assert circle.radius_px == pytest.approx(15 * (1 + CLOSED_SHORT[0]), abs=0.4)
+    assert std_px >= CLOSED_SHORT[1] * circle.radius_px

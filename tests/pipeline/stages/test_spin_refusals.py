@@ -263,6 +263,15 @@ def test_events_count_as_deep_two_pixels_inside_the_mask() -> None:
     assert method.seen.deep.any() and not method.seen.deep.all()
 
 
+def test_what_may_be_the_outline_is_no_evidence_of_a_spin() -> None:
+    events = in_the_middle(np.arange(5000, 10_000, 100))
+    logo_result = seen(Packet(1, 5000, 10_000, events))
+    of_outline = np.arange(len(logo_result.events)) % 3 == 0
+    method = NormalFlowSpin(SpinParameters(), CONTEXT)
+    method._add(dataclasses.replace(logo_result, of_outline=of_outline), NO_FLOW)
+    assert method.seen.t_us.tolist() == logo_result.events.t_us[~of_outline].tolist()
+
+
 def fit(**changes: Any) -> Any:
     """A fit beyond doubt: 40 rps by constraints in all directions."""
     rng = np.random.default_rng(4)
