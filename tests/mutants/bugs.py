@@ -705,7 +705,7 @@ WEB = [
     ),
     Mutant(
         "app/web/presets.py",
-        "return Parameters().with_values(setup_of(opened)).with_values(values)",
+        "return Parameters().with_values(setup_of(opened)).with_values(values, on_rename)",
         "return Parameters().with_values(values).with_values(setup_of(opened))",
         "tests/app/web/test_presets.py",
     ),
