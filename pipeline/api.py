@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from .errors import ParameterError
 from .events import EventBatch
@@ -17,7 +19,7 @@ from .simulator import SimulatedRecording
 
 def estimate(
     recording: AnyRecording | SimulatedRecording | EventBatch | str | Path,
-    parameters: Parameters | Mapping[str, Mapping[str, Any]] | Sequence[str] | None = None,
+    parameters: Parameters | Mapping[str, Any] | Sequence[str] | None = None,
     *,
     preset: str | Path | None = None,
     method: str = "all",
@@ -34,8 +36,9 @@ def estimate(
         File of any format that `open_recording` reads, an opened recording, the result of `simulate`, or events in
         memory (then `sensor_px` says how large the sensor is).
     parameters : Parameters, mapping or sequence of str, optional
-        All parameters, or changes to the preset: `{"logo": {"pad_px": 3.0}}` or `["logo.pad_px=3"]`. What the
-        recording states of its camera is taken unless it is changed here; `Parameters` are taken as they are.
+        All parameters, or changes to the preset: `{"logo": {"pad_px": 3.0}}`, `{"logo.pad_px": 3.0}` or
+        `["logo.pad_px=3"]`. What the recording states of its camera is taken unless it is changed here; `Parameters`
+        are taken as they are.
     preset : str or Path, optional
         `default`, `paper`, or a TOML file of [group] tables.
     method : str
@@ -68,19 +71,18 @@ def estimate(
     >>> result.shots[0].estimates["contrast"].vector_rps  # doctest: +SKIP
     """
     check_method(method)
-    assignments: tuple[str, ...] = ()
-    if isinstance(parameters, Mapping):
-        assignments = tuple(
-            f"{group}.{field}={_assigned(value)}"
-            for group, fields in parameters.items()
-            for field, value in fields.items()
-        )
-    elif isinstance(parameters, Sequence):
-        assignments = tuple(parameters)
+    if isinstance(parameters, Parameters) and preset is not None:
+        raise ParameterError("parameters are given as a whole and as a preset: give one of them")
+    assignments = () if isinstance(parameters, Parameters) else tuple(_assignments(parameters))
     if isinstance(recording, EventBatch):
         recording = _in_memory(recording, sensor_px)
     elif isinstance(recording, SimulatedRecording):
         recording = in_memory(recording)
+    elif not isinstance(recording, AnyRecording | str | Path):
+        raise ParameterError(
+            f"a {type(recording).__name__} is no recording: give a path, a Recording, or an EventBatch "
+            "(EventBatch.checked makes one of columns t_us, x_px, y_px, on)"
+        )
     choices = Choices(preset, assignments, window_us, None, sensor_px)
     session = Session.open(recording, choices, on_progress)
     if isinstance(parameters, Parameters):
@@ -99,8 +101,24 @@ def _in_memory(events: EventBatch, sensor_px: tuple[int, int] | None) -> Recordi
     return RecordingInMemory(events, width_px, height_px)
 
 
+def _assignments(parameters: Mapping[str, Any] | Sequence[str] | None) -> Iterator[str]:
+    """Changes to the preset as `--set` takes them; groups as nested mappings or names as `group.field`."""
+    if parameters is None:
+        return
+    if not isinstance(parameters, Mapping):
+        yield from (parameters,) if isinstance(parameters, str) else parameters
+        return
+    for name, value in parameters.items():
+        if isinstance(value, Mapping):
+            yield from (f"{name}.{field}={_assigned(one)}" for field, one in value.items())
+        elif "." in name:
+            yield f"{name}={_assigned(value)}"
+        else:
+            raise ParameterError(f"{name} = {value!r} is not a table of fields: give {{{name!r}: {{field: value}}}}")
+
+
 def _assigned(value: Any) -> str:
     """A value as `--set` takes it."""
-    if isinstance(value, (list, tuple)):
+    if isinstance(value, (list, tuple, np.ndarray)):
         return ",".join(repr(float(item)) for item in value)
     return "none" if value is None else str(value)

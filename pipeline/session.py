@@ -222,10 +222,15 @@ class Session:
                 f"each +-{std_px:.1f} px: give --fixed-ball X_PX Y_PX RADIUS_PX where you know better"
             )
         else:
-            x, y, radius = (float(number) for number in fixed_ball)
+            try:
+                x, y, radius = (float(number) for number in fixed_ball)
+            except (TypeError, ValueError):
+                raise ParameterError(
+                    f'fixed ball = {fixed_ball!r} is no circle: give x, y and radius in px, or "auto"'
+                ) from None
             if not (-radius < x < self.source.width_px + radius and -radius < y < self.source.height_px + radius):
                 raise ParameterError(
-                    f"--fixed-ball {x:g} {y:g} {radius:g} lies outside the image of "
+                    f"fixed ball = {x:g} {y:g} {radius:g} lies outside the image of "
                     f"{self.source.width_px} x {self.source.height_px} px: give X_PX Y_PX RADIUS_PX in pixels"
                 )
             names = ("fixed_x_px", "fixed_y_px", "fixed_radius_px")
@@ -233,7 +238,7 @@ class Session:
         self.parameters = self.parameters.with_values({"track": values})
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """The shots found in a session, each with its track and its spin by every method.
 
@@ -253,6 +258,12 @@ class Result:
     shots: tuple[Shot, ...]
     no_shot_reason: str | None
     method: str = "all"
+
+    def __repr__(self) -> str:
+        what = self.no_shot_reason or ", ".join(
+            f"{shot.start_us} to {shot.end_us} us ({shot.best})" for shot in self.shots
+        )
+        return f"Result({self.session.recording.path.name}: {what})"
 
     @classmethod
     def of(cls, session: Session, ticks: Iterable[Tick]) -> Result:

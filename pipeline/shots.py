@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from .camera import Camera
 from .chain import Tick
+from .errors import ParameterError
 from .registry import trusted_method
 from .results import SpinEstimate, Truth
 from .stages.track import BallTrack
@@ -94,6 +95,8 @@ class Shot:
 
     def error_against(self, truth: Truth, method: str) -> tuple[float, float] | None:
         """(magnitude error in rps, signed-axis error in degrees) of one method; None where it refused."""
+        if method not in self.estimates:
+            raise ParameterError(f"{method} was not run: there are {', '.join(self.estimates)}")
         estimate = self.estimates[method]
         if estimate.vector_rps is None or estimate.axis is None:
             return None

@@ -99,7 +99,7 @@ def print_reports(reports: list[dict[str, Any]]) -> None:
         if "error" in report:
             print(f"{name}: error: {report['error']}")
         elif not report["shots"]:
-            print(f"{name}: {report['no_shot_reason']}")
+            print(f"{name}: {report['no_shot_reason']} (a ball on a spinner needs --fixed-ball)")
         for number, shot in enumerate(report.get("shots", [])):
             speed = "" if shot["speed_m_s"] is None else f", {shot['speed_m_s']:.2f} m/s"
             print(

@@ -7,7 +7,7 @@ fade takes one off, never below 0, and a table turns levels into values. Equal t
 the benchmark compares the speed with the reference and with the naive loop in float32 (16 x slower at k =
 21).
 
-Lives are kept flat, the rows MARGIN_PX apart and so many rows above and below them: a block needs no check
+Levels are kept flat, the rows MARGIN_PX apart and so many rows above and below them: a block needs no check
 for the image's border. The margins' levels are always 0, for no event sets them.
 """
 
@@ -52,7 +52,7 @@ def _stride_px(width_px: int) -> int:
 
 
 def empty_levels(width_px: int, height_px: int) -> Bytes:
-    """Lives of an empty surface: flat uint8, with margins, and room behind for the last block's last band."""
+    """Levels of an empty surface: flat uint8, with margins, and room behind for the last block's last band."""
     return np.zeros((height_px + 2 * MARGIN_PX) * _stride_px(width_px) + 64, np.uint8)
 
 

@@ -73,6 +73,27 @@ def test_parameters_are_taken_as_they_are_and_changes_on_top_of_a_preset(samples
     assert spinscope.preset_names() == ("default", "paper")
 
 
+def test_changes_may_be_nested_flat_or_texts(samples: Path) -> None:
+    path, kwargs = (
+        samples / "spinner_ball2_side.h5",
+        {"fixed_ball": BALL, "method": "triplet", "window_us": (0, 10_000)},
+    )
+    nested = {"camera": {"focal_length_mm": 16.0, "distortion": np.zeros(5)}}
+    for given in (nested, {"camera.focal_length_mm": 16.0}, ["camera.focal_length_mm=16"], "camera.focal_length_mm=16"):
+        assert spinscope.estimate(path, given, **kwargs).session.parameters.camera.focal_length_mm == 16.0
+
+
+def test_what_is_no_recording_is_refused_and_a_result_is_short_to_read(samples: Path) -> None:
+    with pytest.raises(spinscope.ParameterError, match="a ndarray is no recording"):
+        spinscope.estimate(np.zeros((3, 4)))
+    result = spinscope.estimate(
+        samples / "spinner_ball2_side.h5", fixed_ball=BALL, method="triplet", window_us=(0, 10_000)
+    )
+    assert repr(result) == "Result(spinner_ball2_side.h5: 0 to 10000 us (None))"
+    with pytest.raises(spinscope.ParameterError, match="contrast was not run: there are triplet"):
+        result.shots[0].error_against(result.session.truth, "contrast")
+
+
 def test_former_names_of_parameters_are_read_with_a_notice(samples: Path, tmp_path: Path) -> None:
     file = tmp_path / "old.toml"
     file.write_text("[contrast]\nweakest = 0.3\n", encoding="utf-8")
@@ -98,6 +119,10 @@ def test_no_ball_is_a_result_with_its_reason(samples: Path) -> None:
         ({"parameters": ["logo.pad_px"]}, "not of the form"),
         ({"preset": "papr"}, "default, paper"),
         ({"fixed_ball": (5000, 5000, 3)}, "outside the image"),
+        ({"fixed_ball": (5, 5)}, "is no circle"),
+        ({"fixed_ball": "autos"}, "is no circle"),
+        ({"parameters": {"camera": 16}}, "not a table of fields"),
+        ({"parameters": spinscope.Parameters(), "preset": "paper"}, "give one of them"),
     ],
 )
 def test_wrong_arguments_say_what_is_allowed(samples: Path, change: dict, says: str) -> None:
