@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from spinscope.app.terminal import ProgressBar, note
+from spinscope.pipeline.biases import read_biases
 from spinscope.pipeline.simulated_recordings import WrittenSimulation, simulate_to_file
 
 FOLDER = Path(__file__).parent / "own"
@@ -32,8 +33,8 @@ SAMPLES: dict[str, tuple[str, dict[str, Any]]] = {
         "flight",
         {"spin": "mixed", "magnitude_rps": 55.0, "speed_m_s": 7.0, "second_ball": True, "seed": 1108},
     ),
-    "shot_paper_biases": ("flight", {**TWICE, "biases_path": FOLDER / "paper.bias"}),
-    "shot_factory_biases": ("flight", {**TWICE, "biases_path": FOLDER / "factory.bias"}),
+    "shot_paper_biases": ("flight", {**TWICE, "biases": read_biases(FOLDER / "paper.bias")}),
+    "shot_factory_biases": ("flight", {**TWICE, "biases": read_biases(FOLDER / "factory.bias")}),
     "rally": ("rally", {**HALF, "shots": 6, "duration_ms": 20_000.0, "seed": 1109}),
 }
 
