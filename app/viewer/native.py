@@ -11,7 +11,6 @@ from pathlib import Path
 from spinscope.pipeline.errors import SpinscopeError
 
 from ..terminal import note
-from . import require_display
 from .rerun_api import place_playhead, program, quiet_environment
 from .rrd import write_rrd
 from .run import ViewedRun
@@ -37,8 +36,6 @@ def show_native(run: ViewedRun, layout: str, *, window: tuple[str, ...] = ()) ->
     SpinscopeError
         Where no window can open.
     """
-    if not window:
-        require_display()
     with tempfile.TemporaryDirectory(prefix="spinscope-") as folder:
         path = Path(folder) / "recording.rrd"
         write_rrd(run, path, layout)

@@ -28,7 +28,10 @@ FLAGS = [
 SIZE = {"width": 1000, "height": 620}  # software drawing is slow: a small window
 PATIENCE_MS = 120_000
 
-pytestmark = pytest.mark.skipif(not CHROMIUM.exists(), reason=f"there is no browser at {CHROMIUM}")
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(not CHROMIUM.exists(), reason=f"there is no browser at {CHROMIUM}"),
+]
 
 
 class Tab:
