@@ -423,7 +423,7 @@ class _Run:
         clock = self._chain._clock
         begin = clock() if clock else 0.0
         group = self._parameters.group(stage.group)
-        result = stage.step(group, state, *(inputs[name] for name in stage.inputs))
+        result = stage.step(group, state, *[inputs[name] for name in stage.inputs])
         if clock:
             self._seconds[stage.name] = self._seconds.get(stage.name, 0.0) + clock() - begin
         return result

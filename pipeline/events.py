@@ -33,7 +33,7 @@ class ColumnBatch:
     @property
     def columns(self) -> tuple[NDArray[Any], ...]:
         """All columns, in the order of the fields."""
-        return tuple(getattr(self, name) for name in self.__slots__)
+        return tuple([getattr(self, name) for name in self.__slots__])
 
     @classmethod
     def concatenate(cls, batches: Iterable[Self]) -> Self:
@@ -48,7 +48,7 @@ class ColumnBatch:
 
     def __getitem__(self, rows: slice | NDArray[np.bool_] | NDArray[np.intp]) -> Self:
         """The events of a slice (views), of a mask or of indices (copies)."""
-        return type(self)(*(column[rows] for column in self.columns))
+        return type(self)(*[column[rows] for column in self.columns])
 
     def between(self, start_us: float, end_us: float) -> Self:
         """The events of [start_us, end_us), as views."""

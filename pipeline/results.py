@@ -23,9 +23,11 @@ class ReadOnlyArrays:
     def __post_init__(self) -> None:
         for name in self.__slots__:
             value = getattr(self, name)
-            for array in value.columns if isinstance(value, ColumnBatch) else (value,):
-                if isinstance(array, np.ndarray):
-                    array.flags.writeable = False
+            if type(value) is np.ndarray:
+                value.flags.writeable = False
+            elif isinstance(value, ColumnBatch) and type(value) is not EventBatch:
+                for column in value.columns:
+                    column.flags.writeable = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal
 
 from .camera import Camera
@@ -81,7 +82,7 @@ class Stage:
     reads: tuple[str, ...] = ()
     is_slow: bool = False
 
-    @property
+    @cached_property
     def group(self) -> str:
         """Name of its group of parameters."""
         return self.parameters.group_name()

@@ -88,7 +88,7 @@ def track(events: EventBatch, parts: list[Packet]) -> list[float]:
                 results["ball"] = results["track"].ball
                 if results["ball"] is None:
                     continue
-            given = (results[name] for name in stage.inputs)
+            given = [results[name] for name in stage.inputs]
             results[stage.name] = stage.step(parameters.group(stage.group), states[stage.name], *given)
         seconds.append(time.thread_time() - begin)
     return seconds

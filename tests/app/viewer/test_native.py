@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from spinscope.app.viewer.native import show_native
+from spinscope.app.viewer import require_display
 from spinscope.app.viewer.run import ViewedRun
 from spinscope.pipeline.errors import SpinscopeError
 
@@ -15,9 +15,9 @@ def test_it_opens_where_a_spin_is_first_trusted(flight: ViewedRun, no_ball: View
     assert no_ball.opening_us == no_ball.first_sight_us == no_ball.ticks[0].packet.end_us
 
 
-def test_no_display_no_window(no_ball: ViewedRun, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_display_no_window(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     with pytest.raises(SpinscopeError, match=r"no display.*--native.*--save"):
-        show_native(no_ball, "all")
+        require_display()
