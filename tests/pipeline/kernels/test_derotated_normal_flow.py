@@ -71,7 +71,7 @@ def test_the_drift_is_what_the_guess_is_missing(
     off = np.abs(speeds - rows @ true)
     assert np.median(off) < 4.0 < np.linalg.norm(true) * 0.07
     solved = np.linalg.lstsq(rows[off < 20], speeds[off < 20], rcond=None)[0]
-    # A few in a thousand guesses that miss 11 rad/s and more leave 2 to 3 rad/s, where the edges lie along the drift.
+    # The worst seen so far: 2.04 rad/s left of a true 60 where the guess misses 11.
     np.testing.assert_allclose(solved, true, atol=max(2.0, 0.07 * np.linalg.norm(true)))
 
 
