@@ -11,7 +11,3 @@ class ParameterError(SpinscopeError):
 
 class RecordingError(SpinscopeError):
     """A recording cannot be read or holds nothing that can be used."""
-
-
-class CameraError(SpinscopeError):
-    """A live camera is missing, busy or was pulled out."""

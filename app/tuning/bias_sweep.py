@@ -21,7 +21,7 @@ from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.recordings import open_recording, readable_suffixes
 from spinscope.pipeline.registry import Parameters
 from spinscope.pipeline.session import AnyRecording, Session
-from spinscope.pipeline.simulated_recordings import BIASES, DESCRIPTION, simulate_again_to_file
+from spinscope.pipeline.simulated_recordings import BIASES, description_in, simulate_again_to_file
 from spinscope.pipeline.simulator import simulate_again
 
 NOISE, HOT, EDGE, LOGO = 0, 4, 1, 2  # labels of the simulator's truth
@@ -111,20 +111,11 @@ class Resimulation:
     biases: dict[str, int]
 
 
-def scene_of(recording: AnyRecording) -> dict[str, Any] | None:
-    """Description from which the recording can be simulated again; None where it carries none."""
-    try:
-        description = json.loads(str(recording.attributes.get(DESCRIPTION, "null")))
-    except json.JSONDecodeError:
-        return None
-    return description if isinstance(description, dict) else None
-
-
 def bias_state(recording: AnyRecording) -> BiasState:
     """Biases of an open recording with their declarations."""
     values = known_biases(recording.path, recording)
     locked = None
-    if scene_of(recording) is None:
+    if description_in(recording.attributes) is None:
         locked = (
             "This recording carries no scene: biases act in the camera while it records and cannot be changed "
             "afterwards. Recordings made by `spinscope simulate` can be simulated again with other biases."
@@ -208,7 +199,7 @@ def sweep_bias(
     low, high = max(one.low or 0 for one in declared), min(one.high or 0 for one in declared)
     if not 2 <= points <= MOST_POINTS:
         raise ParameterError(f"{points} points are out of range: 2 to {MOST_POINTS}")
-    description = scene_of(open_recording(original))
+    description = description_in(open_recording(original).attributes)
     if description is None:
         raise RecordingError("the recording carries no scene that could be simulated again")
     values = sorted({int(value) for value in np.rint(np.linspace(low, high, points))})

@@ -15,6 +15,7 @@ from spinscope.pipeline.biases import BiasParameters, read_biases, write_biases
 from spinscope.pipeline.errors import ParameterError, SpinscopeError
 from spinscope.pipeline.registry import Parameters
 from spinscope.pipeline.session import Session
+from spinscope.pipeline.simulated_recordings import description_in
 from spinscope.pipeline.stages.fixed_ball import find_fixed_ball
 
 from . import exports, presets, schemas
@@ -164,7 +165,7 @@ def _add_biases(app: FastAPI, state: AppState, session_of: SessionOf) -> None:
             return OpenRecording.open(path, choices).first_clip()
 
         def work(job: Job) -> bias_sweep.BiasSweep:
-            if bias_sweep.scene_of(recording.session.recording) is not None:
+            if description_in(recording.session.recording.attributes) is not None:
                 return bias_sweep.sweep_bias(original, biases, request.name, request.points, job.report, job.check)
             own, parameters = biases if request.is_known else None, recording.session.parameters
             return bias_sweep.measure_folder(original, own, parameters, open_clip, job.report, job.check)

@@ -19,7 +19,7 @@ from ..stage import Context, SpinMethod
 from ..stages.flow import FlowResult
 from ..stages.logo import LogoResult
 from ..stages.rate import RateResult
-from .parameters import SpinParameters
+from .parameters import TAKES_RATE, SpinParameters
 
 Floats = NDArray[np.float64]
 
@@ -271,7 +271,7 @@ class NormalFlowSpin:
         if covariance is None:
             return self._doubted("the logo's place leaves a part of the spin open")
         spin_rps, covariance_rps2 = fit.spin / TAU, covariance / TAU**2
-        if self.parameters.magnitude_from == "rate" and rate.spin_rps is not None:
+        if TAKES_RATE[self.parameters.magnitude_from] and rate.spin_rps is not None:
             spin_rps, covariance_rps2 = self._with_rate(spin_rps, covariance_rps2, rate)
         magnitude_rps = float(np.linalg.norm(spin_rps))
         if magnitude_rps > self.parameters.max_spin_rps:

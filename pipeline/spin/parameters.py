@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 from ..parameters import ParameterGroup, choice, tunable
 
+# The choices of magnitude_from: whether the event rate may give the magnitude.
+TAKES_RATE = {"rate": True, "flow": False}
+
 
 @dataclass(frozen=True, kw_only=True)
 class SpinParameters(ParameterGroup):
@@ -17,7 +20,7 @@ class SpinParameters(ParameterGroup):
     )
     magnitude_from: str = choice(
         "rate",
-        ("rate", "flow"),
+        tuple(TAKES_RATE),
         "magnitude: from the event rate's zero crossings where they are regular, or from flow alone",
     )
     triplet_solve: str = choice("paper", ("paper", "least_squares"), "triplet: the paper's mean, or full rank")

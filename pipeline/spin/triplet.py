@@ -13,7 +13,7 @@ from ..results import MethodResult, Packet, SpinEstimate
 from ..stage import Context, SpinMethod
 from ..stages.flow import FlowResult
 from ..stages.rate import RateResult
-from .parameters import SpinParameters
+from .parameters import TAKES_RATE, SpinParameters
 
 Floats = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ class TripletSpin:
             return SpinEstimate.refused("triplet", "the logo is seen from one side only", int(counts.sum()))
         spin, covariance = solved
         vector_rps, covariance_rps2 = spin / (2 * math.pi), covariance / (2 * math.pi) ** 2
-        if self.parameters.magnitude_from == "rate" and rate.spin_rps is not None:
+        if TAKES_RATE[self.parameters.magnitude_from] and rate.spin_rps is not None:
             vector_rps, covariance_rps2 = _with_magnitude(vector_rps, covariance_rps2, rate)
         return SpinEstimate("triplet", vector_rps, covariance_rps2, None, int(counts.sum()))
 

@@ -32,11 +32,15 @@ PLANES_PER_MS = 20  # at most; a dense logo has 200 events/ms whose planes share
 TRIPLET_NEAR_PX, TRIPLET_MISMATCH_PX, TRIPLET_MISMATCH_SHARE, TRIPLET_NEIGHBOURS = 0.7, 0.5, 0.2, 12
 
 
+# The choices of t_acc_from: whether t_acc follows from a spin, and whether that may be the event rate's.
+T_ACC_SPINS = {"expected": (True, False), "rate": (True, True), "fixed": (False, False)}
+
+
 @dataclass(frozen=True, kw_only=True)
 class FlowParameters(ParameterGroup):
     """Length of a slice, and limits of the matching."""
 
-    t_acc_from: str = choice("rate", ("expected", "rate", "fixed"), "where t_acc = 1/(10 spin) takes the spin from")
+    t_acc_from: str = choice("rate", tuple(T_ACC_SPINS), "where t_acc = 1/(10 spin) takes the spin from")
     t_acc_us: int = tunable(2000, 100, 100_000, 100, "us", "length of a slice when t_acc_from = fixed")
     expected_spin_rps: float = tunable(50.0, 1.0, 500.0, 1.0, "rps", "median of the spins expected")
     reach_px: float = tunable(3.0, 1.5, 20.0, 0.1, "px", "how far apart neighbouring events of one edge may be")
@@ -156,10 +160,11 @@ def step(
 
 def _t_acc_us(parameters: FlowParameters, rate: RateResult) -> int:
     """Length of a slice begun now."""
-    if parameters.t_acc_from == "fixed":
+    from_spin, from_rate = T_ACC_SPINS[parameters.t_acc_from]
+    if not from_spin:
         return parameters.t_acc_us
     spin_rps = parameters.expected_spin_rps
-    if parameters.t_acc_from == "rate" and rate.spin_rps is not None:
+    if from_rate and rate.spin_rps is not None:
         spin_rps = rate.spin_rps
     return max(round(1e6 / (SLICES_A_ROTATION * spin_rps)), 1)
 

@@ -22,6 +22,10 @@ REPEATS, SHARE_OF_BEST = 0.5, 0.8
 IRREGULAR = 0.15
 
 
+# The choices of low_pass_from: whether the cut-off follows the period found by autocorrelation.
+LOW_PASS_FOLLOWS = {"rhythm": True, "fixed": False}
+
+
 @dataclass(frozen=True, kw_only=True)
 class RateParameters(ParameterGroup):
     """Histogram, moving average and low-pass."""
@@ -29,7 +33,7 @@ class RateParameters(ParameterGroup):
     bin_us: int = tunable(500, 50, 20_000, 50, "us", "width of the histogram's bins")
     ema_us: int = tunable(2000, 100, 100_000, 100, "us", "time constant of the exponential moving average")
     low_pass_from: str = choice(
-        "rhythm", ("rhythm", "fixed"), "cut-off: twice the rotation found by autocorrelation, or low_pass_hz"
+        "rhythm", tuple(LOW_PASS_FOLLOWS), "cut-off: twice the rotation found by autocorrelation, or low_pass_hz"
     )
     low_pass_hz: float = tunable(200.0, 5.0, 2000.0, 5.0, "Hz", "cut-off of the low-pass filter; its upper limit")
     window_us: int = tunable(500_000, 10_000, 5_000_000, 10_000, "us", "how far back in time it looks")
@@ -148,7 +152,7 @@ def _with_period(
     period = shortest_period(correlation, int(0.8 / (max_spin_rps * bin_s)), SHARE_OF_BEST)
     repeats = period > 0 and correlation[period] >= REPEATS
     cutoff_hz = min(parameters.low_pass_hz, 0.45 / bin_s)  # below half the bins' rate, else there is nothing to pass
-    if parameters.low_pass_from == "rhythm" and repeats:
+    if LOW_PASS_FOLLOWS[parameters.low_pass_from] and repeats:
         cutoff_hz = min(cutoff_hz, 2.0 / (period * bin_s))
     smooth_hz = low_passed(varying, cutoff_hz * bin_s)
     crossings_us = t_us[0] + (falling_crossings(smooth_hz) + 0.5) * parameters.bin_us

@@ -16,6 +16,7 @@ import pytest
 from spinscope.pipeline.chain import Chain, EventsInMemory, Tick
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.registry import STAGES, Parameters
+from spinscope.pipeline.session import Choices, Session
 from spinscope.pipeline.stage import Stage
 from spinscope.pipeline.stages.track import TrackResult
 
@@ -189,3 +190,22 @@ def test_a_shot_knows_nothing_of_the_one_before_it(
     assert len(judged) > 2
     for one, other in judged:
         assert_same(one.balls[0].results, other.balls[0].results)
+
+
+CHOICES = [
+    (group, field)
+    for group in dict.fromkeys(stage.group for stage in STAGES)
+    for field, declared in Parameters().group(group).tunables().items()
+    if declared.kind == "choice"
+]
+
+
+@pytest.mark.parametrize(("group", "field"), CHOICES)
+def test_a_choice_that_nothing_implements_fails_instead_of_running_as_another(
+    samples: Path, group: str, field: str
+) -> None:
+    session = Session.open(samples / "flight_fast_top.h5", Choices(window_us=(0, 60_000)))
+    changed = copy.copy(session.parameters.group(group))
+    object.__setattr__(changed, field, "new")  # declared, as far as validation knows
+    with pytest.raises(KeyError, match="new"):
+        list(session.chain.run(session.parameters.with_groups(**{group: changed}), ("triplet", "normal_flow")))
