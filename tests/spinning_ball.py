@@ -110,7 +110,7 @@ def known_ball(
     per_s = 1e6 / tick_us
     mean = np.array([x[1], y[1], (x[1] - x[0]) * per_s, (y[1] - y[0]) * per_s, radius[1]])
     covariance = np.diag([std_px**2, std_px**2, 50.0**2, 50.0**2, std_px**2])
-    return BallTrack(0, float(end_us), 0.0, mean, covariance, Circle(x[1], y[1], radius[1], 1.0))
+    return BallTrack(0, float(end_us), 0.0, mean, covariance, Circle(x[1], y[1], radius[1], 1.0), 0, "start")
 
 
 def track_with(ball: BallTrack) -> TrackResult:

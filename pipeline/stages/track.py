@@ -28,6 +28,10 @@ from .track_outline import VOTE_US, Edge, Limits, Sighting, measure
 from .track_search import MOST_CANDIDATES, OtherBalls, agree, look
 
 Status = Literal["searching", "starting", "tracking", "coasting", "lost"]
+# How a shot began: across the border, at a contact, with the recording, or first seen in the middle of the view.
+BeganBy = Literal["entered", "bounce", "hit", "start", "found"]
+# How it ended: across the border, at a contact, with the recording, or out of sight.
+EndedBy = Literal["left", "bounce", "hit", "end", "lost"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,6 +75,15 @@ class BallTrack(ReadOnlyArrays):
         Its covariance.
     measured : Circle, optional
         The refined circle that entered the filter, None if none did: the ball is coasting.
+    start_us : int
+        Start of the shot (file time), at a contact to within 2 ms.
+    began_by : str
+        How the shot began: entered, bounce, hit, start (of the recording) or found (in the middle of the view).
+    is_shot : bool
+        Whether the ball is in free flight; False for one that rolls or lies, which is tracked without being a shot.
+    earlier : tuple of BallTrack
+        States at the ends of the ticks since start_us before this one, oldest first: a contact is known only some
+        ticks later. Given in the one tick in which the shot is announced, else empty.
     """
 
     shot: int
@@ -79,6 +92,10 @@ class BallTrack(ReadOnlyArrays):
     mean: NDArray[np.float64]
     covariance: NDArray[np.float64]
     measured: Circle | None
+    start_us: int
+    began_by: BeganBy
+    is_shot: bool = True
+    earlier: tuple[BallTrack, ...] = ()
 
     def centre_px(
         self, event_t_us: NDArray[np.int64] | NDArray[np.float64]
@@ -86,6 +103,26 @@ class BallTrack(ReadOnlyArrays):
         """Centre (x, y) in px at the scene times behind these event times (section 3.2, eq. ball_pos)."""
         dt_s = (event_t_us - self.latency_us - self.t_us) * 1e-6
         return self.mean[0] + self.mean[2] * dt_s, self.mean[1] + self.mean[3] * dt_s
+
+
+@dataclass(frozen=True, slots=True)
+class ShotEnd:
+    """End of a shot.
+
+    Attributes
+    ----------
+    shot : int
+        Number of the shot.
+    end_us : int
+        When it ended (file time), at a contact to within 2 ms; before the tick's start where it is known late. No
+        result of the shot from ticks that end later counts.
+    ended_by : str
+        left (across the border), bounce, hit, end (of the recording) or lost.
+    """
+
+    shot: int
+    end_us: int
+    ended_by: EndedBy
 
 
 NO_STATE, NO_COVARIANCE = np.full(5, np.nan), np.full((5, 5), np.nan)
@@ -110,6 +147,8 @@ class TrackResult:
         Circle of the Hough transform on the surface, before refinement and gating.
     candidate : Circle, optional
         The tick's best circle while the track is not trusted yet.
+    ended : tuple of ShotEnd
+        The shots whose end became known in this tick.
     """
 
     status: Status
@@ -118,6 +157,7 @@ class TrackResult:
     balls: tuple[BallTrack, ...]
     hough: Circle | None
     candidate: Circle | None = None
+    ended: tuple[ShotEnd, ...] = ()
 
     @property
     def ball(self) -> BallTrack | None:
@@ -183,6 +223,8 @@ class TrackState:
     others: OtherBalls = field(default_factory=OtherBalls)
     seen_us: int = 0
     shots: int = 0
+    start_us: int = 0
+    began_by: BeganBy = "start"
 
 
 def start(parameters: TrackParameters, context: Context) -> TrackState:
@@ -222,7 +264,9 @@ def _step_fixed(
 ) -> TrackResult:
     """A ball spinner's ball: the stated circle."""
     variance = np.array([1.0, 1.0, 0.0, 0.0, 1.0]) * parameters.fixed_std_px**2
-    return _ball(parameters, packet, "tracking", 0, _fixed_ring(parameters), np.diag(variance))
+    if state.shots == 0:
+        state.shots, state.start_us = 1, packet.start_us
+    return _ball(parameters, state, packet, "tracking", 0, _fixed_ring(parameters), np.diag(variance))
 
 
 def _step_flying(
@@ -306,7 +350,7 @@ def _follow(
     if measured is None and packet.end_us - state.seen_us > parameters.coast_us:
         return _end(parameters, state, packet, f"the ball was not seen for {parameters.coast_us / 1000:g} ms")
     status: Status = "tracking" if measured else "coasting"
-    return _ball(parameters, packet, status, state.shots - 1, now, _total_covariance(ball), hough, measured)
+    return _ball(parameters, state, packet, status, state.shots - 1, now, _total_covariance(ball), hough, measured)
 
 
 def _update(
@@ -355,8 +399,9 @@ def _begin(
     state.pending, state.others = None, OtherBalls()
     state.seen_us = packet.end_us
     state.shots = shot + 1
+    state.start_us, state.began_by = packet.start_us, "found"
     measured = _circle(parameters, sighting)
-    return _ball(parameters, packet, "tracking", shot, mean, _total_covariance(state.ball), hough, measured)
+    return _ball(parameters, state, packet, "tracking", shot, mean, _total_covariance(state.ball), hough, measured)
 
 
 def _end(parameters: TrackParameters, state: TrackState, packet: Packet, reason: str) -> TrackResult:
@@ -400,6 +445,7 @@ def _fixed_ring(parameters: TrackParameters) -> NDArray[np.float64]:
 
 def _ball(
     parameters: TrackParameters,
+    state: TrackState,
     packet: Packet,
     status: Status,
     shot: int,
@@ -409,7 +455,7 @@ def _ball(
     measured: Circle | None = None,
 ) -> TrackResult:
     t_us = packet.end_us - parameters.latency_us
-    ball = BallTrack(shot, t_us, parameters.latency_us, mean, covariance, measured)
+    ball = BallTrack(shot, t_us, parameters.latency_us, mean, covariance, measured, state.start_us, state.began_by)
     return TrackResult(status, None, t_us, (ball,), hough)
 
 

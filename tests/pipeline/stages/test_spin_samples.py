@@ -50,7 +50,7 @@ def track_of(
     moves = np.zeros(2) if fixed else np.array([x[1] - x[0], y[1] - y[0]]) * 200.0
     mean = np.array([x[1] + noise[0], y[1] + noise[1], *moves, r[1] + noise[2] / 2 + wider_px])
     covariance = np.diag([0.3**2, 0.3**2, 100.0**2, 100.0**2, 0.2**2])
-    return track_with(BallTrack(0, t_us, LATENCY_US, mean, covariance, None))
+    return track_with(BallTrack(0, t_us, LATENCY_US, mean, covariance, None, 0, "start"))
 
 
 def shot(
