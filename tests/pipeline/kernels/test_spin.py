@@ -60,3 +60,15 @@ def test_constraints_in_one_plane_leave_the_start_as_it_is() -> None:
     found, _, matrix, _ = robust_spin(rows, rows @ start, np.ones(3), start, 5)
     np.testing.assert_array_equal(found, start)
     assert np.linalg.matrix_rank(matrix) == 2
+
+
+@given(lift=st.sampled_from([1e-3, 0.0]))
+def test_three_nearly_coplanar_constraints_fix_no_spin(lift: float) -> None:
+    rows = np.array([[16.0, 0.0, 0.0], [0.0, 16.0, 0.0], [16.0, 16.0, 16.0 * lift]])
+    speeds = rows @ np.array([20.0, 30.0, 100.0])
+    spin, supported = sampled_spin(rows, speeds, 0.25, 1100.0, 300, 1)
+    assert not spin.any() and supported == 0.0
+    rows[2, 2] = 16.0
+    spin, supported = sampled_spin(rows, rows @ np.array([20.0, 30.0, 100.0]), 0.25, 1100.0, 300, 1)
+    np.testing.assert_allclose(spin, [20.0, 30.0, 100.0])
+    assert supported == 1.0

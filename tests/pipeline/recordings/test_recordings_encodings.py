@@ -90,6 +90,12 @@ def check_room(kinds: list[str], room: int, trigger_room: int, encoding: str) ->
     assert found == twin.events and edges == twin.triggers
 
 
+def test_a_new_time_high_of_evt3_starts_at_time_low_zero() -> None:
+    words = [0x8001, 0x8001, 0x6123, 0x0005, 0x2064, 0x8002, 0x2064, 0x6007, 0x2064, 0x8002, 0x2064]
+    found = decoded("EVT3", False, np.array(words, "<u2").tobytes(), [])
+    assert [event[0] for event in found.events] == [0x1123, 0x2000, 0x2007, 0x2007]
+
+
 @pytest.mark.parametrize("width", [12, 8])
 def test_vectors_of_evt3_go_on_where_the_one_before_ended(width: int) -> None:
     word = 0x4FFF if width == 12 else 0x50FF
