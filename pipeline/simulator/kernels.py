@@ -14,7 +14,22 @@ from numba import njit
 
 from . import kernels_pixel as pixel
 from .kernels_light import EVERY, Bodies, Floats, Physics, light
-from .kernels_pixel import Ints, Maps, Pixels
+from .kernels_pixel import NOBODY, Ints, Maps, Pixels
+
+
+@njit(cache=True, nogil=True)
+def _behind(background: Floats, shift_px: Floats, physics: Physics, height_px: int, x: int, y: int) -> float:
+    """Intensity of the background at a pixel, bilinear where the camera has turned it away by `shift_px` (2,)."""
+    if shift_px[0] == 0.0 and shift_px[1] == 0.0:
+        return float(background[y * physics.width_px + x])
+    u = min(max(x - shift_px[0], 0.0), physics.width_px - 1.001)
+    w = min(max(y - shift_px[1], 0.0), height_px - 1.001)
+    i, j = int(u), int(w)
+    p = j * physics.width_px + i
+    upper = background[p] + (u - i) * (background[p + 1] - background[p])
+    p += physics.width_px
+    lower = background[p] + (u - i) * (background[p + 1] - background[p])
+    return float(upper + (w - j) * (lower - upper))
 
 
 @njit(cache=True, nogil=True)
@@ -23,6 +38,7 @@ def _look(
     view: Maps,
     bodies: Bodies,
     physics: Physics,
+    shift_px: Floats,
     row: int,
     k: int,
     since_us: float,
@@ -38,14 +54,16 @@ def _look(
     sensor = (view.threshold_on, view.threshold_off, view.normals)
     background, ray_x, ray_y = view.background, view.ray_x, view.ray_y
     floor, every = physics.floor, int(kind[k, EVERY])
-    steady = physics.flicker_depth == 0.0
+    steady = physics.pause_us == 0.0
+    height_px = background.size // physics.width_px
     for y in range(box[row, k, 1], box[row, k, 3]):
         for x in range(box[row, k, 0], box[row, k, 2]):
             p = y * physics.width_px + x
             if looked[p] == row or (resting[p] >= row and rest_body[p] == k):
                 continue
+            behind = _behind(background, shift_px[row], physics, height_px, x, y)
             covered, looks, base, intensity, plain = light(
-                owner, background, box, kind, pose, texture, physics, row, x, y, ray_x[p], ray_y[p]
+                owner, behind, box, kind, pose, texture, physics, row, x, y, ray_x[p], ray_y[p]
             )
             looked[p] = row
             at_work = role[p] == pixel.IN_BOX or role[p] == pixel.TAIL
@@ -56,7 +74,7 @@ def _look(
                     pixel.begin(state, role, cursor, sensor, physics, p, intensity, plain, now_us)
                     continue
                 if not at_work:
-                    before = background[p] * gain + floor
+                    before = behind * gain + floor
                     pixel.begin(state, role, cursor, sensor, physics, p, before, before, since_us)
                 pixel.advance(state, events, sensor, physics, p, owner[p], intensity, plain, now_us)
                 if looks > base and not pixel.settled(state, p):  # its events want their times right
@@ -68,7 +86,15 @@ def _look(
 
 @njit(cache=True, nogil=True)
 def _tails(
-    pixels: Pixels, view: Maps, bodies: Bodies, physics: Physics, row: int, before_us: float, now_us: float, gain: float
+    pixels: Pixels,
+    view: Maps,
+    bodies: Bodies,
+    physics: Physics,
+    shift_px: Floats,
+    row: int,
+    before_us: float,
+    now_us: float,
+    gain: float,
 ) -> None:
     """Go on with the pixels that bodies have left, and let go those that have come to rest."""
     box, state, width = bodies.box, pixels.state, physics.width_px
@@ -76,8 +102,7 @@ def _tails(
     events = (cursor, pixels.event_us, pixels.event_word)
     sensor = (view.threshold_on, view.threshold_off, view.normals)
     background = view.background
-    # Under flicker every pixel works: forty looks a period are enough for its sine.
-    pause_us = 0.05 * math.pi / physics.flicker_per_us if physics.flicker_depth > 0.0 else 0.0
+    height_px, rests = background.size // width, physics.pause_us == 0.0
     i = 0
     while i < cursor[0]:
         p = listing[i]
@@ -86,12 +111,16 @@ def _tails(
         for k in range(box.shape[1]):
             if box[row, k, 0] <= x < box[row, k, 2] and box[row, k, 1] <= y < box[row, k, 3]:
                 new_role = pixel.IN_BOX
-        if new_role == pixel.TAIL and now_us - state[p, pixel.TIME] >= pause_us:
-            if pixel.settled(state, p):  # nothing happened since its last look: a body that vanishes does so now
+        if new_role == pixel.TAIL and now_us - state[p, pixel.TIME] >= 0.5 * physics.pause_us:
+            if rests and pixel.settled(
+                state, p
+            ):  # nothing happened since its last look: a body that vanishes does so now
                 state[p, pixel.TIME] = max(state[p, pixel.TIME], before_us)
-            intensity = background[p] * gain + physics.floor
+            intensity = _behind(background, shift_px[row], physics, height_px, x, y) * gain + physics.floor
             pixel.advance(state, events, sensor, physics, p, owner[p], intensity, intensity, now_us)
-            if physics.flicker_depth == 0.0 and pixel.settled(state, p):
+            if not rests:
+                owner[p] = NOBODY
+            elif pixel.settled(state, p):
                 state[p, pixel.SIGNAL], state[p, pixel.SIGNAL_PLAIN] = state[p, pixel.LIGHT], state[p, pixel.PLAIN]
                 new_role = pixel.RESTING
         if new_role == pixel.TAIL:
@@ -129,9 +158,19 @@ def leave_all(pixels: Pixels, box: Ints, width: int) -> None:
 
 
 @njit(cache=True, nogil=True)
-def run(pixels: Pixels, view: Maps, bodies: Bodies, physics: Physics, time_us: Floats, first: int, fresh: bool) -> int:
+def run(
+    pixels: Pixels,
+    view: Maps,
+    bodies: Bodies,
+    physics: Physics,
+    time_us: Floats,
+    shift_px: Floats,
+    first: int,
+    fresh: bool,
+) -> int:
     """Simulate the rows from `first` of time_us on, writing into `pixels`; return the next row.
 
+    `shift_px` (rows, 2) is the shift of the background in the image at these times.
     Returns early when the event buffers are more than half full: empty them (cursor[1] = 0) and call again.
     With `fresh` the row `first` only sets the pixels to what stands there at that time, without events.
     """
@@ -143,20 +182,28 @@ def run(pixels: Pixels, view: Maps, bodies: Bodies, physics: Physics, time_us: F
         for k in range(bodies.kind.shape[0]):
             every = int(bodies.kind[k, EVERY])
             if start or row % every == 0 or row == time_us.size - 1:
-                _look(pixels, view, bodies, physics, row, k, time_us[max(row - every, 0)], now_us, gain, start)
+                _look(
+                    pixels, view, bodies, physics, shift_px, row, k, time_us[max(row - every, 0)], now_us, gain, start
+                )
             if row > 0:
                 _leave(pixels, bodies.box, row - 1, row, k, physics.width_px)
-        _tails(pixels, view, bodies, physics, row, time_us[max(row - 1, 0)], now_us, gain)
+        before_us = time_us[max(row - 1, 0)]
+        pause_us = physics.pause_us
+        if pause_us == 0.0 or math.floor(now_us / pause_us) != math.floor(before_us / pause_us):
+            _tails(pixels, view, bodies, physics, shift_px, row, before_us, now_us, gain)
         row += 1
     return row
 
 
 @njit(cache=True, nogil=True)
-def begin_all(pixels: Pixels, view: Maps, physics: Physics) -> None:
-    """Put every pixel of `pixels` to work on its background at time 0."""
+def begin_all(pixels: Pixels, view: Maps, physics: Physics, shift_px: Floats) -> None:
+    """Put every pixel of `pixels` to work on its background at time 0, shifted by `shift_px` (2,)."""
     sensor = (view.threshold_on, view.threshold_off, view.normals)
+    width_px = physics.width_px
+    height_px = view.background.size // width_px
     for p in range(view.background.size):
-        intensity = view.background[p] * physics.brightness + physics.floor
+        behind = _behind(view.background, shift_px, physics, height_px, p % width_px, p // width_px)
+        intensity = behind * physics.brightness + physics.floor
         pixel.begin(pixels.state, pixels.role, pixels.cursor, sensor, physics, p, intensity, intensity, 0.0)
         pixels.role[p] = pixel.TAIL
         pixels.listing[p] = p

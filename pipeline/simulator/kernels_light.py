@@ -13,11 +13,11 @@ Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 Ints = NDArray[np.int32]
 
-BALL, ARM = 0, 1
+BALL, CAPSULE = 0, 1
 SURE_SIGMAS = 4.0  # beyond this many sigmas from an outline its blur is less than 1e-4
 
-# Columns of a pose. A ball: centre in metres, then camera frame -> ball frame. An arm: (x, y, radius) of
-# elbow and of hand in pixels.
+# Columns of a pose. A ball: centre in metres, then camera frame -> ball frame. A capsule: (x, y, radius) of
+# both ends in pixels.
 CENTRE = 0
 TURN = 3
 SIGMA = 12  # blur of the outline in px
@@ -25,8 +25,9 @@ POSE_COLUMNS = 13
 
 # Columns of what a body is like; SLOWER: so many looks may pass where it moves slowest.
 KIND, OWNER, EVERY, SLOWER, RADIUS, ALBEDO, ALBEDO_2 = range(7)
-HALF_EXTENT, TEXELS, CAP_COSINE, EXTENT_X, EXTENT_Y, SAMPLE = range(7, 13)  # of a ball's logo
-BODY_COLUMNS = 13
+HALF_EXTENT, TEXELS, CAP_COSINE, EXTENT_X, EXTENT_Y, SAMPLE, SIDES = range(7, 14)  # of a ball's logo
+OPACITY = 14  # of a capsule: a shadow lets light through
+BODY_COLUMNS = 15
 
 LOOKS_A_PIXEL = 4  # at least, of any motion
 
@@ -56,6 +57,7 @@ class Physics(NamedTuple):
     floor: float  # dark current as an intensity
     flicker_depth: float
     flicker_per_us: float  # angular frequency
+    pause_us: float  # between two looks at pixels that work all the time, under flicker or shaking; 0 = they may rest
     focal_px: float
     width_px: int
 
@@ -64,10 +66,13 @@ class Physics(NamedTuple):
 def _texture_at(texture: Singles, body: Floats, pose: Floats, k: int, row: int, x: float, y: float, z: float) -> float:
     """Printing of body k in the direction (x, y, z) of the camera frame, bilinear."""
     bz = pose[row, k, TURN + 6] * x + pose[row, k, TURN + 7] * y + pose[row, k, TURN + 8] * z
+    side = -1.0 if bz < 0.0 and body[k, SIDES] == 2.0 else 1.0  # the other side's print: half a turn about the ball's x
+    bz *= side
     if bz <= body[k, CAP_COSINE]:
         return 0.0
     bx = pose[row, k, TURN] * x + pose[row, k, TURN + 1] * y + pose[row, k, TURN + 2] * z
     by = pose[row, k, TURN + 3] * x + pose[row, k, TURN + 4] * y + pose[row, k, TURN + 5] * z
+    by *= side
     last = body[k, TEXELS] - 1.0
     scale = math.sqrt(2.0 / (1.0 + bz)) / body[k, HALF_EXTENT]
     u = (bx * scale + 1.0) * 0.5 * last
@@ -118,6 +123,8 @@ def ball_light(
     bx = pose[row, k, TURN] * nx + pose[row, k, TURN + 1] * ny + pose[row, k, TURN + 2] * nz
     by = pose[row, k, TURN + 3] * nx + pose[row, k, TURN + 4] * ny + pose[row, k, TURN + 5] * nz
     bz = pose[row, k, TURN + 6] * nx + pose[row, k, TURN + 7] * ny + pose[row, k, TURN + 8] * nz
+    if body[k, SIDES] == 2.0:
+        bz = abs(bz)
     # How far the samples around this pixel reach on the sphere: wider where it is seen at a slant.
     step = body[k, SAMPLE] / physics.focal_px
     slant = 1.5 * cz / (radius * max(-nz, 0.2))
@@ -148,10 +155,12 @@ def ball_light(
 
 
 @njit(cache=True, nogil=True)
-def arm_light(body: Floats, pose: Floats, k: int, row: int, x: float, y: float) -> tuple[float, float, float, float]:
-    """(cover, intensity, looks, looks while it moves here) of arm k at a pixel; see `ball_light`.
+def capsule_light(
+    body: Floats, pose: Floats, k: int, row: int, x: float, y: float
+) -> tuple[float, float, float, float]:
+    """(cover, intensity, looks, looks while it moves here) of capsule k at a pixel; see `ball_light`.
 
-    The nearer to the elbow, the slower the arm moves.
+    The nearer to the first end (an arm's elbow), the slower it moves.
     """
     ax, ay, ar = pose[row, k, 0], pose[row, k, 1], pose[row, k, 2]
     bx, by, br = pose[row, k, 3] - ax, pose[row, k, 4] - ay, pose[row, k, 5]
@@ -170,13 +179,14 @@ def arm_light(body: Floats, pose: Floats, k: int, row: int, x: float, y: float) 
     hand = 0.5 * math.erfc(-min(max(beyond / sigma, -5.0), 5.0) / 1.4142135623730951)
     spare = min(distance, abs(beyond)) - SURE_SIGMAS * sigma
     looks = base + max(spare, 0.0) * LOOKS_A_PIXEL
+    cover *= body[k, OPACITY]
     return cover, body[k, ALBEDO] + hand * (body[k, ALBEDO_2] - body[k, ALBEDO]), looks, base
 
 
 @njit(cache=True, nogil=True)
 def light(
     owner: NDArray[np.uint8],
-    background: Floats,
+    behind: float,
     box: Ints,
     kind: Floats,
     pose: Floats,
@@ -188,13 +198,12 @@ def light(
     ray_x: float,
     ray_y: float,
 ) -> tuple[bool, float, float, float, float]:
-    """(covered, looks, looks while it moves here, intensity, intensity without logos) at a pixel.
+    """(covered, looks, looks while it moves here, intensity, intensity without logos) at a pixel before `behind`.
 
     Writes the nearest body into owner, its first argument.
     """
     p = y * physics.width_px + x
-    intensity = background[p]
-    plain = intensity
+    intensity = plain = behind
     covered, looks, base, bodies = False, 1.0, 1.0, 0
     for k in range(kind.shape[0]):
         if x < box[row, k, 0] or y < box[row, k, 1] or x >= box[row, k, 2] or y >= box[row, k, 3]:
@@ -203,7 +212,7 @@ def light(
             cover, body, body_plain, ahead = ball_light(texture, kind, pose, k, row, physics, ray_x, ray_y)
             pace = kind[k, SLOWER]
         else:
-            cover, body, ahead, pace = arm_light(kind, pose, k, row, float(x), float(y))
+            cover, body, ahead, pace = capsule_light(kind, pose, k, row, float(x), float(y))
             body_plain = body
         bodies += 1
         looks, base = (ahead, pace) if bodies == 1 else (1.0, 1.0)

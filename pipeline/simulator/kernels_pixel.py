@@ -22,6 +22,8 @@ Ints = NDArray[np.int32]
 # A pixel's role: untouched so far, in the box of a body, still answering to a body that has left, at rest again.
 NEW, IN_BOX, TAIL, RESTING = 0, 1, 2, 3
 
+NOBODY = 255  # owner of a pixel that no body has covered
+
 # Columns of a pixel's state: it lies in one or two cache lines.
 LIGHT, PLAIN = 0, 1  # log intensity at TIME
 SIGNAL, SIGNAL_PLAIN = 2, 3  # after the low-pass

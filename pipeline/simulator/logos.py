@@ -34,12 +34,15 @@ class Logo:
     name: str = "andro"
     png_base64: str = ""
     width_mm: float = 24.0
+    sides: int = 1  # 2 = the same again on the other side of the ball
 
     def __post_init__(self) -> None:
         if self.name not in (*NAMES, "png"):
             raise ParameterError(f"logo {self.name!r} is unknown: there are {', '.join(NAMES)}, or a PNG file")
         if not 1.0 <= self.width_mm <= 60.0:
             raise ParameterError(f"logo width {self.width_mm:g} mm is out of range: 1 to 60 mm")
+        if self.sides not in (1, 2):
+            raise ParameterError(f"logo on {self.sides} sides: 1 or 2 are possible")
 
     @classmethod
     def of(cls, name_or_png: str | Logo) -> Logo:
@@ -138,11 +141,27 @@ def _double_circle(a: Floats, b: Floats) -> Floats:
     return np.minimum(np.abs(radius - 8.0), np.abs(radius - 6.0)) - 0.3
 
 
+def _seam(a: Floats, b: Floats) -> Floats:
+    """The seam of a ball made of two halves: a great circle 0.4 mm wide (our reading of photographs)."""
+    return np.abs(np.hypot(a, b) - np.pi / 2 * RADIUS_MM) - 0.2
+
+
+# Middles (a, b) and radii of spots of dirt in mm, as of a ball that was played with: our choice.
+SPOTS_MM = ((0.0, 0.0, 0.9), (14.0, 6.0, 0.7), (-9.0, 16.0, 1.1), (-20.0, -8.0, 0.6), (11.0, -19.0, 0.8))
+
+
+def _marks(a: Floats, b: Floats) -> Floats:
+    """Spots of dirt, no print."""
+    return np.asarray(np.minimum.reduce([np.hypot(a - x, b - y) - radius for x, y, radius in SPOTS_MM]))
+
+
 _DRAWINGS: dict[str, tuple[Drawing, float]] = {
     "andro": (_wordmark, 12.6),
     "double_circle": (_double_circle, 8.3),
     "line_0.8mm": (_line(0.8), 13.4),
     "line_1.4mm": (_line(1.4), 13.7),
+    "seam": (_seam, 31.8),
+    "marks": (_marks, 23.0),
     "none": (lambda a, b: np.full_like(a, np.inf), 1.0),
 }
 NAMES = tuple(_DRAWINGS)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..kernels.rotation import rotations
-from .scene import Arm, Ball, Fixed, Flight, Quaternion, Scene, Vector3
+from .scene import Arm, Ball, Flight, Motion, Net, Quaternion, Rolling, Scene, Shake, Vector3
 
 Floats = NDArray[np.float64]
 
@@ -85,15 +85,55 @@ def quaternion_of(matrix: Floats) -> Quaternion:
     return float(w), float(x), float(y), float(z)
 
 
-def trajectory(motion: Fixed | Flight, ball: Ball, scene: Scene) -> Trajectory:
+def trajectory(motion: Motion, ball: Ball, scene: Scene) -> Trajectory:
     """The motion sampled over its whole time."""
-    if isinstance(motion, Fixed):
-        time = np.array([motion.start_s, motion.end_s])
-        still = np.zeros((2, 3))
-        spin = np.tile(np.array(motion.spin_rps, np.float64), (2, 1))
-        turn = rotations(spin * 2 * np.pi * (time - time[0])[:, None]) @ matrix_of(motion.orientation)
-        return Trajectory(time, np.tile(np.array(motion.position_m, np.float64), (2, 1)), still, spin, turn)
-    return _flown(motion, ball, scene)
+    if isinstance(motion, Flight):
+        return _flown(motion, ball, scene)
+    time = np.array([motion.start_s, motion.end_s])
+    since = (time - time[0])[:, None]
+    velocity = np.array(motion.velocity_m_s if isinstance(motion, Rolling) else (0.0, 0.0, 0.0), np.float64)
+    spin = np.tile(np.array(motion.spin_rps, np.float64), (2, 1))
+    turn = rotations(spin * 2 * np.pi * since) @ matrix_of(motion.orientation)
+    position = np.array(motion.position_m, np.float64) + since * velocity
+    return Trajectory(time, position, np.tile(velocity, (2, 1)), spin, turn)
+
+
+def seen(flown: Trajectory, shake: Shake, focal_px: float) -> Trajectory:
+    """The trajectory in the frame of a camera that shakes; the velocity is the scene's, turned."""
+    if not shake.amplitude_px:
+        return flown
+    turn = shake_turns(shake, flown.time_s, focal_px)
+    place, velocity, spin = (
+        np.einsum("nij,nj->ni", turn, value) for value in (flown.position_m, flown.velocity_m_s, flown.spin_rps)
+    )
+    return Trajectory(flown.time_s, place, velocity, spin, turn @ flown.rotation)
+
+
+def shake_px(shake: Shake, time_s: ArrayLike) -> Floats:
+    """(n, 2) float64 shift of what stands in the middle of the image."""
+    weight, turn_hz, phase = _shake_sines(shake)
+    angle = 2 * np.pi * turn_hz * np.asarray(time_s, np.float64)[:, None, None] + phase
+    return np.asarray(shake.amplitude_px * np.sum(weight * np.sin(angle), axis=2))
+
+
+def shake_turns(shake: Shake, time_s: ArrayLike, focal_px: float) -> Floats:
+    """(n, 3, 3) rotations of the scene in the frame of a camera that shakes."""
+    x, y = shake_px(shake, time_s).T / focal_px
+    return rotations(np.stack([-y, x, np.zeros_like(x)], axis=1))
+
+
+def shake_speed_px_s(shake: Shake) -> float:
+    """Bound of the image's speed in its middle."""
+    weight, turn_hz, _ = _shake_sines(shake)
+    return float(2 * np.pi * shake.amplitude_px * np.hypot(*np.sum(weight * turn_hz, axis=1)))
+
+
+def _shake_sines(shake: Shake) -> tuple[Floats, Floats, Floats]:
+    """(2, 3) weights, frequencies and phases of the axes' sines."""
+    random = np.random.default_rng(shake.seed)
+    weight = random.uniform(0.2, 1.0, (2, 3))
+    weight /= weight.sum(axis=1, keepdims=True)
+    return weight, shake.frequency_hz * 2 ** random.uniform(-1, 1, (2, 3)), random.uniform(0, 2 * np.pi, (2, 3))
 
 
 def _flown(flight: Flight, ball: Ball, scene: Scene) -> Trajectory:
@@ -161,17 +201,30 @@ def triple(vector: Floats) -> Vector3:
     return x, y, z
 
 
-def bounced(velocity_m_s: Floats, spin_rps: Floats, up: Floats, radius_m: float) -> tuple[Floats, Floats]:
-    """Velocity and spin after the table: restitution, and friction until the ball grips (hollow sphere)."""
+def bounced(
+    velocity_m_s: Floats,
+    spin_rps: Floats,
+    up: Floats,
+    radius_m: float,
+    restitution: float = RESTITUTION,
+    friction: float = FRICTION,
+) -> tuple[Floats, Floats]:
+    """Velocity and spin after the table: restitution, and friction until the ball grips (hollow sphere).
+
+    References
+    ----------
+    A. Nakashima, Y. Ogawa, Y. Kobayashi, Y. Hayakawa, "Modeling of rebound phenomenon of a rigid ball with friction and
+    elastic effects", American Control Conference 2010.
+    """
     omega = 2 * np.pi * spin_rps
     fall = -float(velocity_m_s @ up)
     slip = velocity_m_s + fall * up - radius_m * np.cross(omega, up)
     slip_speed = float(np.linalg.norm(slip))
-    after = velocity_m_s + (1 + RESTITUTION) * fall * up
+    after = velocity_m_s + (1 + restitution) * fall * up
     if slip_speed == 0:
         return after, spin_rps
     # A hollow sphere (I = 2/3 m r^2) grips after a tangential change of 2/5 of the slip.
-    change = -min(FRICTION * (1 + RESTITUTION) * fall, 0.4 * slip_speed) * slip / slip_speed
+    change = -min(friction * (1 + restitution) * fall, 0.4 * slip_speed) * slip / slip_speed
     omega = omega - 1.5 / radius_m * np.cross(up, change)
     return after + change, omega / (2 * np.pi)
 
@@ -183,3 +236,12 @@ def arm_ends(arm: Arm, time_s: ArrayLike) -> tuple[Floats, Floats]:
     turn = rotations(angle[:, None] * np.asarray(arm.axis)[None, :])
     elbow = np.tile(np.array(arm.elbow_m, np.float64), (t.size, 1))
     return elbow, elbow + arm.length_m * (turn @ np.asarray(arm.rest, np.float64))
+
+
+def tape_at(net: Net, share: float, up: Floats, time_s: ArrayLike) -> Floats:
+    """(n, 3) places of the point of a net's tape at this share of its length."""
+    left, right = np.array(net.left_m, np.float64), np.array(net.right_m, np.float64)
+    across = np.cross(up, right - left)
+    across /= np.linalg.norm(across)
+    swing = np.sin(2 * np.pi * net.frequency_hz * np.asarray(time_s, np.float64) + net.phase_rad)
+    return left + share * (right - left) + net.swing_m * math.sin(math.pi * share) * swing[:, None] * across

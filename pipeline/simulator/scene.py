@@ -45,6 +45,21 @@ class Flight:
 
 
 @dataclass(frozen=True)
+class Rolling:
+    """A ball that moves straight at constant velocity and spin during [start_s, end_s), as one rolling on a table."""
+
+    start_s: float
+    end_s: float
+    position_m: Vector3
+    velocity_m_s: Vector3
+    spin_rps: Vector3
+    orientation: Quaternion
+
+
+Motion = Fixed | Flight | Rolling
+
+
+@dataclass(frozen=True)
 class Air:
     """Gravity and aerodynamics of a flying ball.
 
@@ -62,7 +77,7 @@ class Air:
 class Ball:
     """A matte ball with a logo; `motions` follow each other in time, between them the ball is away."""
 
-    motions: tuple[Fixed | Flight, ...]
+    motions: tuple[Motion, ...]
     radius_m: float = 0.02
     mass_kg: float = 0.0027
     albedo: float = 0.85
@@ -88,6 +103,38 @@ class Arm:
     phase_rad: float = 0.0
     sleeve_albedo: float = 0.06
     hand_albedo: float = 0.45
+
+
+@dataclass(frozen=True)
+class Net:
+    """A net that swings: a tape between two ends and upright cords below it, fixed at their feet.
+
+    A point of the tape at the share s of its length moves across it by swing_m sin(pi s) sin(2 pi frequency_hz t +
+    phase_rad), the first mode of a string.
+    """
+
+    left_m: Vector3
+    right_m: Vector3
+    height_m: float = 0.1525  # rules of table tennis, as the tape's width of 15 mm
+    cords: int = 24
+    swing_m: float = 0.01
+    frequency_hz: float = 6.0
+    phase_rad: float = 0.0
+    tape_albedo: float = 0.75
+    cord_albedo: float = 0.05
+
+
+@dataclass(frozen=True)
+class Shake:
+    """Vibration of the camera: its direction turns, so that the middle of the image moves by so many pixels.
+
+    A sum of three sines an axis between half and twice `frequency_hz`, of random weights and phases; `amplitude_px` is
+    the largest that they may reach together.
+    """
+
+    amplitude_px: float = 0.0
+    frequency_hz: float = 20.0
+    seed: int = 0
 
 
 @dataclass(frozen=True)
@@ -123,6 +170,9 @@ class Light:
     bounce: float = 0.5
     flicker_depth: float = 0.0  # amplitude over the mean, 0 = steady LED panels
     flicker_hz: float = 100.0
+    shadow: float = 0.0  # share of the table's light that a ball takes away below it
+    lamp: Vector3 = (0.3, 0.2, -0.93)  # direction towards the lamp that casts the shadow
+    penumbra_rad: float = 0.05  # sigma of the shadow's edge over its distance: half the angle of a panel
 
 
 @dataclass(frozen=True)
@@ -132,9 +182,11 @@ class Scene:
     duration_s: float
     balls: tuple[Ball, ...]
     arm: Arm | None = None
+    net: Net | None = None
     background: Background = Background()
     light: Light = Light()
     air: Air = Air()
+    shake: Shake = Shake()
     up: Vector3 = (0.0, 0.0, -1.0)
     description: str = ""
 
@@ -164,7 +216,8 @@ class Scene:
             values = dict(plain)
             values["balls"] = tuple(_ball(ball) for ball in values["balls"])
             values["arm"] = None if values.get("arm") is None else built(Arm, values["arm"])
-            for name, kind in (("background", Background), ("light", Light), ("air", Air)):
+            values["net"] = None if values.get("net") is None else built(Net, values["net"])
+            for name, kind in (("background", Background), ("light", Light), ("air", Air), ("shake", Shake)):
                 values[name] = built(kind, values.get(name, {}))
             return built(cls, values)
         except (KeyError, TypeError, AttributeError, ValueError) as error:
@@ -181,8 +234,12 @@ def built(kind: type[Kind], plain: Mapping[str, Any]) -> Kind:
 
 def _ball(plain: Mapping[str, Any]) -> Ball:
     values = dict(plain)
-    values["motions"] = tuple(
-        built(Flight if "velocity_m_s" in motion else Fixed, motion) for motion in values["motions"]
-    )
+    values["motions"] = tuple(built(_motion_kind(motion), motion) for motion in values["motions"])
     values["logo"] = built(Logo, values.get("logo", {}))
     return built(Ball, values)
+
+
+def _motion_kind(plain: Mapping[str, Any]) -> type[Fixed] | type[Flight] | type[Rolling]:
+    if "velocity_m_s" not in plain:
+        return Fixed
+    return Flight if "bounces" in plain else Rolling

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..biases import CURVES, PAPER, BiasCurve, BiasParameters
 from ..errors import ParameterError
 from ..events import EventBatch
+from .kernels_pixel import NOBODY
 
 NOISE, EDGE, LOGO, OTHER, HOT = range(5)  # labels of the truth
 
@@ -87,6 +88,8 @@ class SensorModel:
         Step of the readout's clock.
     rate_limit_hz : float
         Events a second let through, 0 = no limit.
+    gaps_hz, gap_us : float
+        How often the readout loses all events for a time, at random, and for how long.
     pattern_seed : int or None
         Of mismatch and hot pixels (one camera = one pattern); None = drawn from the recording's seed.
     """
@@ -110,6 +113,8 @@ class SensorModel:
     hot_sigma: float = 1.5
     timestamp_us: int = 1
     rate_limit_hz: float = 0.0
+    gaps_hz: float = 0.0
+    gap_us: float = 1000.0
     pattern_seed: int | None = None
 
     def __post_init__(self) -> None:
@@ -173,6 +178,7 @@ class LabelledEvents:
 
     events: EventBatch
     label: NDArray[np.uint8]
+    logo_of: NDArray[np.uint8]  # number of the ball that the logo's events belong to, NOBODY for others
 
 
 def thresholds(sensor: SensorModel, pixels: int, random: np.random.Generator) -> tuple[NDArray[np.float32], ...]:
@@ -222,14 +228,19 @@ def noise(
     on = random.random(where.size) < sensor.noise_on_share
     label = np.repeat(np.array([NOISE, HOT], np.uint8), [count, where_hot.size])
     y, x = np.divmod(where, width_px)
-    return LabelledEvents(EventBatch(time.astype(np.int64), x.astype(np.uint16), y.astype(np.uint16), on), label)
+    nobody = np.full(where.size, NOBODY, np.uint8)
+    return LabelledEvents(
+        EventBatch(time.astype(np.int64), x.astype(np.uint16), y.astype(np.uint16), on), label, nobody
+    )
 
 
-def read_out(parts: list[LabelledEvents], sensor: SensorModel, duration_us: int) -> LabelledEvents:
+def read_out(
+    parts: list[LabelledEvents], sensor: SensorModel, duration_us: int, random: np.random.Generator
+) -> LabelledEvents:
     """Put events in order of time, on the readout's clock and under its rate limit.
 
     The limit counts in windows of 1 ms; what exceeds it in a window is lost, later events first (as the
-    camera's own rate control drops them).
+    camera's own rate control drops them). Gaps of the readout come at random times.
     """
     time = np.concatenate([part.events.t_us for part in parts])
     keep = np.flatnonzero((time >= 0) & (time < duration_us))
@@ -241,5 +252,11 @@ def read_out(parts: list[LabelledEvents], sensor: SensorModel, duration_us: int)
         first = np.searchsorted(window, window)
         allowed = np.arange(time.size) - first < sensor.rate_limit_hz * 1e-3
         time, keep = time[allowed], keep[allowed]
+    if sensor.gaps_hz > 0:
+        gap = np.sort(random.uniform(0, duration_us, random.poisson(sensor.gaps_hz * duration_us * 1e-6)))
+        ended = np.searchsorted(gap + sensor.gap_us, time, side="right")
+        passed = np.searchsorted(gap, time, side="right") == ended
+        time, keep = time[passed], keep[passed]
     x, y, on = (np.concatenate([getattr(part.events, name) for part in parts])[keep] for name in ("x_px", "y_px", "on"))
-    return LabelledEvents(EventBatch(time, x, y, on), np.concatenate([part.label for part in parts])[keep])
+    label, logo_of = (np.concatenate([getattr(part, name) for part in parts])[keep] for name in ("label", "logo_of"))
+    return LabelledEvents(EventBatch(time, x, y, on), label, logo_of)

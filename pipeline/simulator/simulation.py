@@ -19,9 +19,11 @@ from ..events import EventBatch
 from ..results import Truth
 from . import kernels, kernels_light, kernels_pixel
 from .background import intensity_map
-from .bodies import ArmBody, BallBody, bodies_of
-from .motion import triple
+from .bodies import BallBody, Body, bodies_of
+from .kernels_pixel import NOBODY
+from .motion import seen, shake_px, shake_speed_px_s, triple
 from .scene import Scene, built
+from .segments import Segment, segments_of
 from .sensor import EDGE, LOGO, OTHER, LabelledEvents, Lens, SensorModel, noise, read_out, thresholds
 
 EDGE_STEP_PX = 0.25  # an outline moves less than this between two looks at it
@@ -31,12 +33,10 @@ TRUTH_STEP_US = 500
 DARK_FLOOR = 1e-3  # dark current as an intensity: lets the logarithm live without light
 NORMALS = 1 << 16
 REFERENCE_LUX = 1930.0  # the paper's setup, section 4.1
-VERSION = 2  # of the model: raised whenever the same scene and seed give other events
+VERSION = 3  # of the model: raised whenever the same scene and seed give other events
 
 Progress = Callable[[float, str], None]  # share done (0..1) and what is being done
-BodyLooks = tuple[
-    BallBody | ArmBody, int, int
-]  # a body is looked at in every so many rows; slower: see `kernels_light`
+BodyLooks = tuple[Body, int, int]  # a body is looked at in every so many rows; slower: see `kernels_light`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +52,7 @@ class SimulatedRecording:
         Size of the sensor.
     scene : Scene
     description : dict
-        Everything that `simulate_again` needs, ready for JSON.
+        Everything that `simulate_again` needs, ready for JSON; and the segments.
     """
 
     events: EventBatch
@@ -61,6 +61,16 @@ class SimulatedRecording:
     height_px: int
     scene: Scene
     description: dict[str, Any]
+
+    @property
+    def camera(self) -> Camera:
+        """The camera that saw the scene."""
+        return built(Camera, self.description["camera"])
+
+    @property
+    def segments(self) -> list[Segment]:
+        """What each ball did between two contacts, as far as it was in the image."""
+        return [built(Segment, plain) for plain in self.description["segments"]]
 
     @property
     def duration_us(self) -> int:
@@ -116,7 +126,8 @@ def simulate_scene(
     moving = work.run(on_progress)
     brightness = scene.light.illuminance_lux / REFERENCE_LUX
     still = noise(array, backdrop * brightness, duration_us, camera.width_px, pattern, background)
-    read = read_out([*moving, still], array, duration_us)
+    read = read_out([*moving, still], array, duration_us, background)
+    segments = segments_of(scene, camera, [read.events.t_us[read.logo_of == ball] for ball in range(len(scene.balls))])
     description = {
         "version": VERSION,
         "seed": seed,
@@ -125,6 +136,7 @@ def simulate_scene(
         "sensor": dataclasses.asdict(array),
         "lens": dataclasses.asdict(lens),
         "biases": sensor.as_dict() if isinstance(sensor, BiasParameters) else None,
+        "segments": [dataclasses.asdict(segment) for segment in segments],
     }
     truth = truth_of(scene, camera, read.label)
     return SimulatedRecording(read.events, truth, camera.width_px, camera.height_px, scene, description)
@@ -149,19 +161,19 @@ def simulate_again(
     return simulate_scene(scene, camera=camera, sensor=sensor, lens=lens, seed=seed, on_progress=on_progress)
 
 
-def truth_of(scene: Scene, camera: Camera, label: NDArray[np.uint8]) -> Truth:
-    """The truth of the first ball every 500 us of its motions."""
+def truth_of(scene: Scene, camera: Camera, label: NDArray[np.uint8], ball: int = 0) -> Truth:
+    """The truth of the first or another ball every 500 us of its motions."""
     times, poses = [np.empty(0, np.int64)], []
-    for flown in BallBody(scene, 0).trajectories if scene.balls else ():
+    for flown in BallBody(scene, ball).trajectories if scene.balls else ():
         first = -(-max(round(flown.start_s * 1e6), 0) // TRUTH_STEP_US) * TRUTH_STEP_US
         last = round(min(flown.end_s, scene.duration_s) * 1e6)
         times.append(np.arange(first, last, TRUTH_STEP_US, dtype=np.int64))
-        poses.append(flown.at(times[-1] * 1e-6))
+        poses.append(seen(flown.at(times[-1] * 1e-6), scene.shake, camera.focal_px))
     position_m, velocity_m_s, spin_rps = (
         np.concatenate([np.empty((0, 3)), *(getattr(pose, name) for pose in poses)])
         for name in ("position_m", "velocity_m_s", "spin_rps")
     )
-    circle = camera.silhouette(position_m, scene.balls[0].radius_m if scene.balls else 1.0)
+    circle = camera.silhouette(position_m, scene.balls[ball].radius_m if scene.balls else 1.0)
     return Truth(np.concatenate(times), *circle, position_m, velocity_m_s, spin_rps, label)
 
 
@@ -202,14 +214,15 @@ class _Simulation:
             floor=DARK_FLOOR,
             flicker_depth=light.flicker_depth,
             flicker_per_us=2 * math.pi * light.flicker_hz * 1e-6,
+            pause_us=pause_us(scene),
             focal_px=camera.focal_px,
             width_px=camera.width_px,
         )
-        buffer = 4 * count if light.flicker_depth else 1 << 20
+        buffer = 4 * count if self.physics.pause_us else 1 << 20
         self.pixels = kernels_pixel.Pixels(
             state=np.zeros((count, kernels_pixel.STATE_COLUMNS)),
             role=np.full(count, kernels_pixel.NEW, np.uint8),
-            owner=np.zeros(count, np.uint8),
+            owner=np.full(count, NOBODY, np.uint8),
             looked=np.full(count, -1, np.int32),
             rest=np.full(count, -1, np.int32),
             rest_body=np.zeros(count, np.uint8),
@@ -233,24 +246,24 @@ class _Simulation:
             ]
             kernels.leave_all(self.pixels, self.boxes, self.camera.width_px)
             self.boxes = np.zeros((0, 4), np.int32)
-            if there or self.pixels.cursor[0] or self.scene.light.flicker_depth:
+            if there or self.pixels.cursor[0] or self.physics.pause_us:
                 self._segment(there, start, stop, on_progress)
         return self.found
 
-    def _segment(
-        self, there: Sequence[BallBody | ArmBody], start: float, stop: float, on_progress: Progress | None
-    ) -> None:
+    def _segment(self, there: Sequence[Body], start: float, stop: float, on_progress: Progress | None) -> None:
         """Simulate [start, stop], in which these bodies and no others may be seen."""
         speeds = [body.speeds_px_s(self.camera, start, stop) for body in there]
         wanted = [min(EDGE_STEP_PX / max(surface, 1e-3), LONGEST_STEP_S) for _, surface in speeds]
         step = min(wanted, default=LONGEST_STEP_S)
+        if self.physics.pause_us:
+            step = min(step, self.physics.pause_us * 1e-6)
         looks: list[BodyLooks] = []
         for body, (slowest, _), own in zip(there, speeds, wanted, strict=True):
             slower = int(min(EDGE_STEP_PX / max(slowest, 1e-3), LONGEST_STEP_S) / own)
             looks.append((body, int(own / step + 1e-9), max(slower, 1)))
         rows = max(math.ceil((stop - start) / step), 1)
-        if start == 0.0 and self.scene.light.flicker_depth:  # every pixel works all the time
-            kernels.begin_all(self.pixels, self.view, self.physics)
+        if start == 0.0 and self.physics.pause_us:  # every pixel works all the time
+            kernels.begin_all(self.pixels, self.view, self.physics, shake_px(self.scene.shake, [0.0])[0])
         for first in range(0, rows, CHUNK_ROWS):
             if not (there or self.pixels.cursor[0]):
                 break  # everything has come to rest
@@ -260,9 +273,10 @@ class _Simulation:
             self.pixels.rest[:] = -1
             packed = _packed(looks, self.camera, self.lens, time_s)
             self.boxes = packed.box[-1].copy()
+            shift_px = shake_px(self.scene.shake, time_s)
             row = 0 if start == 0.0 and first == 0 else 1
             while row <= count:
-                row = kernels.run(self.pixels, self.view, packed, self.physics, time_s * 1e6, row, row == 0)
+                row = kernels.run(self.pixels, self.view, packed, self.physics, time_s * 1e6, shift_px, row, row == 0)
                 self._collect()
             if on_progress is not None:
                 on_progress(min(float(time_s[-1]) / self.scene.duration_s, 1.0), "simulating")
@@ -276,9 +290,25 @@ class _Simulation:
         y, x = np.divmod(word >> 16, self.camera.width_px)
         # A delay is never negative: jitter beyond that is cut.
         t_us = np.floor(pixels.event_us[:count] + np.maximum(late, 0.0)).astype(np.int64)
-        other, logo, on = (word >> 8) & 0xFF > 0, word & 2 > 0, word & 1 > 0
-        label = np.where(other, OTHER, np.where(logo, LOGO, EDGE)).astype(np.uint8)
-        self.found.append(LabelledEvents(EventBatch(t_us, x.astype(np.uint16), y.astype(np.uint16), on), label))
+        owner, logo, on = (word >> 8) & 0xFF, word & 2 > 0, word & 1 > 0
+        label = np.where(owner > 0, OTHER, np.where(logo, LOGO, EDGE)).astype(np.uint8)
+        logo_of = np.where(logo, owner, NOBODY).astype(np.uint8)
+        self.found.append(
+            LabelledEvents(EventBatch(t_us, x.astype(np.uint16), y.astype(np.uint16), on), label, logo_of)
+        )
+
+
+def pause_us(scene: Scene) -> float:
+    """Time between two looks at pixels that work all the time, 0 where they may rest.
+
+    Forty looks a period are enough for the sine of a flicker; under a shake the image moves by EDGE_STEP_PX at most.
+    """
+    pauses = []
+    if scene.light.flicker_depth:
+        pauses.append(1e6 / (40 * scene.light.flicker_hz))
+    if scene.shake.amplitude_px:
+        pauses.append(1e6 * EDGE_STEP_PX / shake_speed_px_s(scene.shake))
+    return min(pauses, default=0.0)
 
 
 def _packed(

@@ -10,7 +10,7 @@ import pytest
 from spinscope.pipeline.camera import Camera, CameraParameters
 from spinscope.pipeline.simulator import kernels_light as columns
 from spinscope.pipeline.simulator.bodies import BallBody
-from spinscope.pipeline.simulator.logos import NAMES, Logo, texture
+from spinscope.pipeline.simulator.logos import NAMES, SPOTS_MM, Logo, texture
 from spinscope.pipeline.simulator.motion import matrix_of
 from spinscope.pipeline.simulator.scene import Ball, Fixed, Light, Scene
 from spinscope.pipeline.simulator.sensor import Lens
@@ -107,4 +107,8 @@ def test_logos_keep_their_strokes(name):
     elif name == "none":
         assert not drawn.values.any()
     else:
-        assert 60 < drawn.values.sum() * (2 * drawn.half_extent / (side - 1) * 20.0) ** 2 < 140  # mm^2
+        area_mm2 = drawn.values.sum() * (2 * drawn.half_extent / (side - 1) * 20.0) ** 2
+        # On the sphere a circle around the logo's centre is shorter than in the plane.
+        spots_mm2 = sum(math.pi * r**2 * np.sinc(math.hypot(a, b) / 20.0 / math.pi) for a, b, r in SPOTS_MM)
+        low, high = {"seam": (49, 52), "marks": (0.97 * spots_mm2, 1.03 * spots_mm2)}.get(name, (60, 140))
+        assert low < area_mm2 < high

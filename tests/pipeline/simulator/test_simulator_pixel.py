@@ -27,6 +27,7 @@ IDEAL = Physics(
     floor=0.0,
     flicker_depth=0.0,
     flicker_per_us=0.0,
+    pause_us=0.0,
     focal_px=1646.0,
     width_px=1,
 )
