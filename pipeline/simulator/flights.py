@@ -13,7 +13,7 @@ from ..camera import Camera
 from ..errors import ParameterError
 from ..kernels.rotation import rotations
 from .motion import Trajectory, quaternion_of, trajectory, triple
-from .scene import Air, Background, Ball, Flight, Scene
+from .scene import DRAG_RANGE, LIFT_STD, PLUMB_STD_DEG, Air, Background, Ball, Flight, Scene, Vector3
 
 Floats = NDArray[np.float64]
 
@@ -46,12 +46,34 @@ def mounted(ball: int, spin_rps: Floats, phase_rad: float, toward: Floats) -> Fl
     return np.asarray(rotations(phase_rad * pole)[0] @ frame @ rotations([0.0, 0.0, in_plane])[0])
 
 
+def drawn_set_up(camera: Camera, seed: int) -> tuple[Air, Vector3]:
+    """Air and up direction (unit, camera frame) of a set-up drawn from a seed: as far from the defaults as real ones.
+
+    Camera.up is what the user believes; the plumb line is known to about a degree only.
+    """
+    random = np.random.default_rng([seed, 6])
+    scale = 1 + LIFT_STD * float(np.clip(random.standard_normal(), -2.5, 2.5))
+    plain = Air()
+    assert plain.lift_max is not None
+    air = replace(
+        plain,
+        drag=float(random.uniform(*DRAG_RANGE)),
+        magnus=scale * plain.magnus,
+        lift_max=scale * plain.lift_max,
+    )
+    up = np.array(camera.up)
+    lean = math.radians(PLUMB_STD_DEG) * random.standard_normal(3)
+    return air, triple(rotations(lean - (lean @ up) * up)[0] @ up)
+
+
 class FlightSampler:
     """Draws flights through the image."""
 
-    def __init__(self, random: np.random.Generator, camera: Camera, air: Air, spin_decay_hz: float) -> None:
+    def __init__(
+        self, random: np.random.Generator, camera: Camera, air: Air, up: Vector3, spin_decay_hz: float
+    ) -> None:
         self.random, self.camera, self.air, self.spin_decay_hz = random, camera, air, spin_decay_hz
-        self.up = np.array(camera.up, np.float64)
+        self.up = np.array(up, np.float64)
 
     def shot(
         self,

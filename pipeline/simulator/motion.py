@@ -143,18 +143,21 @@ def _flown(flight: Flight, ball: Ball, scene: Scene) -> Trajectory:
     area = math.pi * ball.radius_m**2
     pressure = 0.5 * air.density_kg_m3 * area / ball.mass_kg
     drag = pressure * air.drag  # 1/m, times -|v| v
-    lift = 2 * math.pi * (pressure * air.magnus * ball.radius_m)  # times spin x v
+    per_spin = 2 * math.pi * ball.radius_m  # from spin in rps to the speed of the surface
     count = max(int(np.ceil((flight.end_s - flight.start_s) / STEP_S)), 1)
     h = (flight.end_s - flight.start_s) / count
 
     def acceleration(v: Vector3, w: Vector3) -> Vector3:
         (vx, vy, vz), (wx, wy, wz) = v, w
-        brake = drag * math.sqrt(vx * vx + vy * vy + vz * vz)
-        return (
-            gx - brake * vx + lift * (wy * vz - wz * vy),
-            gy - brake * vy + lift * (wz * vx - wx * vz),
-            gz - brake * vz + lift * (wx * vy - wy * vx),
-        )
+        speed = math.sqrt(vx * vx + vy * vy + vz * vz)
+        brake = drag * speed
+        ax, ay, az = wy * vz - wz * vy, wz * vx - wx * vz, wx * vy - wy * vx
+        lift = pressure * per_spin * air.magnus  # times spin x v
+        across = math.sqrt(ax * ax + ay * ay + az * az)
+        if air.lift_max is not None and lift * across != 0:
+            rising = per_spin * air.magnus * across / (speed * speed)  # coefficient of a lift that does not saturate
+            lift *= air.lift_max * math.tanh(rising / air.lift_max) / rising
+        return gx - brake * vx + lift * ax, gy - brake * vy + lift * ay, gz - brake * vz + lift * az
 
     p, v, w = flight.position_m, flight.velocity_m_s, flight.spin_rps
     rows = [(p, v, w)]

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from ..camera import Camera
 from ..errors import ParameterError
 from ..kernels.rotation import rotations
-from .flights import HEADING_DEG, FlightSampler, mounted, vector
+from .flights import HEADING_DEG, FlightSampler, drawn_set_up, mounted, vector
 from .logos import Logo
 from .motion import quaternion_of, triple
-from .scene import Air, Arm, Background, Ball, Fixed, Flight, Light, Scene
+from .scene import Arm, Background, Ball, Fixed, Flight, Light, Scene
 from .simulation import default_camera
 
 Floats = NDArray[np.float64]
@@ -84,7 +84,7 @@ def flight(
     bounce: bool = False,
     background: Background | None = None,
     light: Light | None = None,
-    air: Air | None = None,
+    set_up: int | None = None,
     spin_decay_hz: float = 0.0,
     camera: Camera | None = None,
     seed: int = 0,
@@ -107,14 +107,17 @@ def flight(
         Whether another ball crosses, an arm swings at the border; both count as other objects.
     bounce : bool
         Whether the ball bounces off the table.
+    set_up : int or None
+        Number of the set-up: flights with the same one share air and plumb line; None = as the seed.
     spin_decay_hz : float
         The spin falls as exp(-spin_decay_hz t).
     camera : Camera or None
         None = the paper's.
     """
     random = np.random.default_rng([seed, 2])
-    camera, air = camera or default_camera(), air or Air()
-    draw = FlightSampler(random, camera, air, spin_decay_hz)
+    camera = camera or default_camera()
+    air, up = drawn_set_up(camera, seed if set_up is None else set_up)
+    draw = FlightSampler(random, camera, air, up, spin_decay_hz)
     shot, middle_s, heading = draw.shot(kind, magnitude_rps, speed_m_s, heading_deg, spin_rps, ball, bounce)
     balls = [Ball((shot,), logo=Logo.of(logo))]
     if second_ball:
@@ -130,7 +133,7 @@ def flight(
         background=background or Background(),
         light=light or Light(),
         air=air,
-        up=triple(np.array(camera.up)),
+        up=up,
         description=f"flight, {kind if spin_rps is None else 'given spin'}",
     )
 
@@ -169,7 +172,8 @@ def rally(
     if shots < 1:
         raise ParameterError(f"a rally of {shots} shots is out of range: 1 or more")
     slot = duration_s / shots
-    draw = FlightSampler(random, camera, Air(), 0.0)
+    air, up = drawn_set_up(camera, seed)
+    draw = FlightSampler(random, camera, air, up, 0.0)
     motions: list[Fixed | Flight] = []
     for number in range(shots):
         shot, _, _ = draw.shot(
@@ -189,7 +193,8 @@ def rally(
         arm=swinging_arm(random, camera) if arm else None,
         background=background or Background(),
         light=light or Light(),
-        up=triple(np.array(camera.up)),
+        air=air,
+        up=up,
         description=f"rally of {shots} shots",
     )
 
