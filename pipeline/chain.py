@@ -27,6 +27,7 @@ from .stage import Context, Stage
 
 if TYPE_CHECKING:
     from .spin.contrast.stage import ContrastResult
+    from .spin.trajectory.stage import TrajectoryResult
     from .stages.filter import FilterResult
     from .stages.flow import FlowResult
     from .stages.logo import LogoResult
@@ -96,6 +97,7 @@ class Tick(StageResults):
         triplet: ClassVar[MethodResult]
         normal_flow: ClassVar[MethodResult]
         contrast: ClassVar[ContrastResult]
+        trajectory: ClassVar[TrajectoryResult]
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):

@@ -13,13 +13,14 @@ from .camera import BallParameters, CameraParameters
 from .extensions import Registry
 from .parameters import ParameterGroup, ParameterSet
 from .results import SpinEstimate
-from .spin import contrast, normal_flow, triplet
+from .spin import contrast, normal_flow, trajectory, triplet
 from .stage import SpinMethod, Stage
 from .stages import filter, flow, logo, rate, surface, track
 
 if TYPE_CHECKING:
     from .spin.contrast.stage import ContrastParameters
     from .spin.parameters import SpinParameters
+    from .spin.trajectory.stage import TrajectoryParameters
 
 STAGES: Registry[Stage] = Registry("stage")
 for _stage in (
@@ -32,6 +33,7 @@ for _stage in (
     triplet.STAGE,
     normal_flow.STAGE,
     contrast.STAGE,
+    trajectory.STAGE,
 ):
     STAGES.register(_stage)
 
@@ -50,6 +52,7 @@ class Parameters(ParameterSet):
         flow: flow.FlowParameters
         spin: SpinParameters
         contrast: ContrastParameters
+        trajectory: TrajectoryParameters
 
     @classmethod
     def group_types(cls) -> dict[str, type[ParameterGroup]]:

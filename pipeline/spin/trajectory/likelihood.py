@@ -1,0 +1,207 @@
+"""Which spins bend a flight as it is bent: their likelihood, and the estimate that follows from it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...kernels.arrays import Floats
+from ...kernels.lift import lift_likelihood, spin_log_likelihoods
+from ...kernels.rotation import orthonormal_axes
+from ...results import ReadOnlyArrays
+from .motion import FittedMotion
+
+GRAVITY_M_S2, AIR_KG_M3, BALL_KG = 9.81, 1.2, 0.0027  # air at 20 degrees C; mass by the rules of the game
+# Lift coefficient of a fast spin, and the spin parameter |spin across the flight| radius / speed at which it saturates:
+# C_L = 0.26 tanh(S / 0.4), fitted on 203 real flights with measured spin (2.8-10 m/s; recordings of SpinDOE, 2023).
+LIFT_MAX, LIFT_SATURATION = 0.26, 0.4
+# The grid over the spins across the flight: directions and magnitudes, narrowed around the best ones so many times.
+DIRECTIONS, MAGNITUDES, NARROWINGS = 24, 16, 2
+# Spins less likely than the best by this logarithm (5 sigma) are left out when the grid is narrowed.
+NEGLIGIBLE = 12.5
+# Degrees of freedom of the nine accelerations less those of the spin across the flight.
+FREEDOM = 7
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SetUp(ReadOnlyArrays):
+    """What flights of one set-up share, each with its 1 sigma.
+
+    Attributes
+    ----------
+    up : (3,) float64
+        Unit vector, camera frame.
+    plumb_std_deg : float
+        Of `up` in each direction.
+    drag_per_m, drag_std_per_m : float
+        Drag is -drag_per_m |v| v.
+    lift_scale, lift_std : float
+        Lift over that of LIFT_MAX tanh(S / LIFT_SATURATION).
+    """
+
+    up: Floats
+    plumb_std_deg: float
+    drag_per_m: float
+    drag_std_per_m: float
+    lift_scale: float
+    lift_std: float
+
+    @property
+    def gravity_m_s2(self) -> Floats:
+        """(3,) float64, camera frame."""
+        return -GRAVITY_M_S2 * self.up
+
+    def air(self, ball_radius_m: float) -> tuple[float, float, float]:
+        """The air as the kernels take it, see `kernels.flight.lift_at`."""
+        pressure = 0.5 * AIR_KG_M3 * math.pi * ball_radius_m**2 / BALL_KG
+        return LIFT_MAX * pressure * self.lift_scale, LIFT_SATURATION, ball_radius_m
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlightLikelihood(ReadOnlyArrays):
+    """Likelihood of spins by the accelerations of one flight.
+
+    The likelihood of a lift (9,) at the nodes is -1/2 lift information lift + pull lift, with drag and plumb line
+    averaged over what is known of them.
+
+    Attributes
+    ----------
+    velocity_m_s : (3, 3) float64
+        At the nodes of the motion.
+    information : (9, 9) float64
+        Inverse covariance of the lift, (m/s^2)^-2.
+    pull : (9,) float64
+        Gradient of the logarithmic likelihood at no lift.
+    most : float
+        Logarithm of the likelihood of the lift that fits best, by whatever cause, over that of no lift.
+    air : (float, float, float)
+        See `SetUp.air`.
+    lift_std : float
+        1 sigma of the lift's scale.
+    """
+
+    velocity_m_s: Floats
+    information: Floats
+    pull: Floats
+    most: float
+    air: tuple[float, float, float]
+    lift_std: float
+
+    @classmethod
+    def of(cls, motion: FittedMotion, set_up: SetUp, ball_radius_m: float) -> FlightLikelihood:
+        """The likelihood by a motion; what the set-up leaves open is averaged over (Gaussian, in closed form)."""
+        velocity = motion.velocity_m_s
+        brake = -np.linalg.norm(velocity, axis=1)[:, None] * velocity
+        known = set_up.gravity_m_s2 + set_up.drag_per_m * brake - motion.acceleration_m_s2
+        open_terms = np.empty((3, 3, 3))
+        open_terms[:, :, 0] = set_up.drag_std_per_m * brake
+        lean = GRAVITY_M_S2 * math.radians(set_up.plumb_std_deg)
+        open_terms[:, :, 1:] = lean * np.array(orthonormal_axes(*set_up.up)[1:]).T
+        pull = np.empty(9)
+        information, most = lift_likelihood(
+            pull, motion.information, motion.gradient, open_terms.reshape(9, 3), known.ravel()
+        )
+        return cls(velocity, information, pull, most, set_up.air(ball_radius_m), set_up.lift_std)
+
+    def scaled(self, factor: float) -> FlightLikelihood:
+        """The likelihood with all variances of the circles this many times as large."""
+        return replace(self, information=self.information / factor, pull=self.pull / factor, most=self.most / factor)
+
+    def log_likelihood(self, spins_rps: ArrayLike) -> Floats:
+        """(k,) float64 natural logarithm of the likelihood of spins (k, 3) in the camera frame, rps; 0 for no spin.
+
+        No prior over spins is in it. What else the flight depends on (place, velocity, error of the radius, drag,
+        plumb line, scale of the lift) is averaged over its own prior. It is flat along the direction of flight, for
+        such a spin bends nothing, and in magnitude where lift saturates.
+        """
+        spins = np.ascontiguousarray(np.atleast_2d(np.asarray(spins_rps, np.float64)))
+        values = np.empty(len(spins))
+        spin_log_likelihoods(values, spins, self.velocity_m_s, self.information, self.pull, self.air, self.lift_std)
+        return values
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SpinAcross(ReadOnlyArrays):
+    """Spin across the flight, as far as the bend tells it; any magnitude and any direction are as likely beforehand.
+
+    Attributes
+    ----------
+    axis : (3,) float64
+        Unit vector across the flight, camera frame.
+    along : (3,) float64
+        Unit vector of the flight.
+    magnitude_rps, magnitude_std_rps : float
+        Mean and standard deviation.
+    axis_std_rad : float
+        Of the direction, within the plane across the flight.
+    least_rps, most_rps : float
+        Range in which the magnitude is 2.5 % likely to be below, and above.
+    misfit : float
+        Chi-squared per degree of freedom of the bend by the best spin; variances are that much larger where it is
+        above 1.
+    """
+
+    axis: Floats
+    along: Floats
+    magnitude_rps: float
+    magnitude_std_rps: float
+    axis_std_rad: float
+    least_rps: float
+    most_rps: float
+    misfit: float
+
+
+def spin_across(likelihood: FlightLikelihood, max_spin_rps: float) -> SpinAcross:
+    """The spin across the flight of up to max_spin_rps, from its likelihood on a grid."""
+    velocity = likelihood.velocity_m_s[1]
+    basis = np.array(orthonormal_axes(*(velocity / math.sqrt(velocity @ velocity))))
+    low, high, start, width = 0.0, max_spin_rps, 0.0, 2 * math.pi
+    for narrowing in range(NARROWINGS + 1):
+        step, turn = (high - low) / MAGNITUDES, width / DIRECTIONS
+        magnitudes, angles = low + step * MAGNITUDE_CELLS, start + turn * DIRECTION_CELLS
+        cosines, sines = np.cos(angles), np.sin(angles)
+        spins = (cosines[:, None] * basis[1] + sines[:, None] * basis[2])[:, None] * magnitudes[:, None]
+        values = likelihood.log_likelihood(spins.reshape(-1, 3)).reshape(DIRECTIONS, MAGNITUDES)
+        best = float(values.max())
+        misfit = max(2 * (likelihood.most - best) / FREEDOM, 0.0)
+        # The usual scale factor: errors as large as makes the misfit what chance would make it.
+        weights = (values - best) / max(misfit, 1.0)
+        if narrowing == NARROWINGS:
+            break
+        likely = weights >= -NEGLIGIBLE
+        # One cell more on each side: the best spin may lie between the cells.
+        columns = np.flatnonzero(likely.any(axis=0))
+        top = high
+        low, high = max(magnitudes[columns[0]] - 1.5 * step, 0.0), min(magnitudes[columns[-1]] + 1.5 * step, top)
+        start, width = _arc(angles[likely.any(axis=1)], turn)
+    np.exp(weights, out=weights)
+    of_angle, of_magnitude = weights.sum(axis=1) / weights.sum(), weights.sum(axis=0) / weights.sum()
+    cosine, sine = float(of_angle @ cosines), float(of_angle @ sines)
+    length = min(math.hypot(cosine, sine), 1.0)
+    middle, summed = float(of_magnitude @ magnitudes), np.cumsum(of_magnitude)
+    return SpinAcross(
+        (cosine * basis[1] + sine * basis[2]) / length,
+        basis[0],
+        middle,
+        math.sqrt(float(of_magnitude @ (magnitudes - middle) ** 2) + step**2 / 12),
+        math.sqrt(-2 * math.log(length) + turn**2 / 12) if length > 1e-6 else math.pi,
+        float(magnitudes[np.searchsorted(summed, 0.025)]) - step / 2,
+        float(magnitudes[np.searchsorted(summed, 0.975)]) + step / 2,
+        misfit,
+    )
+
+
+MAGNITUDE_CELLS, DIRECTION_CELLS = np.arange(MAGNITUDES) + 0.5, np.arange(DIRECTIONS) + 0.5
+
+
+def _arc(angles: Floats, step: float) -> tuple[float, float]:
+    """(begin, width) of the shortest arc that holds these angles (rising, step apart or more) and a cell more."""
+    gaps = np.append(angles[1:], angles[0] + 2 * math.pi) - angles
+    widest = int(np.argmax(gaps))
+    width = 2 * math.pi - float(gaps[widest]) + 3 * step
+    if width >= 2 * math.pi:
+        return 0.0, 2 * math.pi
+    return float(angles[(widest + 1) % len(angles)]) - 1.5 * step, width
