@@ -43,8 +43,8 @@ def lift_likelihood(
     gain = seen @ inverse_matrix(open_terms.T @ seen + np.eye(open_terms.shape[1]))
     left = information - gain @ seen.T
     pull[:] = gradient - gain @ (open_terms.T @ gradient) - left @ known
-    most = 0.5 * (pull @ (inverse_matrix(left + np.eye(9) / ANY_LIFT_M_S2**2) @ pull))
-    return left, most
+    lift = inverse_matrix(left + np.eye(9) / ANY_LIFT_M_S2**2) @ pull
+    return left, 0.5 * float(pull @ lift)
 
 
 @njit(cache=True, nogil=True)

@@ -89,8 +89,8 @@ class Air:
     lift_max: float | None = 0.26
 
 
-# Scatter of the air from one set-up to another: drag of 0.125 to 0.19 /m (`Air`), lift with 12 % of 1 sigma (temperature,
-# surface and wear of the balls), a plumb line that is set to 1 degree in each direction (a spirit level on a tripod).
+# Scatter from one set-up to another: drag of 0.125 to 0.19 /m (`Air`), 12 % of the lift (1 sigma; temperature, surface
+# and wear of the balls), a plumb line that is set to 1 degree in each direction (a spirit level on a tripod).
 DRAG_RANGE, LIFT_STD, PLUMB_STD_DEG = (0.448, 0.68), 0.12, 1.0
 
 

@@ -125,7 +125,7 @@ class FlightLikelihood(ReadOnlyArrays):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpinAcross(ReadOnlyArrays):
-    """Spin across the flight, as far as the bend tells it; any magnitude and any direction are as likely beforehand.
+    """Spin across the flight, where beforehand any direction and any order of magnitude are as likely.
 
     Attributes
     ----------
@@ -176,8 +176,8 @@ def spin_across(likelihood: FlightLikelihood, max_spin_rps: float) -> SpinAcross
         columns = np.flatnonzero(likely.any(axis=0))
         top = high
         low, high = max(magnitudes[columns[0]] - 1.5 * step, 0.0), min(magnitudes[columns[-1]] + 1.5 * step, top)
-        start, width = _arc(angles[likely.any(axis=1)], turn)
-    np.exp(weights, out=weights)
+        start, width = _arc(np.compress(likely.any(axis=1), angles), turn)
+    weights = np.exp(weights) / magnitudes  # a prior that is flat in the logarithm of the magnitude
     of_angle, of_magnitude = weights.sum(axis=1) / weights.sum(), weights.sum(axis=0) / weights.sum()
     cosine, sine = float(of_angle @ cosines), float(of_angle @ sines)
     length = min(math.hypot(cosine, sine), 1.0)

@@ -98,7 +98,7 @@ def fit_flight(
     shared : float
         Number of circles in which an event is seen: so much less they tell than as many independent ones.
     """
-    centres_m = camera.ball_centre_m(*circles_px.T, ball_radius_m)
+    centres_m = camera.ball_centre_m(circles_px[:, 0], circles_px[:, 1], circles_px[:, 2], ball_radius_m)
     places = camera.focal_px / centres_m[:, 2:] * [1.0, 1.0, ball_radius_m]
     places[:, :2] *= centres_m[:, :2]
     reference_us, half_s = float(t_us[0] + t_us[-1]) / 2, float(t_us[-1] - t_us[0]) * 0.5e-6
