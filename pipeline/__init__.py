@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .api import calibrate_flights as calibrate_flights
     from .api import estimate as estimate
     from .camera import Camera as Camera
     from .errors import ParameterError as ParameterError
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
 # Names of the API by the module that defines them.
 _MODULES = {
+    "calibrate_flights": "api",
     "estimate": "api",
     "Camera": "camera",
     "ParameterError": "errors",

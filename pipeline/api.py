@@ -1,8 +1,8 @@
-"""Entry point for scripts and notebooks: estimate the spin of the shots of a recording."""
+"""Entry points for scripts and notebooks: the spin of the shots of a recording, the calibration of a set-up."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from .errors import ParameterError
 from .events import EventBatch
+from .flight_calibration import FlightCalibration, flight_calibration
 from .recordings.in_memory import RecordingInMemory
 from .registry import Parameters
 from .session import AnyRecording, Choices, Progress, Result, Session, check_method
@@ -89,6 +90,40 @@ def estimate(
         session.parameters = parameters
     session.place_fixed_ball(fixed_ball)
     return session.estimate(method, on_progress)
+
+
+def calibrate_flights(
+    recordings: Iterable[AnyRecording | SimulatedRecording | EventBatch | str | Path],
+    parameters: Parameters | Mapping[str, Any] | Sequence[str] | None = None,
+    **options: Any,
+) -> FlightCalibration:
+    """Find what the flights of one set-up share: lift, drag and plumb line.
+
+    Parameters
+    ----------
+    recordings : iterable
+        Recordings of one set-up with shots whose logo is seen well; others do no harm.
+    parameters, **options
+        As `estimate` takes them.
+
+    Returns
+    -------
+    FlightCalibration
+        Its `values` are what `estimate` takes as parameters; `write` makes a file for `--flight-calibration`.
+
+    Raises
+    ------
+    RecordingError
+        When a recording cannot be read, or no shot's spin is told by its logo.
+    ParameterError
+        See `estimate`.
+
+    Examples
+    --------
+    >>> calibration = calibrate_flights(["top.raw", "back.raw", "side.raw"])  # doctest: +SKIP
+    >>> estimate("side.raw", calibration.values).shots[0].estimates["trajectory"]  # doctest: +SKIP
+    """
+    return flight_calibration(estimate(recording, parameters, **options) for recording in recordings)
 
 
 def _in_memory(events: EventBatch, sensor_px: tuple[int, int] | None) -> RecordingInMemory:

@@ -88,9 +88,10 @@ def needed_stages(targets: Iterable[str]) -> tuple[Stage, ...]:
 def trusted_method(estimates: Mapping[str, SpinEstimate]) -> str | None:
     """Name of the method whose estimate the program itself trusts; None where it trusts none.
 
-    The methods are asked from the last registered to the first: the most accurate one comes last.
+    The methods are asked from the last registered to the first, for the most accurate one comes last, and then those
+    that are a last resort.
     """
-    for method in reversed(methods()):
+    for method in sorted(reversed(methods()), key=lambda method: method.is_last_resort):
         if method.name in estimates and method.is_trusted(estimates):
             return method.name
     return None

@@ -49,6 +49,8 @@ class Choices:
         Circle of a ball spinner's ball.
     sensor_px : (int, int), optional
         Width and height of the sensor.
+    flight_calibration : str or Path, optional
+        TOML file with the calibration of the set-up's flights; it goes before the preset.
     """
 
     preset: str | Path | None = None
@@ -56,6 +58,7 @@ class Choices:
     window_us: tuple[int, int] | None = None
     fixed_ball: tuple[float, float, float] | str | None = None
     sensor_px: tuple[int, int] | None = None
+    flight_calibration: str | Path | None = None
 
     @property
     def for_others(self) -> Choices:
@@ -63,8 +66,11 @@ class Choices:
         return dataclasses.replace(self, window_us=None, fixed_ball=None)
 
     def parameters(self, on_rename: Callable[[str], None] | None = None) -> Parameters:
-        """The preset's parameters, changed by the assignments."""
-        return preset(self.preset or "default", on_rename).with_assignments(self.assignments, on_rename)
+        """The preset's parameters, changed by the flights' calibration and the assignments."""
+        parameters = preset(self.preset or "default", on_rename)
+        if self.flight_calibration is not None:
+            parameters = preset(self.flight_calibration, on_rename, parameters)
+        return parameters.with_assignments(self.assignments, on_rename)
 
 
 @dataclass(slots=True)
@@ -341,7 +347,7 @@ def _with_attributes(parameters: Parameters, attributes: dict[str, Any], choices
         for name in CameraParameters.tunables()
         if f"camera.{name}" in attributes and f"camera.{name}" not in chosen
     }
-    if choices.preset:
+    if choices.preset or choices.flight_calibration:
         default = CameraParameters()
         stated = {k: v for k, v in stated.items() if getattr(parameters.camera, k) == getattr(default, k)}
     return parameters.with_groups(camera=parameters.camera.with_values(stated))

@@ -15,6 +15,7 @@ from .chain import Tick
 from .errors import ParameterError
 from .registry import trusted_method
 from .results import SpinEstimate, Truth
+from .spin.trajectory.motion import FittedMotion
 from .stages.track import BallTrack
 
 Floats = NDArray[np.float64]
@@ -42,6 +43,8 @@ class Shot:
         The spin by method, from the whole shot.
     best : str, optional
         The method that is trusted, None where none is.
+    motion : FittedMotion, optional
+        The flight as fitted by the trajectory method; None where that was not run or found none.
     """
 
     start_us: int
@@ -53,6 +56,7 @@ class Shot:
     logo_events: int | None
     estimates: dict[str, SpinEstimate]
     best: str | None
+    motion: FittedMotion | None = None
 
     def positions_m(self, camera: Camera, ball_radius_m: float) -> Floats:
         """(n, 3) float64 centres of the ball in the camera frame, from silhouettes, metres."""
@@ -137,7 +141,9 @@ class ShotLog:
         for shot, ball in balls.items():
             logo = ball.results.get("logo")
             logo_events = None if logo is None else len(logo.events)
-            row = _Row(tick.packet.start_us, tick.packet.end_us, ball.track, logo_events, ball.estimates)
+            trajectory = ball.results.get("trajectory")
+            motion = None if trajectory is None else trajectory.motion
+            row = _Row(tick.packet.start_us, tick.packet.end_us, ball.track, logo_events, ball.estimates, motion)
             self._flying.setdefault(shot, []).append(row)
         if not balls and tick.track.reason:
             self._last_reason = tick.track.reason
@@ -172,6 +178,7 @@ class _Row:
     track: BallTrack
     logo_events: int | None
     estimates: dict[str, SpinEstimate]
+    motion: FittedMotion | None
 
 
 def _shot(rows: list[_Row]) -> Shot:
@@ -186,4 +193,5 @@ def _shot(rows: list[_Row]) -> Shot:
         logo_events=sum(events) if events else None,
         estimates=rows[-1].estimates,
         best=trusted_method(rows[-1].estimates),
+        motion=rows[-1].motion,
     )

@@ -103,7 +103,10 @@ class SpinMethod(Stage):
         Red, green and blue in every plot, 0..255.
     is_trusted : callable
         `is_trusted(estimates) -> bool`: whether the program itself trusts this method's estimate, given all methods'.
+    is_last_resort : bool
+        Whether its estimate is taken only where that of no other method is trusted.
     """
 
     colour: tuple[int, int, int]
     is_trusted: Callable[[Mapping[str, SpinEstimate]], bool] = never_trusted
+    is_last_resort: bool = False

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import click
 
-from spinscope.pipeline.errors import SpinscopeError
+from spinscope.pipeline.errors import ParameterError, SpinscopeError
 from spinscope.pipeline.files import check_writable
+from spinscope.pipeline.flight_calibration import doubt_about_up, flight_calibration
 from spinscope.pipeline.registry import methods
-from spinscope.pipeline.session import Choices, Progress, Session
+from spinscope.pipeline.session import Choices, Progress, Result, Session
 
 from ..terminal import ProgressBar, note
 from .options import RECORDING, ListingCommand, RegisteredName, session_options, write_text
@@ -39,14 +42,27 @@ def _methods() -> dict[str, str]:
     show_default=True,
     help="Which estimates of the spin to report; only what they need is run.",
 )
+@click.option(
+    "--calibrate-flight",
+    "calibration",
+    type=click.Path(path_type=Path),
+    metavar="OUT.toml",
+    help="Take the recordings as one set-up: find its lift, drag and plumb line from the shots whose logo is seen well, "
+    "write them, and answer all shots with them.",
+)
 @session_options
-def analyze(recordings: tuple[Path, ...], output: str | None, method: str, choices: Choices) -> None:
+def analyze(
+    recordings: tuple[Path, ...], output: str | None, method: str, calibration: Path | None, choices: Choices
+) -> None:
     """Find the shots of recordings and estimate their spin.
 
     In the table * marks the estimate that the program itself trusts, +- is 1 sigma, axes are in the camera frame.
     """
     if output is not None and output != "-":
         check_writable(Path(output), "JSON")
+    if calibration is not None:
+        calibrate_to_file(recordings, choices, calibration)
+        choices = dataclasses.replace(choices, flight_calibration=calibration)
     reports: list[dict[str, Any]] = []
     for recording in recordings:
         try:
@@ -63,6 +79,26 @@ def analyze(recordings: tuple[Path, ...], output: str | None, method: str, choic
         write_text(output, "".join(json.dumps(report, allow_nan=False) + "\n" for report in reports))
     if any("error" in report for report in reports):
         sys.exit(2)
+
+
+def calibrate_to_file(recordings: tuple[Path, ...], choices: Choices, out: Path) -> None:
+    """Calibrate the set-up by the flights of those recordings that can be read; raises SpinscopeError."""
+    if out.suffix != ".toml":
+        raise ParameterError(f"a calibration is a TOML file: give a name that ends with .toml instead of {out}")
+    check_writable(out, "calibration")
+    calibration = flight_calibration(_results(recordings, choices))
+    calibration.write(out)
+    note(f"calibrated: {calibration}: {out}")
+
+
+def _results(recordings: tuple[Path, ...], choices: Choices) -> Iterator[Result]:
+    """The results of the recordings that can be read; the others are reported when they are answered."""
+    for recording in recordings:
+        try:
+            with ProgressBar() as bar:
+                yield Session.open(recording, choices, bar).estimate(on_progress=bar)
+        except SpinscopeError:
+            continue
 
 
 def analyze_recording(
@@ -86,7 +122,9 @@ def analyze_recording(
     begin = time.perf_counter()
     session = Session.open(path, choices, on_progress)
     load_seconds = session.load_kernels(method) if cold else 0.0
-    report = session.estimate(method, on_progress).to_dict()
+    result = session.estimate(method, on_progress)
+    report = result.to_dict()
+    report["warnings"] = [*report["warnings"], *filter(None, [doubt_about_up(result)])]
     report["recording"]["path"] = str(path)
     report["seconds"] |= {"load": load_seconds, "total": time.perf_counter() - begin}
     return report

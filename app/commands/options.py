@@ -121,6 +121,11 @@ def session_options(command: Callable[..., None]) -> Callable[..., None]:
             type=FixedBall(),
             help="The ball stays in place (ball spinner): its circle, or auto to find it.",
         ),
+        click.option(
+            "--flight-calibration",
+            metavar="FILE.toml",
+            help="Lift, drag and plumb line of the set-up, as `analyze --calibrate-flight` wrote them.",
+        ),
         sensor_option,
     )
 
@@ -129,12 +134,13 @@ def session_options(command: Callable[..., None]) -> Callable[..., None]:
         assignments: tuple[str, ...],
         window: tuple[int, int] | None,
         fixed_ball: tuple[float, float, float] | str | None,
+        flight_calibration: str | None,
         sensor: tuple[int, int] | None,
         **rest: Any,
     ) -> None:
         if window and window[0] >= window[1]:
             raise click.UsageError(f"--window {window[0]} {window[1]} is empty: START_US must be below END_US")
-        command(choices=Choices(preset, assignments, window, fixed_ball, sensor), **rest)
+        command(choices=Choices(preset, assignments, window, fixed_ball, sensor, flight_calibration), **rest)
 
     with_choices.__name__, with_choices.__doc__ = command.__name__, command.__doc__
     decorated: Callable[..., None] = with_choices

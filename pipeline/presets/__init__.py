@@ -17,7 +17,9 @@ def preset_names() -> tuple[str, ...]:
     return tuple(sorted(file.stem for file in FOLDER.glob("*.toml")))
 
 
-def preset(name: str | Path, on_rename: Callable[[str], None] | None = None) -> Parameters:
+def preset(
+    name: str | Path, on_rename: Callable[[str], None] | None = None, base: Parameters | None = None
+) -> Parameters:
     """Parameters of a preset.
 
     Parameters
@@ -26,6 +28,8 @@ def preset(name: str | Path, on_rename: Callable[[str], None] | None = None) -> 
         `default`, `paper`, or the path of a TOML file of [group] tables.
     on_rename : callable, optional
         Told of parameters under a former name, one sentence each.
+    base : Parameters, optional
+        What holds for values that the preset does not state; the defaults if not given.
 
     Raises
     ------
@@ -40,4 +44,4 @@ def preset(name: str | Path, on_rename: Callable[[str], None] | None = None) -> 
         raise ParameterError(f"there is no preset {str(name)!r}: use {known} or the path of a .toml file") from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise ParameterError(f"the preset cannot be read ({error}): {path}") from None
-    return Parameters().with_values(values, on_rename)
+    return (base or Parameters()).with_values(values, on_rename)

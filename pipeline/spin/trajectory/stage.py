@@ -209,4 +209,5 @@ STAGE = SpinMethod(
     absent=absent,
     colour=(171, 71, 188),
     is_trusted=is_trusted,
+    is_last_resort=True,
 )
