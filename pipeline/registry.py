@@ -91,7 +91,8 @@ def trusted_method(estimates: Mapping[str, SpinEstimate]) -> str | None:
     The methods are asked from the last registered to the first, for the most accurate one comes last, and then those
     that are a last resort.
     """
-    for method in sorted(reversed(methods()), key=lambda method: method.is_last_resort):
+    from_the_last = methods()[::-1]
+    for method in sorted(from_the_last, key=lambda method: method.is_last_resort):
         if method.name in estimates and method.is_trusted(estimates):
             return method.name
     return None

@@ -47,8 +47,8 @@ def _methods() -> dict[str, str]:
     "calibration",
     type=click.Path(path_type=Path),
     metavar="OUT.toml",
-    help="Take the recordings as one set-up: find its lift, drag and plumb line from the shots whose logo is seen well, "
-    "write them, and answer all shots with them.",
+    help="Take the recordings as one set-up: find its lift, drag and plumb line from the shots whose logo is seen "
+    "well, write them, and answer all shots with them.",
 )
 @session_options
 def analyze(
