@@ -9,10 +9,13 @@ from numba import njit
 
 from .arrays import Floats
 from .moving_circle import inverse_matrix
+from .rotation import Vector
 
 # Lift that no ball shows: 60 m/s^2 (150 rps at 30 m/s: 65). It keeps the largest likelihood finite where the circles
 # say nothing.
 ANY_LIFT_M_S2 = 60.0
+# The grid over spins is narrowed so many times, to those not less likely than the best by this logarithm (5 sigma).
+NARROWINGS, NEGLIGIBLE = 2, 12.5
 
 
 @njit(cache=True, nogil=True)
@@ -98,3 +101,74 @@ def spin_log_likelihoods(
         values[k] = (
             linear - 0.5 * quadratic + 0.5 * variance * (linear - quadratic) ** 2 / spread - 0.5 * math.log(spread)
         )
+
+
+@njit(cache=True, nogil=True)
+def spin_grid(
+    weights: Floats,
+    across: tuple[Vector, Vector],
+    likelihood: tuple[Floats, Floats, Floats, float, tuple[float, float, float], float],
+    max_spin_rps: float,
+    freedom: float,
+) -> tuple[float, float, float, float, float]:
+    """Write the likelihood of spins across a flight, on a grid narrowed around the best ones, relative to the best.
+
+    Parameters
+    ----------
+    weights : (directions, magnitudes) float64
+        Written.
+    across : ((float, float, float), (float, float, float))
+        Orthonormal axes across the flight; direction a is cos(a) times the first plus sin(a) times the second.
+    likelihood : tuple
+        Velocities (3, 3), information (9, 9), pull (9,), logarithm of the largest likelihood, air, lift_std: see
+        `spin_log_likelihoods` and `lift_likelihood`.
+    max_spin_rps : float
+        The grid begins with all directions and magnitudes up to this.
+    freedom : float
+        Degrees of freedom of what the best spin leaves unexplained. Where its chi-squared is larger, all logarithms
+        are made smaller by as much: the usual scale factor of errors.
+
+    Returns
+    -------
+    (float, float, float, float, float)
+        Begin and step of the magnitudes (rps), begin and step of the directions (rad), of which the weights stand in
+        the middle; chi-squared per degree of freedom.
+    """
+    velocity_m_s, information, pull, most, air, lift_std = likelihood
+    directions, magnitudes = weights.shape
+    spins, values = np.empty((magnitudes, 3)), np.empty(magnitudes)
+    low, high, begin, width = 0.0, max_spin_rps, 0.0, 2.0 * math.pi
+    step, turn, misfit = 0.0, 0.0, 0.0
+    for narrowing in range(NARROWINGS + 1):
+        step, turn = (high - low) / magnitudes, width / directions
+        for a in range(directions):
+            cosine, sine = math.cos(begin + (a + 0.5) * turn), math.sin(begin + (a + 0.5) * turn)
+            for m in range(magnitudes):
+                for c in range(3):
+                    spins[m, c] = (low + (m + 0.5) * step) * (cosine * across[0][c] + sine * across[1][c])
+            spin_log_likelihoods(values, spins, velocity_m_s, information, pull, air, lift_std)
+            weights[a] = values
+        best = weights.max()
+        misfit = max(2.0 * (most - best) / freedom, 0.0)
+        weights[:] = (weights - best) / max(misfit, 1.0)
+        if narrowing == NARROWINGS:
+            break
+        # One cell more on each side: the best spin may lie between the cells. The directions are those outside the
+        # widest gap of the whole circle, which has `around` cells.
+        around = math.ceil(2.0 * math.pi / turn - 1e-9)
+        first, last, since, widest, after = magnitudes, 0, -1, 0, 0
+        for a in range(around + directions):
+            is_likely = False
+            if a % around < directions:
+                for m in range(magnitudes):
+                    if weights[a % around, m] >= -NEGLIGIBLE:
+                        is_likely, first, last = True, min(first, m), max(last, m)
+            if is_likely:
+                if since >= 0 and a - since > widest:
+                    widest, after = a - since, a % around
+                since = a
+        low, high = max(low + (first - 1) * step, 0.0), min(low + (last + 2) * step, high)
+        begin += (after - 1) * turn
+        width = min((around - widest + 3) * turn, 2.0 * math.pi)
+    weights[:] = np.exp(weights)
+    return low, step, begin, turn, misfit

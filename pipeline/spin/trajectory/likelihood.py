@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...kernels.arrays import Floats
-from ...kernels.lift import lift_likelihood, spin_log_likelihoods
+from ...kernels.lift import lift_likelihood, spin_grid, spin_log_likelihoods
 from ...kernels.rotation import orthonormal_axes
 from ...results import ReadOnlyArrays
 from .motion import FittedMotion
@@ -18,12 +18,11 @@ GRAVITY_M_S2, AIR_KG_M3, BALL_KG = 9.81, 1.2, 0.0027  # air at 20 degrees C; mas
 # Lift coefficient of a fast spin, and the spin parameter |spin across the flight| radius / speed at which it saturates:
 # C_L = 0.26 tanh(S / 0.4), fitted on 203 real flights with measured spin (2.8-10 m/s; recordings of SpinDOE, 2023).
 LIFT_MAX, LIFT_SATURATION = 0.26, 0.4
-# The grid over the spins across the flight: directions and magnitudes, narrowed around the best ones so many times.
-DIRECTIONS, MAGNITUDES, NARROWINGS = 24, 16, 2
-# Spins less likely than the best by this logarithm (5 sigma) are left out when the grid is narrowed.
-NEGLIGIBLE = 12.5
+# The grid over the spins across the flight: the middles of its cells, in cells.
+DIRECTIONS, MAGNITUDES = 20, 16
+DIRECTION_CELLS, MAGNITUDE_CELLS = np.arange(DIRECTIONS) + 0.5, np.arange(MAGNITUDES) + 0.5
 # Degrees of freedom of the nine accelerations less those of the spin across the flight.
-FREEDOM = 7
+FREEDOM = 7.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -157,34 +156,32 @@ class SpinAcross(ReadOnlyArrays):
 def spin_across(likelihood: FlightLikelihood, max_spin_rps: float) -> SpinAcross:
     """The spin across the flight of up to max_spin_rps, from its likelihood on a grid."""
     velocity = likelihood.velocity_m_s[1]
-    basis = np.array(orthonormal_axes(*(velocity / math.sqrt(velocity @ velocity))))
-    low, high, start, width = 0.0, max_spin_rps, 0.0, 2 * math.pi
-    for narrowing in range(NARROWINGS + 1):
-        step, turn = (high - low) / MAGNITUDES, width / DIRECTIONS
-        magnitudes, angles = low + step * MAGNITUDE_CELLS, start + turn * DIRECTION_CELLS
-        cosines, sines = np.cos(angles), np.sin(angles)
-        spins = (cosines[:, None] * basis[1] + sines[:, None] * basis[2])[:, None] * magnitudes[:, None]
-        values = likelihood.log_likelihood(spins.reshape(-1, 3)).reshape(DIRECTIONS, MAGNITUDES)
-        best = float(values.max())
-        misfit = max(2 * (likelihood.most - best) / FREEDOM, 0.0)
-        # The usual scale factor: errors as large as makes the misfit what chance would make it.
-        weights = (values - best) / max(misfit, 1.0)
-        if narrowing == NARROWINGS:
-            break
-        likely = weights >= -NEGLIGIBLE
-        # One cell more on each side: the best spin may lie between the cells.
-        columns = np.flatnonzero(likely.any(axis=0))
-        top = high
-        low, high = max(magnitudes[columns[0]] - 1.5 * step, 0.0), min(magnitudes[columns[-1]] + 1.5 * step, top)
-        start, width = _arc(np.compress(likely.any(axis=1), angles), turn)
-    weights = np.exp(weights) / magnitudes  # a prior that is flat in the logarithm of the magnitude
-    of_angle, of_magnitude = weights.sum(axis=1) / weights.sum(), weights.sum(axis=0) / weights.sum()
-    cosine, sine = float(of_angle @ cosines), float(of_angle @ sines)
+    along, first, second = orthonormal_axes(*(velocity / math.sqrt(velocity @ velocity)))
+    weights = np.empty((DIRECTIONS, MAGNITUDES))
+    low, step, begin, turn, misfit = spin_grid(
+        weights,
+        (first, second),
+        (
+            likelihood.velocity_m_s,
+            likelihood.information,
+            likelihood.pull,
+            likelihood.most,
+            likelihood.air,
+            likelihood.lift_std,
+        ),
+        max_spin_rps,
+        FREEDOM,
+    )
+    magnitudes, angles = low + step * MAGNITUDE_CELLS, begin + turn * DIRECTION_CELLS
+    weights /= magnitudes  # a prior that is flat in the logarithm of the magnitude
+    weights /= weights.sum()
+    of_angle, of_magnitude = weights.sum(axis=1), weights.sum(axis=0)
+    cosine, sine = float(of_angle @ np.cos(angles)), float(of_angle @ np.sin(angles))
     length = min(math.hypot(cosine, sine), 1.0)
     middle, summed = float(of_magnitude @ magnitudes), np.cumsum(of_magnitude)
     return SpinAcross(
-        (cosine * basis[1] + sine * basis[2]) / length,
-        basis[0],
+        (cosine * np.array(first) + sine * np.array(second)) / length,
+        np.array(along),
         middle,
         math.sqrt(float(of_magnitude @ (magnitudes - middle) ** 2) + step**2 / 12),
         math.sqrt(-2 * math.log(length) + turn**2 / 12) if length > 1e-6 else math.pi,
@@ -192,16 +189,3 @@ def spin_across(likelihood: FlightLikelihood, max_spin_rps: float) -> SpinAcross
         float(magnitudes[np.searchsorted(summed, 0.975)]) + step / 2,
         misfit,
     )
-
-
-MAGNITUDE_CELLS, DIRECTION_CELLS = np.arange(MAGNITUDES) + 0.5, np.arange(DIRECTIONS) + 0.5
-
-
-def _arc(angles: Floats, step: float) -> tuple[float, float]:
-    """(begin, width) of the shortest arc that holds these angles (rising, step apart or more) and a cell more."""
-    gaps = np.append(angles[1:], angles[0] + 2 * math.pi) - angles
-    widest = int(np.argmax(gaps))
-    width = 2 * math.pi - float(gaps[widest]) + 3 * step
-    if width >= 2 * math.pi:
-        return 0.0, 2 * math.pi
-    return float(angles[(widest + 1) % len(angles)]) - 1.5 * step, width
