@@ -14,8 +14,9 @@ from .rotation import Vector
 # Lift that no ball shows: 60 m/s^2 (150 rps at 30 m/s: 65). It keeps the largest likelihood finite where the circles
 # say nothing.
 ANY_LIFT_M_S2 = 60.0
-# The grid over spins is narrowed so many times, to those not less likely than the best by this logarithm (5 sigma).
-NARROWINGS, NEGLIGIBLE = 2, 12.5
+# The grid over spins is narrowed so many times, to those not less likely than the best by this logarithm: 7 sigma, and
+# 2.5 sigma where the errors are scaled by 8. It begins at this share of the fastest spin, which bends no flight.
+NARROWINGS, NEGLIGIBLE, SLOWEST = 3, 25.0, 0.01
 
 
 @njit(cache=True, nogil=True)
@@ -123,7 +124,7 @@ def spin_grid(
         Velocities (3, 3), information (9, 9), pull (9,), logarithm of the largest likelihood, air, lift_std: see
         `spin_log_likelihoods` and `lift_likelihood`.
     max_spin_rps : float
-        The grid begins with all directions and magnitudes up to this.
+        The grid begins with all directions and magnitudes up to this, equally spaced in the logarithm.
     freedom : float
         Degrees of freedom of what the best spin leaves unexplained. Where its chi-squared is larger, all logarithms
         are made smaller by as much: the usual scale factor of errors.
@@ -131,26 +132,28 @@ def spin_grid(
     Returns
     -------
     (float, float, float, float, float)
-        Begin and step of the magnitudes (rps), begin and step of the directions (rad), of which the weights stand in
-        the middle; chi-squared per degree of freedom.
+        Begin and step of the magnitudes (natural logarithm of rps), begin and step of the directions (rad), of which
+        the weights stand in the middle; chi-squared per degree of freedom.
     """
     velocity_m_s, information, pull, most, air, lift_std = likelihood
     directions, magnitudes = weights.shape
     spins, values = np.empty((magnitudes, 3)), np.empty(magnitudes)
-    low, high, begin, width = 0.0, max_spin_rps, 0.0, 2.0 * math.pi
+    low, high = math.log(SLOWEST * max_spin_rps), math.log(max_spin_rps)
+    begin, width = 0.0, 2.0 * math.pi
     step, turn, misfit = 0.0, 0.0, 0.0
     for narrowing in range(NARROWINGS + 1):
         step, turn = (high - low) / magnitudes, width / directions
         for a in range(directions):
             cosine, sine = math.cos(begin + (a + 0.5) * turn), math.sin(begin + (a + 0.5) * turn)
             for m in range(magnitudes):
+                magnitude = math.exp(low + (m + 0.5) * step)
                 for c in range(3):
-                    spins[m, c] = (low + (m + 0.5) * step) * (cosine * across[0][c] + sine * across[1][c])
+                    spins[m, c] = magnitude * (cosine * across[0][c] + sine * across[1][c])
             spin_log_likelihoods(values, spins, velocity_m_s, information, pull, air, lift_std)
             weights[a] = values
         best = weights.max()
+        weights -= best
         misfit = max(2.0 * (most - best) / freedom, 0.0)
-        weights[:] = (weights - best) / max(misfit, 1.0)
         if narrowing == NARROWINGS:
             break
         # One cell more on each side: the best spin may lie between the cells. The directions are those outside the
@@ -167,8 +170,8 @@ def spin_grid(
                 if since >= 0 and a - since > widest:
                     widest, after = a - since, a % around
                 since = a
-        low, high = max(low + (first - 1) * step, 0.0), min(low + (last + 2) * step, high)
+        low, high = max(low + (first - 1) * step, low), min(low + (last + 2) * step, high)
         begin += (after - 1) * turn
         width = min((around - widest + 3) * turn, 2.0 * math.pi)
-    weights[:] = np.exp(weights)
+    weights[:] = np.exp(weights / max(misfit, 1.0))
     return low, step, begin, turn, misfit

@@ -172,8 +172,7 @@ def spin_across(likelihood: FlightLikelihood, max_spin_rps: float) -> SpinAcross
         max_spin_rps,
         FREEDOM,
     )
-    magnitudes, angles = low + step * MAGNITUDE_CELLS, begin + turn * DIRECTION_CELLS
-    weights /= magnitudes  # a prior that is flat in the logarithm of the magnitude
+    magnitudes, angles = np.exp(low + step * MAGNITUDE_CELLS), begin + turn * DIRECTION_CELLS
     weights /= weights.sum()
     of_angle, of_magnitude = weights.sum(axis=1), weights.sum(axis=0)
     cosine, sine = float(of_angle @ np.cos(angles)), float(of_angle @ np.sin(angles))
@@ -183,9 +182,9 @@ def spin_across(likelihood: FlightLikelihood, max_spin_rps: float) -> SpinAcross
         (cosine * np.array(first) + sine * np.array(second)) / length,
         np.array(along),
         middle,
-        math.sqrt(float(of_magnitude @ (magnitudes - middle) ** 2) + step**2 / 12),
+        math.sqrt(float(of_magnitude @ (magnitudes - middle) ** 2) + (step * middle) ** 2 / 12),
         math.sqrt(-2 * math.log(length) + turn**2 / 12) if length > 1e-6 else math.pi,
-        float(magnitudes[np.searchsorted(summed, 0.025)]) - step / 2,
-        float(magnitudes[np.searchsorted(summed, 0.975)]) + step / 2,
+        float(magnitudes[np.searchsorted(summed, 0.025)]) * math.exp(-step / 2),
+        float(magnitudes[np.searchsorted(summed, 0.975)]) * math.exp(step / 2),
         misfit,
     )
