@@ -438,8 +438,8 @@ RECORDINGS = [
 SIMULATOR = [
     Mutant(
         "pipeline/simulator/motion.py",
-        "gx - brake * vx + lift * (wy * vz - wz * vy)",
-        "gx - brake * vx - lift * (wy * vz - wz * vy)",
+        "return gx - brake * vx + lift * ax,",
+        "return gx - brake * vx - lift * ax,",
         "tests/pipeline/simulator/test_simulator_motion.py",
     ),
     Mutant(

@@ -48,7 +48,9 @@ def test_a_guess_follows_gravity_and_drag_exactly(seed: int) -> None:
     tau_s = np.sort(random.uniform(-0.05, 0.05, 9))
     place, velocity, gravity = random.normal(0, 1, 3), random.normal(0, 5, 3), random.normal(0, 6, 3)
     motion = np.empty(16)
-    flight.guess_motion(motion, place + tau_s[:, None] * velocity + 0.5 * tau_s[:, None] ** 2 * gravity, tau_s, gravity, 0.0)
+    flight.guess_motion(
+        motion, place + tau_s[:, None] * velocity + 0.5 * tau_s[:, None] ** 2 * gravity, tau_s, gravity, 0.0
+    )
     np.testing.assert_allclose(motion[:6], [*place, *velocity], atol=1e-9)
     np.testing.assert_allclose(motion[6:15].reshape(3, 3), [gravity] * 3, atol=1e-9)
     assert motion[15] == 0.0

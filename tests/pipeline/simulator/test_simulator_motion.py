@@ -42,13 +42,13 @@ def test_a_flight_without_air_is_a_parabola():
 
 def test_drag_slows_as_one_over_distance_e_folding():
     air = Air(gravity_m_s2=0.0, magnus=0.0)
-    k = 0.5 * 1.2 * 0.4 * math.pi * 0.02**2 / 0.0027
+    k = 0.5 * 1.2 * 0.55 * math.pi * 0.02**2 / 0.0027
     way = flown((0.0, 12.0, 0.0), air=air)
     assert way.velocity_m_s[:, 1] == pytest.approx(12.0 / (1 + k * 12.0 * way.time_s), rel=1e-9)
 
 
 def test_magnus_turns_the_flight_and_keeps_the_speed():
-    air = Air(gravity_m_s2=0.0, drag=0.0)
+    air = Air(gravity_m_s2=0.0, drag=0.0, magnus=0.6, lift_max=None)
     way = flown((0.0, 8.0, 0.0), (0.0, 0.0, -40.0), air)  # spin along up: left sidespin
     assert np.linalg.norm(way.velocity_m_s, axis=1) == pytest.approx(8.0, rel=1e-9)
     rate = 0.5 * 1.2 * math.pi * 0.02**2 / 0.0027 * 0.6 * 0.02 * 2 * math.pi * 40.0
@@ -56,6 +56,40 @@ def test_magnus_turns_the_flight_and_keeps_the_speed():
     assert heading[-1] - heading[0] == pytest.approx(-rate * 0.2, rel=1e-6)
     left = np.cross(UP, [0.0, 1.0, 0.0])
     assert (way.position_m[-1] - way.position_m[0]) @ left > 0
+
+
+@pytest.mark.parametrize("spin_rps", [2.0, 20.0, 60.0, 300.0])
+def test_lift_saturates_with_the_spin(spin_rps):
+    """C_L = 0.26 tanh(S / 0.4) for the spin across the flight, whatever turns along it."""
+    air = Air(gravity_m_s2=0.0, drag=0.0)
+    way = flown((0.0, 8.0, 0.0), (0.0, 35.0, -spin_rps), air, seconds=0.001)
+    parameter = 2 * math.pi * spin_rps * 0.02 / 8.0
+    lift = 0.5 * 1.2 * math.pi * 0.02**2 / 0.0027 * 64.0 * 0.26 * math.tanh(parameter / 0.4)
+    change = (way.velocity_m_s[-1] - way.velocity_m_s[0]) / 0.001
+    assert np.linalg.norm(change) == pytest.approx(lift, rel=1e-3)
+    assert change[0] == pytest.approx(lift, rel=1e-3)  # to the left, seen along the flight to +y from above
+
+
+def test_scenes_of_one_set_up_share_air_and_plumb_line():
+    one, other, foreign = (flight(seed=seed, set_up=set_up) for seed, set_up in ((1, 5), (2, 5), (2, 6)))
+    assert (one.air, one.up) == (other.air, other.up)
+    assert one.air != foreign.air and one.up != foreign.up
+    assert flight(seed=5).air == one.air
+    drawn = [flight(seed=seed) for seed in range(60)]
+    drags = np.array([scene.air.drag for scene in drawn]) * 0.5 * 1.2 * math.pi * 0.02**2 / 0.0027
+    assert 0.125 <= drags.min() < 0.14 and 0.175 < drags.max() <= 0.19
+    lifts = np.array([scene.air.lift_max for scene in drawn]) / 0.26
+    assert np.std(lifts) == pytest.approx(0.12, rel=0.3) and np.mean(lifts) == pytest.approx(1.0, abs=0.05)
+    tilts = np.degrees(np.arccos([-scene.up[2] for scene in drawn]))
+    assert np.sqrt(np.mean(tilts**2)) == pytest.approx(math.sqrt(2), rel=0.3)  # a degree in each direction
+
+
+def test_scenes_of_earlier_versions_keep_their_linear_lift():
+    plain = flight(seed=3).to_dict()
+    del plain["air"]["lift_max"]
+    assert Scene.from_dict(plain).air.lift_max is None
+    again = Scene.from_dict(flight(seed=3).to_dict())
+    assert again.air == flight(seed=3).air
 
 
 def test_topspin_dips_and_backspin_floats():
