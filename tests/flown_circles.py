@@ -75,10 +75,11 @@ def ball_at(t_us: float, circle_px: Floats | None, is_shot: bool = True) -> Ball
 
 def answer(
     shown: FlownCircles,
-    parameters: TrajectoryParameters = TrajectoryParameters(),
+    parameters: TrajectoryParameters | None = None,
     around: Context | None = None,
 ) -> TrajectoryResult:
     """The stage's last result after all circles, tick by tick."""
+    parameters = parameters or TrajectoryParameters()
     state = stage.start(parameters, around or context())
     result = None
     for t_us, circle in zip(shown.t_us, shown.circles_px, strict=True):

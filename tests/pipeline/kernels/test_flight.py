@@ -136,8 +136,8 @@ def test_other_causes_widen_the_covariance(seed: int) -> None:
 @given(SEEDS)
 def test_a_grid_holds_the_best_spin_and_relative_likelihoods(seed: int) -> None:
     random = np.random.default_rng(seed)
-    velocity = np.array([random.normal(0, 6, 3) + [3, 0, 0]] * 3)
-    along, first, second = (np.array(a) for a in orthonormal_axes(*(velocity[1] / np.linalg.norm(velocity[1]))))
+    velocity = np.array([random.normal(0, 6, 3)] * 3)
+    _, first, second = (np.array(a) for a in orthonormal_axes(*(velocity[1] / np.linalg.norm(velocity[1]))))
     angle, magnitude = random.uniform(0, 2 * math.pi), random.uniform(5, 100)
     true = magnitude * (math.cos(angle) * first + math.sin(angle) * second)
     information = an_information(random, random.uniform(0.3, 5))
