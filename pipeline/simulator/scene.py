@@ -237,6 +237,7 @@ class Scene:
             values = dict(plain)
             values["balls"] = tuple(_ball(ball) for ball in values["balls"])
             values["arm"] = None if values.get("arm") is None else built(Arm, values["arm"])
+            values["net"] = None if values.get("net") is None else built(Net, values["net"])
             # Scenes of earlier versions have a linear lift and do not state its limit.
             values["air"] = {"lift_max": None, **values["air"]} if "air" in values else {}
             for name, kind in (("background", Background), ("light", Light), ("air", Air), ("shake", Shake)):
