@@ -7,12 +7,14 @@ recording | camera | simulator -> packets of one tick
 A column is one stage's results so far plus the state to go on. Its key is the source's identity and the chain of
 (stage, parameter values) up to it, compared by value: a changed parameter re-runs its stage and those that read
 it, nothing else, and going back to earlier values finds their columns still there. Stages of one ball have a column
-for each shot.
+for each shot. A shot whose start is known late, at a contact, gets its results of the earlier ticks in the tick in
+which it is announced.
 """
 
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Callable, Collection, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -24,6 +26,7 @@ from .events import EventBatch
 from .registry import STAGES, Parameters, methods, needed_stages, trusted_method
 from .results import MethodResult, Packet, SpinEstimate, nbytes
 from .stage import Context, Stage
+from .track_evidence import NO_EVIDENCE, TrackEvidence
 
 if TYPE_CHECKING:
     from .spin.contrast.stage import ContrastResult
@@ -38,6 +41,8 @@ if TYPE_CHECKING:
 CACHE_BYTES = 2 << 30
 MAX_COLUMNS = 10_000
 MAX_TICKS = 4_000_000  # 5.5 hours at 200 Hz; more is a damaged clock, not a recording
+# How long packets are kept for shots that are announced late: five times what a contact takes to be seen at 200 Hz.
+EARLIER_US = 100_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,17 +60,34 @@ class StageResults:
         """Spin estimates from the present shot so far, by method, of the methods that were run."""
         return {method.name: self.results[method.name].estimate for method in methods() if method.name in self.results}
 
-    @cached_property
-    def best(self) -> str | None:
-        """Method whose estimate is trusted, None where none is."""
-        return trusted_method(self.estimates)
-
 
 @dataclass(frozen=True, eq=False)
 class BallTick(StageResults):
-    """Results of one ball in one tick: its track, and by name those of the stages of one ball."""
+    """Results of one ball in one tick.
 
+    Attributes
+    ----------
+    results : Mapping[str, Any]
+        By name: the stages of one ball.
+    packet : Packet
+        The tick's events, from the start of the shot on.
+    track : BallTrack
+        The ball at the tick's end.
+    evidence : TrackEvidence
+        What its track shows from the shot's start to this tick.
+    earlier : tuple of BallTick
+        The ticks since the shot's start that came before it was announced, oldest first.
+    """
+
+    packet: Packet
     track: BallTrack
+    evidence: TrackEvidence
+    earlier: tuple[BallTick, ...] = ()
+
+    @cached_property
+    def best(self) -> str | None:
+        """Method whose estimate is trusted, None where none is."""
+        return trusted_method(self.estimates, self.evidence.doubt)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +108,11 @@ class Tick(StageResults):
 
     packet: Packet
     balls: tuple[BallTick, ...]
+
+    @property
+    def best(self) -> str | None:
+        """Method whose estimate is trusted for the followed ball, None where none is."""
+        return self.balls[0].best if self.balls else None
 
     if TYPE_CHECKING:  # results of the stages that ship; no fields, and not the only ones
         filter: ClassVar[FilterResult]
@@ -181,6 +208,15 @@ class _Column:
     fault: BaseException | None = None
     bytes: int = 0
     last_use: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _BallInputs:
+    """What the stages of one ball take in tick number `index`: by name, their own results so far among them."""
+
+    index: int
+    evidence: TrackEvidence
+    values: dict[str, Any]
 
 
 class Chain:
@@ -312,11 +348,11 @@ class Chain:
                     results[stage.name] = run.result(stage, column, index, results)
             balls = [run.balls_of(index, results) for index, results in enumerate(rows, first)]
             for stage in of_ball:
-                for index, flying in enumerate(balls, first):
-                    for shot, results in flying.items():
-                        results[stage.name] = run.result(stage, run.column(stage, shot, index), index, results)
+                for one in (one for flying in balls for ticks_of_ball in flying for one in ticks_of_ball):
+                    column = run.column(stage, one.values["ball"].shot, one.index)
+                    one.values[stage.name] = run.result(stage, column, one.index, one.values)
             for results, flying in zip(rows, balls, strict=True):
-                yield run.tick(of_ball, results, list(flying.values()))
+                yield run.tick(of_ball, results, flying)
             self._keep_budget(run.columns_in_use)
 
     def _packet(self, tick_us: int, index: int) -> Packet:
@@ -348,12 +384,9 @@ class Chain:
                 return False
             if STAGES[name].scope == "recording":
                 return True
-            wanted: dict[int, int] = {}  # results of each shot
-            for track in column.results[:count]:
-                for ball in track.balls:
-                    wanted[ball.shot] = wanted.get(ball.shot, 0) + 1
-            kept = {shot: self._columns.get((keys[name], shot)) for shot in wanted}
-        return all(shot is not None and len(shot.results) >= wanted[number] for number, shot in kept.items())
+            last = {ball.shot: index for index, track in enumerate(column.results[:count]) for ball in track.balls}
+            kept = {shot: self._columns.get((keys[name], shot)) for shot in last}
+        return all(one is not None and one.first + len(one.results) > last[shot] for shot, one in kept.items())
 
     def _keep_budget(self, in_use: set[Hashable]) -> None:
         with self._lock:
@@ -380,6 +413,9 @@ class _Run:
         self._chain, self._parameters, self._keys = chain, parameters, keys
         self._forget, self._seconds = forget, seconds
         self._columns: dict[tuple[str, int | None], _Column] = {}
+        self._inputs_of_ball = {name for stage in STAGES if stage.scope == "ball" for name in ("packet", *stage.inputs)}
+        self._recent: deque[dict[str, Any]] = deque()  # those of the recent ticks that no ball has to itself
+        self._evidence: dict[int, TrackEvidence] = {}  # of the shots in flight
 
     @property
     def columns_in_use(self) -> set[Hashable]:
@@ -430,16 +466,33 @@ class _Run:
             self._seconds[stage.name] = self._seconds.get(stage.name, 0.0) + clock() - begin
         return result
 
-    def balls_of(self, index: int, results: Mapping[str, Any]) -> dict[int, dict[str, Any]]:
-        """Inputs of the stages of one ball, by shot."""
+    def balls_of(self, index: int, results: Mapping[str, Any]) -> list[list[_BallInputs]]:
+        """Inputs of the stages of one ball, by ball: in the ticks before its shot was announced, and in this one."""
         track = results.get("track")
-        return {ball.shot: {**results, "ball": ball} for ball in track.balls} if track is not None else {}
+        if track is None:
+            return []
+        packet = results["packet"]
+        self._recent.append({name: results[name] for name in self._inputs_of_ball if name in results})
+        while self._recent[0]["packet"].end_us <= packet.end_us - EARLIER_US:
+            self._recent.popleft()
+        balls = []
+        for ball in track.balls:
+            evidence = self._evidence.get(ball.shot, NO_EVIDENCE)
+            tracks = (*ball.earlier, ball)[-len(self._recent) :]
+            first, rows = index + 1 - len(tracks), list(self._recent)[-len(tracks) :]
+            balls.append([])
+            for number, (state, row) in enumerate(zip(tracks, rows, strict=True), first):
+                evidence = evidence.with_tick(state)
+                values = {**row, "packet": _since(ball.start_us, row["packet"]), "ball": state}
+                balls[-1].append(_BallInputs(number, evidence, values))
+        self._evidence = {ball.shot: rows[-1].evidence for ball, rows in zip(track.balls, balls, strict=True)}
+        return balls
 
-    def tick(self, of_ball: list[Stage], results: dict[str, Any], balls: list[dict[str, Any]]) -> Tick:
+    def tick(self, of_ball: list[Stage], results: dict[str, Any], balls: list[list[_BallInputs]]) -> Tick:
         """The tick with all results."""
         packet = results.pop("packet")
         names = [stage.name for stage in of_ball]
-        flying = tuple(BallTick({name: ball[name] for name in names}, ball["ball"]) for ball in balls)
+        flying = tuple(_ball_tick(names, rows) for rows in balls)
         if flying:
             results.update(flying[0].results)
         else:
@@ -447,3 +500,18 @@ class _Run:
                 assert stage.absent is not None, stage.name
                 results[stage.name] = stage.absent(self._parameters.group(stage.group), results["track"].reason)
         return Tick(results, packet, flying)
+
+
+def _since(start_us: int, packet: Packet) -> Packet:
+    """The packet without the events before a shot."""
+    if start_us <= packet.start_us:
+        return packet
+    return Packet(packet.index, start_us, packet.end_us, packet.events.between(start_us, packet.end_us))
+
+
+def _ball_tick(names: list[str], rows: list[_BallInputs]) -> BallTick:
+    """One ball in the last of these ticks, with those before it as its earlier ones."""
+    *earlier, last = rows
+    results = {name: last.values[name] for name in names}
+    before = tuple(_ball_tick(names, [row]) for row in earlier)
+    return BallTick(results, last.values["packet"], last.values["ball"], last.evidence, before)

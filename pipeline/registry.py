@@ -85,17 +85,39 @@ def needed_stages(targets: Iterable[str]) -> tuple[Stage, ...]:
     return tuple(stage for stage in STAGES if stage.name in needed)
 
 
-def trusted_method(estimates: Mapping[str, SpinEstimate]) -> str | None:
+def trusted_method(estimates: Mapping[str, SpinEstimate], doubt: str | None = None) -> str | None:
     """Name of the method whose estimate the program itself trusts; None where it trusts none.
 
     The methods are asked from the last registered to the first, for the most accurate one comes last, and then those
     that are a last resort.
+
+    Parameters
+    ----------
+    estimates : Mapping[str, SpinEstimate]
+        Of the methods that were run, by name.
+    doubt : str, optional
+        What speaks against the ball's track (`TrackEvidence.doubt`); then no estimate from it is trusted.
     """
+    if doubt is not None:
+        return None
     from_the_last = methods()[::-1]
     for method in sorted(from_the_last, key=lambda method: method.is_last_resort):
         if method.name in estimates and method.is_trusted(estimates):
             return method.name
     return None
+
+
+def distrust_reason(estimates: Mapping[str, SpinEstimate], doubt: str | None = None) -> str | None:
+    """Why no estimate is trusted, in words for people; None where one is. See `trusted_method`.
+
+    A method's own refusal is the reason where there is no doubt about the track: that of the most accurate one.
+    """
+    if doubt is not None or trusted_method(estimates) is not None:
+        return doubt
+    refusals = [
+        f"{m.label}: {estimates[m.name].reason}" for m in methods() if m.name in estimates and estimates[m.name].reason
+    ]
+    return refusals[-1] if refusals else "the methods that were run answer, but are not sure enough to be trusted alone"
 
 
 def quick_stages() -> tuple[str, ...]:

@@ -296,7 +296,9 @@ class Result:
         shots = [shot.to_dict(session.camera, session.ball_radius_m) for shot in self.shots]
         for shot in shots:
             shot["spin"] = {name: estimate for name, estimate in shot["spin"].items() if self.method in ("all", name)}
-            shot["best"] = shot["best"] if shot["best"] in shot["spin"] else None
+            if shot["best"] is not None and shot["best"] not in shot["spin"]:
+                shot["best_reason"] = f"trusted is {shot['best']}, which was not asked for"
+                shot["best"] = None
         return {
             "schema": SCHEMA,
             "recording": {

@@ -1,4 +1,4 @@
-"""Shots: the flights (or the one fixed ball) found in a run of ticks, each with its track and spin."""
+"""Shots: the free flights (or the one fixed ball) found in a run of ticks, each with its track and spin."""
 
 from __future__ import annotations
 
@@ -11,24 +11,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .camera import Camera
-from .chain import Tick
+from .chain import BallTick, Tick
 from .errors import ParameterError
-from .registry import trusted_method
+from .registry import distrust_reason, trusted_method
 from .results import SpinEstimate, Truth
 from .spin.trajectory.motion import FittedMotion
-from .stages.track import BallTrack
+from .stages.track import BallTrack, BeganBy, EndedBy, ShotEnd
+from .track_evidence import TrackEvidence
 
 Floats = NDArray[np.float64]
+
+# How shots begin and end, in words for people.
+BEGAN_WORDS: dict[BeganBy, str] = {
+    "entered": "came into view",
+    "bounce": "from a bounce",
+    "hit": "from a hit",
+    "start": "in view from the start",
+    "found": "found in view",
+}
+ENDED_WORDS: dict[EndedBy, str] = {
+    "left": "left the view",
+    "bounce": "bounced",
+    "hit": "was hit",
+    "end": "in view to the end",
+    "lost": "was lost",
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shot:
-    """One ball from the tick in which it was found to the last tick in which it was there.
+    """One free flight of one ball, between two contacts or from where it comes into view to where it is lost.
 
     Attributes
     ----------
     start_us, end_us : int
-        Time of the first packet's start and the last one's end (file time).
+        Its span (file time), at a contact to within 2 ms.
     t_us : (n,) float64
         Scene time of each tick's state.
     state : (n, 5) float64
@@ -43,6 +60,14 @@ class Shot:
         The spin by method, from the whole shot.
     best : str, optional
         The method that is trusted, None where none is.
+    best_reason : str, optional
+        Why no method is trusted, in words for people; None where one is.
+    began_by : str
+        entered (across the border), bounce, hit, start (of the recording) or found (in the middle of the view).
+    ended_by : str
+        left (across the border), bounce, hit, end (of the recording) or lost.
+    number : int
+        The tracker's number of the shot (`BallTrack.shot`).
     motion : FittedMotion, optional
         The flight as fitted by the trajectory method; None where that was not run or found none.
     """
@@ -56,6 +81,10 @@ class Shot:
     logo_events: int | None
     estimates: dict[str, SpinEstimate]
     best: str | None
+    best_reason: str | None = None
+    began_by: BeganBy = "found"
+    ended_by: EndedBy = "lost"
+    number: int = 0
     motion: FittedMotion | None = None
 
     def positions_m(self, camera: Camera, ball_radius_m: float) -> Floats:
@@ -83,6 +112,8 @@ class Shot:
         return {
             "start_us": self.start_us,
             "end_us": self.end_us,
+            "began_by": self.began_by,
+            "ended_by": self.ended_by,
             "track": {
                 "t_us": self.t_us.tolist(),
                 **{name: track[name] for name in ("x_px", "y_px", "radius_px", "vx_px_s", "vy_px_s")},
@@ -95,6 +126,7 @@ class Shot:
             "logo_events": self.logo_events,
             "spin": {name: estimate.to_dict() for name, estimate in self.estimates.items()},
             "best": self.best,
+            "best_reason": self.best_reason,
         }
 
     def error_against(self, truth: Truth, method: str) -> tuple[float, float] | None:
@@ -114,7 +146,8 @@ class Shot:
 class ShotLog:
     """Shots gathered from ticks in order of time, keeping of each tick only what a shot needs.
 
-    A ball that was followed for a single tick of several, before a faster one took over, is no shot.
+    A ball that was followed for a single tick of several is no shot, nor one that rolls or lies. What a shot's results
+    say of ticks that end after it, before its end was known, does not count.
     """
 
     def __init__(self) -> None:
@@ -136,22 +169,18 @@ class ShotLog:
         """Take the next tick."""
         self._tick_count += 1
         balls = {ball.track.shot: ball for ball in tick.balls}
+        ends = {end.shot: end for end in tick.track.ended}
         for shot in self._flying.keys() - balls.keys():
-            self._end(shot)
+            self._end(ends.get(shot) or ShotEnd(shot, self._flying[shot][-1].end_us, "lost"))
         for shot, ball in balls.items():
-            logo = ball.results.get("logo")
-            logo_events = None if logo is None else len(logo.events)
-            trajectory = ball.results.get("trajectory")
-            motion = None if trajectory is None else trajectory.motion
-            row = _Row(tick.packet.start_us, tick.packet.end_us, ball.track, logo_events, ball.estimates, motion)
-            self._flying.setdefault(shot, []).append(row)
+            self._flying.setdefault(shot, []).extend(map(_row, (*ball.earlier, ball)))
         if not balls and tick.track.reason:
             self._last_reason = tick.track.reason
 
     def close(self) -> None:
-        """End the shots that are still in flight."""
-        for shot in list(self._flying):
-            self._end(shot)
+        """End the shots that are still in flight, with the recording."""
+        for shot, rows in list(self._flying.items()):
+            self._end(ShotEnd(shot, rows[-1].end_us, "end"))
 
     @property
     def shots(self) -> list[Shot]:
@@ -163,35 +192,56 @@ class ShotLog:
         """Reason why there are no shots, in words; None when there are some."""
         return None if self._ended else self._last_reason or "no ball, because there are no events"
 
-    def _end(self, shot: int) -> None:
-        rows = self._flying.pop(shot)
-        if len(rows) > 1 or self._tick_count == 1:
-            self._ended.append(_shot(rows))
+    def _end(self, end: ShotEnd) -> None:
+        rows = [row for row in self._flying.pop(end.shot) if row.end_us <= end.end_us]
+        if rows and not rows[-1].track.is_shot:
+            self._last_reason = "no shot: a ball rolls or lies, it does not fly"
+        elif len(rows) > 1 or (rows and self._tick_count == 1):
+            self._ended.append(_shot(rows, end))
         else:
             self._last_reason = "no shot: a ball was seen for a single tick only"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Row:
-    start_us: int
+    """One tick of a shot."""
+
     end_us: int
     track: BallTrack
+    evidence: TrackEvidence
     logo_events: int | None
     estimates: dict[str, SpinEstimate]
     motion: FittedMotion | None
 
 
-def _shot(rows: list[_Row]) -> Shot:
+def _row(ball: BallTick) -> _Row:
+    logo, trajectory = ball.results.get("logo"), ball.results.get("trajectory")
+    return _Row(
+        end_us=ball.packet.end_us,
+        track=ball.track,
+        evidence=ball.evidence,
+        logo_events=None if logo is None else len(logo.events),
+        estimates=ball.estimates,
+        motion=None if trajectory is None else trajectory.motion,
+    )
+
+
+def _shot(rows: list[_Row], end: ShotEnd) -> Shot:
     events = [row.logo_events for row in rows if row.logo_events is not None]
+    estimates, doubt = rows[-1].estimates, rows[-1].evidence.doubt
     return Shot(
-        start_us=rows[0].start_us,
-        end_us=rows[-1].end_us,
+        start_us=rows[0].track.start_us,
+        end_us=end.end_us,
         t_us=np.array([row.track.t_us for row in rows]),
         state=np.array([row.track.mean for row in rows]),
         std=np.array([np.sqrt(np.diag(row.track.covariance)) for row in rows]),
         measured=np.array([row.track.measured is not None for row in rows]),
         logo_events=sum(events) if events else None,
-        estimates=rows[-1].estimates,
-        best=trusted_method(rows[-1].estimates),
+        estimates=estimates,
+        best=trusted_method(estimates, doubt),
+        best_reason=distrust_reason(estimates, doubt),
+        began_by=rows[0].track.began_by,
+        ended_by=end.ended_by,
+        number=end.shot,
         motion=rows[-1].motion,
     )

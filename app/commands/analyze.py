@@ -17,6 +17,7 @@ from spinscope.pipeline.files import check_writable
 from spinscope.pipeline.flight_calibration import doubt_about_up, flight_calibration
 from spinscope.pipeline.registry import methods
 from spinscope.pipeline.session import Choices, Progress, Result, Session
+from spinscope.pipeline.shots import BEGAN_WORDS, ENDED_WORDS
 
 from ..terminal import ProgressBar, note
 from .options import RECORDING, ListingCommand, RegisteredName, session_options, write_text
@@ -56,7 +57,8 @@ def analyze(
 ) -> None:
     """Find the shots of recordings and estimate their spin.
 
-    In the table * marks the estimate that the program itself trusts, +- is 1 sigma, axes are in the camera frame.
+    A shot is one free flight of one ball: a bounce or a hit ends it and begins another. In the table * marks the
+    estimate that the program itself trusts, +- is 1 sigma, axes are in the camera frame.
     """
     if output is not None and output != "-":
         check_writable(Path(output), "JSON")
@@ -142,11 +144,14 @@ def print_reports(reports: list[dict[str, Any]]) -> None:
             speed = "" if shot["speed_m_s"] is None else f", {shot['speed_m_s']:.2f} m/s"
             print(
                 f"{name}, shot {number + 1} of {len(report['shots'])}: {shot['start_us'] / 1000:.1f} to "
-                f"{shot['end_us'] / 1000:.1f} ms{speed}, {shot['logo_events']} logo events"
+                f"{shot['end_us'] / 1000:.1f} ms ({BEGAN_WORDS[shot['began_by']]}, {ENDED_WORDS[shot['ended_by']]}){speed}, "
+                f"{shot['logo_events']} logo events"
             )
             print(f"    {'method':<12} {'spin [rps]':>18}   {'axis x, y, z':<24}  {'+- [deg]':>8}")
             for method, estimate in shot["spin"].items():
                 print(f"  {'*' if method == shot['best'] else ' '} {method:<12} {_row(estimate)}")
+            if shot["best"] is None:
+                print(f"    none is trusted: {shot['best_reason']}")
     print("* = trusted; +- is 1 sigma; axis in the camera frame: x right, y down, z into the scene")
     for report in reports:
         for warning in report.get("warnings", []):

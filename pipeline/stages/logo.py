@@ -147,7 +147,8 @@ def step(
     radius_px, moving = float(ball.mean[4]), bool(ball.mean[2:4].any())
     pad_px = parameters.pad_px if moving else parameters.fixed_pad_px
     rim_pad_px = parameters.rim_pad_px if moving else parameters.fixed_rim_pad_px
-    events, inside = _logo_events(filtered.logo_events, ball, radius_px - pad_px, radius_px - rim_pad_px)
+    own = filtered.logo_events.between(packet.start_us, packet.end_us)  # none from before the shot
+    events, inside = _logo_events(own, ball, radius_px - pad_px, radius_px - rim_pad_px)
     centre_x, centre_y = ball.centre_px(events.t_us.astype(np.float64) - parameters.delay_us)
     camera = state.camera
     rays = camera.rays(events.x_px, events.y_px)
@@ -156,7 +157,7 @@ def step(
     knots_m = _knots_m(packet, ball, parameters.delay_us, state)
     points, normals = intersect_ball(rays, events.t_us, packet.start_us, packet.end_us, knots_m, state.ball_radius_m)
     of_outline = _of_outline(x, y, events.on, ball)
-    rows, own = np.flatnonzero(inside), np.flatnonzero(~of_outline)
+    rows, turning = np.flatnonzero(inside), np.flatnonzero(~of_outline)
     return LogoResult(
         events=events[rows],
         centre_x_px=centre_x[rows],
@@ -168,7 +169,7 @@ def step(
         points_m=points[rows],
         normals=normals[rows],
         of_outline=of_outline[rows],
-        turning=TurningEvents(events.t_us, events.on, normals, centre_x, centre_y)[own],
+        turning=TurningEvents(events.t_us, events.on, normals, centre_x, centre_y)[turning],
         position_std_px=math.sqrt(0.5 * (ball.covariance[0, 0] + ball.covariance[1, 1])),
         radius_std_px=math.sqrt(ball.covariance[4, 4]),
         velocity_std_px_s=math.sqrt(0.5 * (ball.covariance[2, 2] + ball.covariance[3, 3])),

@@ -7,14 +7,15 @@ import itertools
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from spinscope.pipeline import chain as chain_module
-from spinscope.pipeline.chain import Chain, EventsInMemory
+from spinscope.pipeline.chain import Chain, EventsInMemory, Tick
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.registry import STAGES, Parameters
@@ -41,6 +42,11 @@ class ToyBall:
     """One ball of the toy tracker."""
 
     shot: int
+    t_us: float = 0.0
+    start_us: int = 0
+    earlier: tuple[ToyBall, ...] = ()
+    mean: NDArray[np.float64] = field(default_factory=lambda: np.ones(5), compare=False)
+    measured: None = None
 
 
 @dataclass(frozen=True)
@@ -56,12 +62,12 @@ class Toys:
     """Toy stages in place of the real ones, whose results name everything seen so far.
 
     counts : how often each stage stepped
-    flying : the shots in flight by tick number; one ball throughout by default
+    flying : the shots or balls in flight by tick number; one ball throughout by default
     """
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.counts = dict.fromkeys(INPUTS, 0)
-        self.flying: Callable[[int], tuple[int, ...]] = lambda index: (0,)
+        self.flying: Callable[[int], tuple[int | ToyBall, ...]] = lambda index: (0,)
         self.steps: dict[str, Callable[..., Any]] = {}
         self.stages = {stage.name: self._toy(stage) for stage in STAGES}
         monkeypatch.setattr(STAGES, "_entries", self.stages)
@@ -72,7 +78,8 @@ class Toys:
             state.append(f"{packet.index}:{len(packet.events)}")
             seen = (stage.name, parameters, tuple(state), inputs)
             if stage.name == "track":
-                return ToyTrack(tuple(ToyBall(shot) for shot in self.flying(packet.index)), seen)
+                flying = self.flying(packet.index)
+                return ToyTrack(tuple(ToyBall(one) if isinstance(one, int) else one for one in flying), seen)
             return seen
 
         self.steps[stage.name] = step
@@ -290,6 +297,104 @@ def test_a_column_of_a_shot_is_not_known_until_its_last_tick(toys: Toys) -> None
     assert chain.knows(DEFAULT, "track") and not chain.knows(DEFAULT, "logo")
     list(chain.run(DEFAULT, ("rate",)))
     assert chain.knows(DEFAULT, "logo") and chain.knows(DEFAULT, "rate") and not chain.knows(DEFAULT, "flow")
+
+
+def late_shots(index: int) -> tuple[int | ToyBall, ...]:
+    """Shot 0 until tick 9; a contact at 36 ms, in tick 7, is known in tick 10: shot 1. Shot 2 flies throughout."""
+    if index < 10:
+        return (0, 2)
+    earlier = tuple(ToyBall(1, float(number), 36_000) for number in (7, 8, 9)) if index == 10 else ()
+    return (ToyBall(1, float(index), 36_000, earlier), 2)
+
+
+def flown(ticks: list[Tick]) -> list[Any]:
+    """Everything the ticks say of balls, those of earlier ticks among it."""
+    return [
+        [(one.track, one.results, one.packet.start_us, len(one.packet.events)) for one in (*ball.earlier, ball)]
+        for tick in ticks
+        for ball in tick.balls
+    ]
+
+
+def test_a_shot_that_is_announced_late_has_its_earlier_ticks_without_the_events_before_it(toys: Toys) -> None:
+    toys.flying = late_shots
+    chain = Chain(source())
+    ticks = list(chain.run(DEFAULT))
+    assert not any(ball.earlier for tick in ticks for ball in tick.balls if tick.packet.index != 10)
+    late, other = ticks[10].balls
+    assert [one.track.t_us for one in (*late.earlier, late)] == [7, 8, 9, 10]
+    assert (late.earlier[0].packet.start_us, late.earlier[0].packet.end_us) == (36_000, 40_000)
+    assert [one.packet.index for one in late.earlier] == [7, 8, 9]
+    for name in BELOW_LOGO:
+        _, _, seen, inputs = late.results[name]
+        assert seen == ("7:4", "8:5", "9:5", "10:5"), name
+        assert late.earlier[1].results[name][2] == ("7:4", "8:5"), name
+    assert late.earlier[1].results["logo"][3] == (ticks[8].filter, late.track.earlier[1])
+    assert other.results["logo"][2] == tuple(f"{index}:5" for index in range(11)), "another ball's are its own"
+    assert ticks[9].balls[0].results["logo"][2] == tuple(f"{index}:5" for index in range(10))
+    assert toys.counts["logo"] == 10 + 13 + 20
+    assert late.evidence.ticks == 4
+
+
+@pytest.mark.parametrize("together", [1, 3, 4, 20])
+@pytest.mark.parametrize("stop", [0, 8, 10, 11, 15])
+def test_late_shots_are_the_same_in_batch_tick_by_tick_and_resumed(toys: Toys, together: int, stop: int) -> None:
+    toys.flying = late_shots
+    whole = flown(list(Chain(source()).run(DEFAULT)))
+    counted = dict(toys.counts)
+    toys.counts.update(dict.fromkeys(INPUTS, 0))
+    chain = Chain(source())
+    list(chain.run(DEFAULT, ALL_BUT_CONTRAST, ticks=stop, together=together))
+    assert flown(list(chain.run(DEFAULT, together=together))) == whole
+    assert toys.counts == counted, "nothing twice"
+    assert all(chain.knows(DEFAULT, name) for name in INPUTS)
+    growing = Chain(dataclasses.replace(source(), growing=True, end_us=0))
+    for end_us in range(0, source().end_us, 3700):
+        growing.source = dataclasses.replace(source(), growing=True, end_us=end_us)
+        list(growing.run(DEFAULT))
+    growing.source = source()
+    assert flown(list(growing.run(DEFAULT))) == whole
+
+
+@pytest.mark.parametrize("forgotten", [*INPUTS, "all"])
+def test_late_shots_are_made_again_where_they_were_forgotten(toys: Toys, forgotten: str) -> None:
+    toys.flying = late_shots
+    whole = flown(list(Chain(source()).run(DEFAULT)))
+    chain = Chain(source())
+    forget = tuple(INPUTS) if forgotten == "all" else (forgotten,)
+    assert flown(list(chain.run(DEFAULT, forget=forget, together=4))) == whole
+    assert not any(chain.knows(DEFAULT, name) for name in forget)
+    assert flown(list(chain.run(DEFAULT))) == whole
+    list(chain.run(DEFAULT.with_assignments(["contrast.kernel_rad=0.05"]), ticks=12))
+    assert not chain.knows(DEFAULT.with_assignments(["contrast.kernel_rad=0.05"]), "contrast")
+
+
+def test_threads_share_late_shots(toys: Toys) -> None:
+    toys.flying = late_shots
+    whole = flown(list(Chain(source()).run(DEFAULT)))
+    counted = dict(toys.counts)
+    for name, step in list(toys.steps.items()):
+        toys.steps[name] = lambda *inputs, step=step: (time.sleep(2e-4), step(*inputs))[1]
+    toys.counts.update(dict.fromkeys(INPUTS, 0))
+    chain, found = Chain(source()), [[], []]
+    threads = [
+        threading.Thread(target=lambda number=number: found[number].extend(chain.run(DEFAULT))) for number in (0, 1)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(30)
+    assert toys.counts == counted
+    assert all(flown(ticks) == whole for ticks in found)
+
+
+def test_a_shot_from_longer_ago_than_packets_are_kept_begins_with_the_oldest_that_are(toys: Toys) -> None:
+    """Known after all 20 ticks of 5 ms and more: those within EARLIER_US are there."""
+    earlier = tuple(ToyBall(0, float(number)) for number in range(39))
+    toys.flying = lambda index: () if index < 39 else (ToyBall(0, float(index), 0, earlier if index == 39 else ()),)
+    chain = Chain(source(205))
+    (ball,) = list(chain.run(DEFAULT, ticks=40))[-1].balls
+    assert ball.results["logo"][2] == tuple(f"{index}:5" for index in range(20, 40))
 
 
 def test_a_stage_that_raises_leaves_no_half_column(toys: Toys) -> None:

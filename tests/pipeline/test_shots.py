@@ -11,28 +11,37 @@ import pytest
 from spinscope.pipeline.camera import Camera, CameraParameters
 from spinscope.pipeline.results import SpinEstimate, Truth
 from spinscope.pipeline.shots import Shot, ShotLog
+from spinscope.pipeline.stages.track import ShotEnd
+from spinscope.pipeline.track_evidence import NO_EVIDENCE
 
 CAMERA = Camera.of(CameraParameters(), 1280, 720)
 
 
-def tick(number: int, *shots: int, x_px: float = 100.0, reason: str | None = None) -> Any:
-    """A tick with these shots in flight, and with what a shot needs of it."""
-    packet = SimpleNamespace(start_us=5000 * number, end_us=5000 * (number + 1))
-    balls = [
-        SimpleNamespace(
-            track=SimpleNamespace(
-                shot=shot,
-                t_us=5000.0 * (number + 1) - 100,
-                mean=np.array([x_px, 50.0, 1000.0, 0.0, 16.0]),
-                covariance=np.eye(5),
-                measured=None if number % 2 else object(),
-            ),
-            results={"logo": SimpleNamespace(events=[0] * number)},
-            estimates={"triplet": SpinEstimate.refused("triplet", f"tick {number}")},
-        )
-        for shot in shots
-    ]
-    return SimpleNamespace(packet=packet, track=SimpleNamespace(reason=reason), balls=balls)
+def ball(number: int, shot: int, *, start_us: int | None = None, x_px: float = 100.0, is_shot: bool = True) -> Any:
+    """What a shot needs of one ball in a tick."""
+    return SimpleNamespace(
+        packet=SimpleNamespace(end_us=5000 * (number + 1)),
+        track=SimpleNamespace(
+            shot=shot,
+            t_us=5000.0 * (number + 1) - 100,
+            mean=np.array([x_px, 50.0, 1000.0, 0.0, 16.0]),
+            covariance=np.eye(5),
+            measured=None if number % 2 else object(),
+            start_us=5000 * number if start_us is None else start_us,
+            began_by="found" if start_us is None else "bounce",
+            is_shot=is_shot,
+        ),
+        evidence=NO_EVIDENCE,
+        earlier=(),
+        results={"logo": SimpleNamespace(events=[0] * number)},
+        estimates={"triplet": SpinEstimate.refused("triplet", f"tick {number}")},
+    )
+
+
+def tick(number: int, *shots: int | Any, ended: tuple[ShotEnd, ...] = (), reason: str | None = None) -> Any:
+    """A tick with these balls, or shots of these numbers, in flight."""
+    balls = [ball(number, shot) if isinstance(shot, int) else shot for shot in shots]
+    return SimpleNamespace(track=SimpleNamespace(reason=reason, ended=ended), balls=balls)
 
 
 def gathered(*ticks: Any) -> ShotLog:
@@ -62,6 +71,37 @@ def test_a_single_tick_of_several_is_no_shot() -> None:
     assert len(gathered(tick(0, 0)).shots) == 1
 
 
+def test_a_contact_that_is_known_late_ends_one_shot_and_begins_the_next() -> None:
+    """Shot 0 bounces at 12.5 ms; in tick 5 that is known, and shot 1 has its results of ticks 2 to 4."""
+    earlier = tuple(ball(number, 1, start_us=12_500) for number in (2, 3, 4))
+    announced = ball(5, 1, start_us=12_500)
+    announced.earlier = earlier
+    bounced = (ShotEnd(0, 12_500, "bounce"),)
+    ticks = [*(tick(number, 0) for number in range(5)), tick(5, announced, ended=bounced), tick(6, 1)]
+    before, after = gathered(*ticks, tick(7, ended=(ShotEnd(1, 31_000, "left"),))).shots
+    assert (before.start_us, before.end_us, before.began_by, before.ended_by) == (0, 12_500, "found", "bounce")
+    assert before.t_us.tolist() == [4900.0, 9900.0]
+    assert before.logo_events == 0 + 1
+    assert before.estimates["triplet"].reason == "tick 1", "later ones have seen the other shot's events"
+    assert (after.start_us, after.end_us, after.began_by, after.ended_by) == (12_500, 31_000, "bounce", "left")
+    assert after.t_us.tolist() == [14_900.0, 19_900.0, 24_900.0, 29_900.0]
+    assert after.logo_events == 2 + 3 + 4 + 5
+    assert after.number == 1
+
+
+def test_a_ball_in_flight_at_the_end_and_one_that_goes_unexplained() -> None:
+    assert [shot.ended_by for shot in gathered(tick(0, 0), tick(1, 0)).shots] == ["end"]
+    assert [shot.ended_by for shot in gathered(tick(0, 0), tick(1, 0), tick(2)).shots] == ["lost"]
+
+
+def test_a_ball_that_rolls_is_no_shot() -> None:
+    rolling = [tick(number, ball(number, 3, is_shot=False), 4) for number in range(4)]
+    assert [shot.number for shot in gathered(*rolling).shots] == [4]
+    alone = gathered(*(tick(number, ball(number, 3, is_shot=False)) for number in range(4)))
+    assert not alone.shots
+    assert "rolls" in str(alone.no_shot_reason)
+
+
 def test_the_last_reason_is_told_where_there_is_no_ball() -> None:
     assert gathered(tick(0, reason="dark"), tick(1, reason="darker")).no_shot_reason == "darker"
     assert "no events" in str(gathered().no_shot_reason)
@@ -78,7 +118,7 @@ def flight(velocity_m_s: tuple[float, float, float]) -> Shot:
 
 
 def test_a_shot_keeps_each_ticks_state_and_its_standard_deviations() -> None:
-    ticks = [tick(number, 4, x_px=100.0 + number) for number in range(3)]
+    ticks = [tick(number, ball(number, 4, x_px=100.0 + number)) for number in range(3)]
     for row in ticks:
         row.balls[0].track.covariance = np.diag([0.01, 0.04, 100.0, 400.0, 0.25])
     (shot,) = gathered(*ticks).shots
