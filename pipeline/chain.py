@@ -475,7 +475,7 @@ class _Run:
         self._recent.append({name: results[name] for name in self._inputs_of_ball if name in results})
         while self._recent[0]["packet"].end_us <= packet.end_us - EARLIER_US:
             self._recent.popleft()
-        balls = []
+        balls: list[list[_BallInputs]] = []
         for ball in track.balls:
             evidence = self._evidence.get(ball.shot, NO_EVIDENCE)
             tracks = (*ball.earlier, ball)[-len(self._recent) :]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 # circles of ticks that follow each other more quickly share events (track.contour_us is 3 ms).
 FEWEST_IN_ROW, SHORTEST_US = 3, 10_000.0
 # The slowest shot that the tracker looks for (1 m/s, 50 radii a second) flies so many radii within SHORTEST_US.
-SHORTEST_WAY = 0.5
+SHORTEST_REACH = 0.5
 # A parabola fits flights to a tenth of a radius, in vibration of 2 px too; a hand, noise or two balls taken for one
 # it does not.
 ERRATIC_RADII, FEWEST_FOR_PARABOLA = 0.25, 5
@@ -41,7 +41,7 @@ class TrackEvidence:
         First measured circle; None before.
     first_us : float
         Its scene time.
-    way_px : float
+    reach_px : float
         Largest distance of a measured centre from the first one.
     moments : (5, 5) float64
         Sums over the measured ticks of products of [1, s, s^2, x, y], s in seconds from the first circle, x and y in px
@@ -56,7 +56,7 @@ class TrackEvidence:
     longest_row_us: float
     first: Circle | None
     first_us: float
-    way_px: float
+    reach_px: float
     moments: NDArray[np.float64]
 
     def with_tick(self, ball: BallTrack) -> TrackEvidence:
@@ -79,7 +79,7 @@ class TrackEvidence:
             longest_row_us=max(self.longest_row_us, ball.t_us - since_us),
             first=first,
             first_us=first_us,
-            way_px=max(self.way_px, math.hypot(x, y)),
+            reach_px=max(self.reach_px, math.hypot(x, y)),
             moments=moments,
         )
 
@@ -90,12 +90,12 @@ class TrackEvidence:
             return None
         if self.first is None or self.most_in_row < FEWEST_IN_ROW or self.longest_row_us < SHORTEST_US:
             return (
-                f"the track is too thin: the ball was measured in {self.most_in_row} of {self.ticks} ticks in a row, "
+                f"too little of the track is measured: {self.most_in_row} of {self.ticks} ticks in a row, "
                 f"{FEWEST_IN_ROW} over {SHORTEST_US / 1000:g} ms are needed{_if_fixed('auto')}"
             )
-        if self.way_px < SHORTEST_WAY * self.first.radius_px:
+        if self.reach_px < SHORTEST_REACH * self.first.radius_px:
             place = f"{self.first.x_px:.0f} {self.first.y_px:.0f} {self.first.radius_px:.0f}"
-            return f"the ball stays in its place, within {self.way_px:.1f} px{_if_fixed(place, 'auto')}"
+            return f"the ball stays in its place, within {self.reach_px:.1f} px{_if_fixed(place, 'auto')}"
         if (scatter_px := self.scatter_px) > ERRATIC_RADII * self.first.radius_px:
             return f"the track is no flight: its circles lie {scatter_px:.1f} px beside a parabola{_if_fixed('auto')}"
         return None

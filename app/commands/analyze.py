@@ -142,9 +142,10 @@ def print_reports(reports: list[dict[str, Any]]) -> None:
             print(f"{name}: {report['no_shot_reason']} (a ball on a spinner needs --fixed-ball)")
         for number, shot in enumerate(report.get("shots", [])):
             speed = "" if shot["speed_m_s"] is None else f", {shot['speed_m_s']:.2f} m/s"
+            how = f"{BEGAN_WORDS[shot['began_by']]}, {ENDED_WORDS[shot['ended_by']]}"
             print(
                 f"{name}, shot {number + 1} of {len(report['shots'])}: {shot['start_us'] / 1000:.1f} to "
-                f"{shot['end_us'] / 1000:.1f} ms ({BEGAN_WORDS[shot['began_by']]}, {ENDED_WORDS[shot['ended_by']]}){speed}, "
+                f"{shot['end_us'] / 1000:.1f} ms ({how}){speed}, "
                 f"{shot['logo_events']} logo events"
             )
             print(f"    {'method':<12} {'spin [rps]':>18}   {'axis x, y, z':<24}  {'+- [deg]':>8}")

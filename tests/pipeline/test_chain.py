@@ -326,7 +326,7 @@ def test_a_shot_that_is_announced_late_has_its_earlier_ticks_without_the_events_
     assert (late.earlier[0].packet.start_us, late.earlier[0].packet.end_us) == (36_000, 40_000)
     assert [one.packet.index for one in late.earlier] == [7, 8, 9]
     for name in BELOW_LOGO:
-        _, _, seen, inputs = late.results[name]
+        _, _, seen, _ = late.results[name]
         assert seen == ("7:4", "8:5", "9:5", "10:5"), name
         assert late.earlier[1].results[name][2] == ("7:4", "8:5"), name
     assert late.earlier[1].results["logo"][3] == (ticks[8].filter, late.track.earlier[1])

@@ -54,7 +54,7 @@ def test_few_measured_ticks_in_a_row_are_too_little(pattern: str, tick_us: int) 
     places = flight(len(pattern), tick_s=tick_us * 1e-6)
     doubt = evidence_of([p if seen == "x" else None for p, seen in zip(places, pattern, strict=True)], tick_us).doubt
     assert doubt is not None
-    assert "too thin" in doubt and "--fixed-ball auto" in doubt
+    assert "too little" in doubt and "--fixed-ball auto" in doubt
 
 
 def test_rows_are_counted_from_their_first_tick_to_their_last() -> None:
