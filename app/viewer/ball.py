@@ -147,6 +147,10 @@ def _path(run: ViewedRun) -> list[Chunk]:
     goes_on = [run.has_ball[i] and i > 0 and shots[i] == shots[i - 1] for i in range(len(run.ticks))]
     pieces = [places[i - 1 : i + 1] for i, flies in enumerate(goes_on) if flies]
     chunks.append(columns_at(at.PATH, run.times_us, rr.LineStrips3D.columns(strips=pieces), [0, *map(int, goes_on)]))
+    paths = [shot.positions_m(run.camera, run.ball_radius_m) for shot in run.shots]
+    numbers = [str(number) for number in range(1, len(paths) + 1)]
+    if paths:
+        chunks.append(once(at.PATHS, rr.LineStrips3D(paths, colors=[at.OTHERS_COLOUR], radii=[-0.6], labels=numbers)))
     if run.truth is not None:
         positions = run.truth.position_m
         dashes = [positions[i : i + 6] for i in range(0, len(positions) - 6, 10)]

@@ -39,7 +39,7 @@ class Curve:
         Drawn as a translucent band of +-1 sigma; then `unit` is its unit.
     t_us : (n,) array, optional
         Times of the values, us of file time, where they are not the ticks' ends.
-    marker : {"circle", "down"}, optional
+    marker : {"circle", "down", "up"}, optional
         Dots of this form in place of a line.
     width : float
         Of the line, or of the dots.
@@ -56,7 +56,7 @@ class Curve:
     variances: Floats | None = None
     unit: str = ""
     t_us: NDArray[np.int64] | Floats | None = None
-    marker: Literal["circle", "down"] | None = None
+    marker: Literal["circle", "down", "up"] | None = None
     width: float = 1.5
     is_stepped: bool = False
     is_in_range: bool = True

@@ -14,6 +14,7 @@ from .derotated_logo import derotated_logo_chunks
 from .rerun_api import Chunk
 from .run import ViewedRun
 from .score import score_chunks
+from .shot_marks import shot_mark_chunks
 from .summary import summary_chunks
 
 
@@ -57,6 +58,7 @@ for _drawer in (
     Drawer(name="spin", plots=(plots.MAGNITUDE_PLOT, plots.COMPONENT_PLOT, plots.AXIS_ERROR_PLOT)),
     Drawer(name="ball", draw=ball_chunks),
     Drawer(name="derotated_logo", draw=derotated_logo_chunks),
+    Drawer(name="shots", draw=shot_mark_chunks),
     Drawer(name="summary", draw=summary_chunks),
 ):
     DRAWERS.register(_drawer)

@@ -70,7 +70,7 @@ class DrawingCache:
 
     def _drawn(self, drawer: Drawer, run: ViewedRun, keys: Mapping[str, Hashable]) -> Future[list[Chunk]]:
         shown = run.stages if drawer.stage is None else (drawer.stage,)
-        key = (drawer, len(run.ticks), tuple(keys[stage] for stage in shown))
+        key = (drawer, len(run.ticks), run.followed, tuple(keys[stage] for stage in shown))
         with self._lock:
             drawn = self._drawings.get(key)
             if drawn is None or (drawn.done() and not _is_made(drawn)):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import colorsys
 
+from spinscope.pipeline.shots import BEGAN_WORDS
+
 Colour = tuple[int, int, int]
 
 APPLICATION = "spinscope"
@@ -18,6 +20,9 @@ HOUGH = "/image/hough"
 MEASURED = "/image/measured"
 KALMAN = "/image/kalman"
 TRUE_CIRCLE = "/image/truth"
+# All balls, numbered by their shots.
+BALLS = "/image/balls"
+TRACKS = "/image/tracks"
 # Children of the ball move with it: pixels from its centre.
 BALL_PLACE = "/image/ball"
 BALL_CENTRE = "/image/ball/centre"
@@ -35,6 +40,8 @@ SCORE_AXES = "/score_axes"
 
 # Over time.
 STATUS = "/tracker"
+SHOTS = "/shots"
+CONTACTS = "/contacts"
 PLOT = "/plots"
 RESIDUAL = "/plots/residual"
 EVENT_COUNT = "/plots/events"
@@ -47,6 +54,7 @@ AXIS_ERROR = "/plots/axis_error"
 # Space: the camera frame, metres.
 WORLD = "/world"
 PATH = "/world/path"
+PATHS = "/world/paths"
 TRUE_PATH = "/world/true_path"
 AXES = "/world/axes"
 BALL = "/world/ball"
@@ -72,6 +80,8 @@ KALMAN_COLOUR: Colour = (76, 217, 100)
 TRUTH_COLOUR: Colour = (214, 120, 255)
 MASK_COLOUR: Colour = (130, 140, 150)
 PATH_COLOUR: Colour = (76, 217, 100)
+OTHERS_COLOUR: Colour = (200, 206, 212)
+CONTACT_COLOUR: Colour = (255, 112, 167)
 RING_COLOUR: Colour = (255, 213, 79)
 RATE_COLOUR: Colour = (174, 213, 129)
 BACKGROUND: Colour = (16, 16, 16)
@@ -81,6 +91,14 @@ STATUS_COLOURS: dict[str, Colour] = {
     "tracking": (67, 160, 71),
     "coasting": (92, 148, 214),
     "lost": (229, 57, 53),
+}
+SHOT_COLOURS: dict[str, Colour] = {
+    "no shot": (60, 66, 72),
+    BEGAN_WORDS["start"]: (120, 144, 156),
+    BEGAN_WORDS["entered"]: (67, 160, 71),
+    BEGAN_WORDS["found"]: (92, 148, 214),
+    BEGAN_WORDS["bounce"]: (236, 112, 99),
+    BEGAN_WORDS["hit"]: (255, 167, 38),
 }
 # Classes of the raw events: 2 x (kept by the surface's filter) + (ON).
 EVENT_CLASSES: tuple[tuple[str, Colour], ...] = (

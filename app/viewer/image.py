@@ -28,6 +28,9 @@ Floats = NDArray[np.float64]
 EVENTS_SHOWN = 1_500_000  # of more, every second, third ... is shown: 15 MB of points is what a flight may take
 WHEEL_PX = 128
 DASHES = 12
+# Numbered circles are drawn around the balls, not upon the circles that the stages give; their tracks are cut off
+# after so many ticks, half a second, so that those of a ball spinner do not fill the memory.
+BESIDE_PX, TRACK_TICKS = 4.0, 100
 
 
 def filter_chunks(run: ViewedRun) -> list[Chunk]:
@@ -70,6 +73,7 @@ def track_chunks(run: ViewedRun) -> list[Chunk]:
         *_circles(run, at.HOUGH, [track.hough for track in tracks], at.HOUGH_COLOUR, 0.8),
         *_circles(run, at.MEASURED, [track.measured for track in tracks], at.MEASURED_COLOUR, 1.2),
         *_circles(run, at.KALMAN, kalman, at.KALMAN_COLOUR, 1.6),
+        *_balls(run),
         _ball_place(run),
         *states(at.STATUS, run.times_us, statuses, at.STATUS_COLOURS),
     ]
@@ -158,6 +162,31 @@ def _circles(
     return [
         styled(entity, rr.Ellipses2D, colors=colour, line_radii=-width_ui),
         columns_at(entity, run.times_us, columns, lengths),
+    ]
+
+
+def _balls(run: ViewedRun) -> list[Chunk]:
+    """Circle of every ball with the number of its shot, and its track up to the tick."""
+    so_far: dict[int, list[Floats]] = {}
+    circles: list[tuple[Floats, str]] = []
+    strips: list[Floats] = []
+    lengths = [0]
+    for tick in run.ticks:
+        for ball in tick.track.balls:
+            so_far.setdefault(ball.shot, []).append(ball.mean[:2])
+            number = run.shot_numbers.get(ball.shot)
+            circles.append((ball.mean, "" if number is None else str(number)))
+            strips.append(np.array(so_far[ball.shot][-TRACK_TICKS:]))
+        lengths.append(len(tick.track.balls))
+    places = np.array([mean for mean, _ in circles]).reshape(-1, 5).astype(np.float32)
+    outlines = rr.Ellipses2D.columns(
+        centers=places[:, :2], half_sizes=places[:, [4, 4]] + BESIDE_PX, labels=[label for _, label in circles]
+    )
+    return [
+        styled(at.BALLS, rr.Ellipses2D, colors=at.OTHERS_COLOUR, line_radii=-0.6, show_labels=True),
+        columns_at(at.BALLS, run.times_us, outlines, lengths),
+        styled(at.TRACKS, rr.LineStrips2D, colors=at.OTHERS_COLOUR, radii=-0.6),
+        columns_at(at.TRACKS, run.times_us, rr.LineStrips2D.columns(strips=strips), lengths),
     ]
 
 

@@ -14,6 +14,7 @@ from .run import ViewedRun
 Floats = NDArray[np.float64]
 
 CIRCLES = (at.HOUGH, at.MEASURED, at.KALMAN, at.TRUE_CIRCLE)
+ALL_BALLS = (at.BALLS, at.TRACKS)
 
 
 def picture(origin: str, name: str, contents: list[str] | None = None, bounds: Floats | None = None) -> rrb.View:
@@ -34,12 +35,12 @@ def text(origin: str, name: str) -> rrb.View:
 
 def events(run: ViewedRun) -> rrb.View:
     """Raw events in the whole image."""
-    return picture(at.IMAGE, "Events: ON red, OFF blue", [at.FRAME, at.EVENTS], _image_bounds(run))
+    return picture(at.IMAGE, "Events: ON red, OFF blue", [at.FRAME, at.EVENTS, *ALL_BALLS], _image_bounds(run))
 
 
 def surface(run: ViewedRun, name: str = "Surface: Hough yellow, Kalman green") -> rrb.View:
     """The surface with the circles in the whole image."""
-    return picture(at.IMAGE, name, [at.FRAME, at.SURFACE, *CIRCLES], _image_bounds(run))
+    return picture(at.IMAGE, name, [at.FRAME, at.SURFACE, *CIRCLES, *ALL_BALLS], _image_bounds(run))
 
 
 def close_up(run: ViewedRun, name: str = "Surface around the ball", prefix: str = "") -> rrb.View:
@@ -73,10 +74,18 @@ def score_over_magnitude() -> rrb.View:
 
 
 def status() -> rrb.View:
-    """Lane of the tracker's status."""
+    """Lanes of the tracker's status and of the shots, one below the other for balls in flight at the same time."""
     return rrb.StateTimelineView(
-        origin=at.STATUS, name="State of the tracker", time_view=rrb.TimeAxis(link="LinkToGlobal")
+        origin="/",
+        contents=[at.STATUS, f"{at.SHOTS}/**"],
+        name="State of the tracker, shots by how they began",
+        time_view=rrb.TimeAxis(link="LinkToGlobal"),
     )
+
+
+def contacts() -> rrb.View:
+    """List of the contacts: which shot began or ended when, and how."""
+    return rrb.TextLogView(origin=at.CONTACTS, name="Shots and contacts")
 
 
 def ball(run: ViewedRun, name: str = "Ball with derotated logo", *, methods: bool = True) -> rrb.View:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from spinscope.pipeline.camera import Camera
 from spinscope.pipeline.chain import Tick
-from spinscope.pipeline.registry import methods
+from spinscope.pipeline.registry import STAGES, methods
 from spinscope.pipeline.results import SpinEstimate, Truth
 from spinscope.pipeline.shots import Shot
 from spinscope.pipeline.stage import SpinMethod
+
+from .followed_ball import followed_ticks
 
 if TYPE_CHECKING:
     from spinscope.pipeline.session import Result
@@ -33,7 +35,7 @@ class ViewedRun:
     name : str
         Name of the recording, for people.
     ticks : sequence of Tick
-        In order of time, without gaps; at least one.
+        In order of time, without gaps; at least one. Their first ball is the one that the detail views follow.
     shots : sequence of Shot
         Found in the ticks.
     no_shot_reason : str, optional
@@ -48,6 +50,9 @@ class ViewedRun:
         The simulator's truth.
     warnings : sequence of str
         Notices about the recording, for people.
+    followed : int, optional
+        Number of the shot, from 1, whose ball the detail views follow while it flies; by default the tracker's first
+        ball.
     """
 
     name: str
@@ -59,21 +64,30 @@ class ViewedRun:
     fixed: bool
     truth: Truth | None
     warnings: Sequence[str]
+    followed: int | None = None
 
     @classmethod
-    def of(cls, result: Result) -> ViewedRun:
-        """The run behind a result."""
-        session = result.session
+    def of(cls, result: Result, followed: int | None = None) -> ViewedRun:
+        """The run behind a result; a number beyond its shots is no choice."""
+        session, shots = result.session, result.shots
+        followed = followed if followed is not None and 1 <= followed <= len(shots) else None
+
+        def absent(stage: str, reason: str) -> Any:
+            declared = STAGES[stage]
+            assert declared.absent is not None
+            return declared.absent(session.parameters.group(declared.group), reason)
+
         return cls(
             name=session.recording.path.name,
-            ticks=result.ticks,
-            shots=result.shots,
+            ticks=followed_ticks(result.ticks, shots, None if followed is None else shots[followed - 1], absent),
+            shots=shots,
             no_shot_reason=result.no_shot_reason,
             camera=session.camera,
             ball_radius_m=session.ball_radius_m,
             fixed=session.parameters.track.ball == "fixed",
             truth=session.truth,
             warnings=session.warnings,
+            followed=followed,
         )
 
     @cached_property
@@ -128,6 +142,29 @@ class ViewedRun:
     def variances(self) -> Floats:
         """Variances (n, 5) of the Kalman states, NaN without a ball."""
         return np.array([np.diag(tick.track.covariance) for tick in self.ticks]).reshape(-1, 5)
+
+    @cached_property
+    def shot_numbers(self) -> dict[int, int]:
+        """Number of each shot for people, from 1 in order of their start, by the tracker's number."""
+        return {shot.number: number for number, shot in enumerate(self.shots, 1)}
+
+    @cached_property
+    def final_shots(self) -> dict[int, Shot]:
+        """Shots by the row of the tick with the result of the whole shot, of those followed there."""
+        rows = {}
+        for shot in self.shots:
+            own = [i for i, tick in enumerate(self.ticks) if tick.track.shot == shot.number]
+            whole = [i for i in own if self.ends_us[i] <= shot.end_us]
+            if whole:
+                rows[whole[-1]] = shot
+        return rows
+
+    @cached_property
+    def contacts_us(self) -> Times:
+        """Times (n,) at which a shot begins with a bounce or a hit, or ends with one, us of file time."""
+        began = {shot.start_us for shot in self.shots if shot.began_by in ("bounce", "hit")}
+        ended = {shot.end_us for shot in self.shots if shot.ended_by in ("bounce", "hit")}
+        return np.array(sorted(began | ended), np.int64)
 
     @cached_property
     def stages(self) -> tuple[str, ...]:
@@ -187,12 +224,6 @@ def vector_of(estimate: SpinEstimate | None) -> Floats:
     return np.zeros(3) if estimate is None or estimate.vector_rps is None else estimate.vector_rps
 
 
-def shot_starts(run: ViewedRun) -> Iterator[int | None]:
+def shot_starts(run: ViewedRun) -> list[int | None]:
     """Start of the shot to which each tick belongs, the moment of the body frame; None without a ball."""
-    shot, start_us = None, None
-    for tick in run.ticks:
-        if not tick.track.has_ball:
-            shot, start_us = None, None
-        elif tick.track.shot != shot:
-            shot, start_us = tick.track.shot, tick.packet.start_us
-        yield start_us
+    return [tick.balls[0].track.start_us if tick.balls else None for tick in run.ticks]

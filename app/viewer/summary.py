@@ -13,6 +13,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from spinscope.pipeline.chain import Tick
 from spinscope.pipeline.results import SpinEstimate
+from spinscope.pipeline.shots import BEGAN_WORDS, ENDED_WORDS
 from spinscope.pipeline.spin_terms import Kind, axis_words, kind_of_spin, km_h, rpm, speed_words, std_words
 
 from . import entities as at
@@ -34,19 +35,16 @@ MIN_SPEED_M_S = 0.2
 def summary_chunks(run: ViewedRun) -> list[Chunk]:
     """Summary and card at the start and at the end of every tick."""
     texts, cards = [_opening(run)], [(("-", "spin"), ("-", "speed"), ("No ball yet", run.no_shot_reason or ""))]
-    finals = {shot.end_us: shot for shot in run.shots}
     result: list[str] = []
-    for tick, true_rps in zip(run.ticks, _true_spins(run), strict=True):
+    for row, (tick, true_rps) in enumerate(zip(run.ticks, _true_spins(run), strict=True)):
         velocity = _velocity_m_s(run, tick)
-        shot = finals.get(tick.packet.end_us)
+        shot = run.final_shots.get(row)
         if shot is not None and not run.fixed and shot.t_us.size > 1:
             velocity = shot.velocity_m_s(run.camera, run.ball_radius_m)
         state = _TickState(run, tick, velocity, true_rps)
         if shot is not None:
             milliseconds = (shot.end_us - shot.start_us) / 1000
-            result = state.lines(
-                f"shot {list(finals).index(shot.end_us) + 1} of {len(run.shots)}, {milliseconds:.0f} ms"
-            )
+            result = state.lines(f"shot {run.shot_numbers[shot.number]} of {len(run.shots)}, {milliseconds:.0f} ms")
         if not tick.track.has_ball:
             text = _without_ball(run, tick, result)
         else:
@@ -87,7 +85,7 @@ class _TickState:
 
     def lines(self, span: str) -> list[str]:
         """The whole summary of a span of time."""
-        return [*self._headline(span), *self._table(), *_evidence(self.run, self.tick)]
+        return [*self._headline(span), *self._table(), *_shot_table(self.run), *_evidence(self.run, self.tick)]
 
     def _headline(self, span: str) -> list[str]:
         """Heading with the answer, or that there is none yet."""
@@ -144,6 +142,21 @@ class _TickState:
             speed_lines,
             (kind.name.capitalize(), more.strip("()") if more.startswith("(") else more),
         )
+
+
+def _shot_table(run: ViewedRun) -> list[str]:
+    """Every shot of the run with its trusted spin, a row each: before and after a contact side by side."""
+    if len(run.shots) < 2:
+        return []
+    lines = ["| shot | ms | began | spin [rps] | axis (x, y, z) | ended |", "|---|---|---|---|---|---|"]
+    for number, shot in enumerate(run.shots, 1):
+        span = f"{shot.start_us / 1000:.0f} to {shot.end_us / 1000:.0f}"
+        spin, axis = f"not known: {shot.best_reason}", "-"
+        if shot.best is not None:
+            spin, axis = _magnitude(shot.estimates[shot.best]), axis_words(shot.estimates[shot.best])
+        began, ended = BEGAN_WORDS[shot.began_by], ENDED_WORDS[shot.ended_by]
+        lines.append(f"| {number} | {span} | {began} | {spin} | {axis} | {ended} |")
+    return [*lines, ""]
 
 
 def _true_spins(run: ViewedRun) -> list[Vector | None]:

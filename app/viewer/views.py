@@ -143,7 +143,7 @@ def _spin(run: ViewedRun) -> rrb.Container:
         rrb.Vertical(panes.ball(run), unrolled, row_shares=[3, 2]),
         rrb.Vertical(panes.score_over_magnitude(), score, row_shares=[4, 3]),
         rrb.Vertical(*(plot.view(run) for plot in shown)),
-        panes.text(at.SUMMARY, "Summary"),
+        rrb.Vertical(panes.text(at.SUMMARY, "Summary"), panes.contacts(), row_shares=[4, 1]),
         column_shares=[4, 4, 3, 4],
     )
 
