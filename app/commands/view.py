@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.session import Choices, Session
 
 from ..terminal import ProgressBar, note
@@ -35,13 +36,20 @@ def _layouts() -> dict[str, str]:
     show_default=True,
     help="Which tab is in front.",
 )
+@click.option(
+    "--shot",
+    "followed",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Follow the ball of shot N, as `analyze` numbers them; the first ball by default.",
+)
 @session_options
-def view(recording: Path, save: Path | None, native: bool, layout: str, choices: Choices) -> None:
+def view(recording: Path, save: Path | None, native: bool, layout: str, followed: int | None, choices: Choices) -> None:
     """Show every stage of a recording in the viewer."""
     if not (save or native):
         from ..web import serve
 
-        serve(recording, choices, tools=False, layout=layout)
+        serve(recording, choices, tools=False, layout=layout, followed=followed)
         return
     from .. import viewer
 
@@ -51,11 +59,13 @@ def view(recording: Path, save: Path | None, native: bool, layout: str, choices:
         session = Session.open(recording, choices, bar)
         session = session.clip_for_viewing(bar)
         result = session.estimate_keeping_ticks(bar)
+        if followed is not None and followed > len(result.shots):
+            raise ParameterError(f"--shot {followed}: there are {len(result.shots)} shots, numbered from 1")
         for warning in session.warnings:
             note(f"warning: {warning}")
         if save:
-            viewer.save(result, save, layout=layout)
+            viewer.save(result, save, layout, followed)
     if save:
         note(f"saved {save} ({save.stat().st_size / 1e6:.1f} MB): `uv run rerun {save}` opens it")
     else:
-        viewer.show_window(result, layout)
+        viewer.show_window(result, layout, followed)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from spinscope.pipeline.session import Result
 
 
-def save(result: Result, path: Path, layout: str = "all") -> None:
+def save(result: Result, path: Path, layout: str = "all", followed: int | None = None) -> None:
     """Write a result as an .rrd file with all views in it; the file appears whole or not at all.
 
     Parameters
@@ -27,6 +27,8 @@ def save(result: Result, path: Path, layout: str = "all") -> None:
         File to write.
     layout : str
         Name of the view in front.
+    followed : int, optional
+        Number of the shot, from 1, whose ball the detail views follow while it flies.
 
     Raises
     ------
@@ -36,7 +38,7 @@ def save(result: Result, path: Path, layout: str = "all") -> None:
     from .rrd import write_rrd
     from .run import ViewedRun
 
-    write_rrd(ViewedRun.of(result), path, layout)
+    write_rrd(ViewedRun.of(result, followed), path, layout)
 
 
 def require_display() -> None:
@@ -49,9 +51,9 @@ def require_display() -> None:
         )
 
 
-def show_window(result: Result, layout: str = "all") -> None:
+def show_window(result: Result, layout: str = "all", followed: int | None = None) -> None:
     """Show the run in Rerun's own window until that is closed; raises SpinscopeError where no window can open."""
     from .native import show_native
     from .run import ViewedRun
 
-    show_native(ViewedRun.of(result), layout)
+    show_native(ViewedRun.of(result, followed), layout)

@@ -11,7 +11,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from .entities import Colour
+from .entities import CONTACT_COLOUR, Colour
 from .rerun_api import Chunk, columns_at, styled
 from .run import ViewedRun
 
@@ -39,7 +39,7 @@ class Curve:
         Drawn as a translucent band of +-1 sigma; then `unit` is its unit.
     t_us : (n,) array, optional
         Times of the values, us of file time, where they are not the ticks' ends.
-    marker : {"circle", "down", "up"}, optional
+    marker : {"circle", "down"}, optional
         Dots of this form in place of a line.
     width : float
         Of the line, or of the dots.
@@ -56,7 +56,7 @@ class Curve:
     variances: Floats | None = None
     unit: str = ""
     t_us: NDArray[np.int64] | Floats | None = None
-    marker: Literal["circle", "down", "up"] | None = None
+    marker: Literal["circle", "down"] | None = None
     width: float = 1.5
     is_stepped: bool = False
     is_in_range: bool = True
@@ -109,13 +109,14 @@ class Plot:
     with_zero: bool = False
 
     def chunks(self, run: ViewedRun) -> list[Chunk]:
-        """All curves."""
-        return [chunk for curve in self.curves(run) for chunk in curve.chunks(run, self.entity)]
+        """All curves, and a vertical line at each contact."""
+        curves = [*self.curves(run), *self._contacts(run)]
+        return [chunk for curve in curves for chunk in curve.chunks(run, self.entity)]
 
     def view(self, run: ViewedRun, *, legend: bool = True) -> rrb.TimeSeriesView:
         """View of the plot over the time in view; without its legend where there is no room for it."""
         corner = self.legend if legend else "none"
-        y_range = self.y_range(run) if self.y_range else self._range(run)
+        y_range = self._range(run)
         if corner == "top" and y_range is not None:
             y_range = (y_range[0], y_range[1] + LEGEND_SHARE * (y_range[1] - y_range[0]))
         place: Literal["RightBottom", "RightTop"] = "RightBottom" if corner == "bottom" else "RightTop"
@@ -127,8 +128,20 @@ class Plot:
             plot_legend=rrb.PlotLegend(corner=place, visible=corner != "none"),
         )
 
+    def _contacts(self, run: ViewedRun) -> list[Curve]:
+        """Vertical lines at the contacts over the range of the axis: up within a nanosecond, the time's resolution."""
+        y_range = self._range(run)
+        if y_range is None or not run.contacts_us.size:
+            return []
+        t_us = np.add.outer(run.contacts_us, [-1e-3, 0.0, 1e-3]).ravel()
+        values = np.tile([*y_range, np.nan], run.contacts_us.size)
+        t_us, values = np.concatenate([[run.start_us], t_us]), _from_start(values)
+        return [Curve("contacts", "contact", CONTACT_COLOUR, values, t_us=t_us, width=1.0)]
+
     def _range(self, run: ViewedRun) -> Range | None:
-        """Range of the curves with a tenth to spare on either side; None where they have no values."""
+        """Range of the axis, or of the curves with a tenth to spare on either side; None where they have no values."""
+        if self.y_range:
+            return self.y_range(run)
         values = np.zeros(int(self.with_zero))
         for curve in self.curves(run):
             if curve.is_in_range:

@@ -40,7 +40,7 @@ SCORE_AXES = "/score_axes"
 
 # Over time.
 STATUS = "/tracker"
-SHOTS = "/shots"
+SHOTS = "/tracker/shots"
 CONTACTS = "/contacts"
 PLOT = "/plots"
 RESIDUAL = "/plots/residual"

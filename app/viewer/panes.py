@@ -76,8 +76,7 @@ def score_over_magnitude() -> rrb.View:
 def status() -> rrb.View:
     """Lanes of the tracker's status and of the shots, one below the other for balls in flight at the same time."""
     return rrb.StateTimelineView(
-        origin="/",
-        contents=[at.STATUS, f"{at.SHOTS}/**"],
+        origin=at.STATUS,
         name="State of the tracker, shots by how they began",
         time_view=rrb.TimeAxis(link="LinkToGlobal"),
     )
@@ -85,7 +84,8 @@ def status() -> rrb.View:
 
 def contacts() -> rrb.View:
     """List of the contacts: which shot began or ended when, and how."""
-    return rrb.TextLogView(origin=at.CONTACTS, name="Shots and contacts")
+    columns = rrb.TextLogColumns(timeline_columns=[at.TIMELINE], text_log_columns=["Body"])
+    return rrb.TextLogView(origin=at.CONTACTS, name="Shots and contacts", columns=columns)
 
 
 def ball(run: ViewedRun, name: str = "Ball with derotated logo", *, methods: bool = True) -> rrb.View:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -150,10 +149,7 @@ def _magnitude_curves(run: ViewedRun) -> list[Curve]:
         curves.append(Curve("rate", "event rate's zero crossings", at.RATE_COLOUR, values))
     if run.true_spins_rps is not None:
         curves.append(_truth(np.linalg.norm(run.true_spins_rps, axis=1)))
-    # A row of NaN leads, as before every curve.
-    contacts_us, zeros = np.array([run.start_us, *run.contacts_us]), np.zeros(run.contacts_us.size)
-    contacts = Curve("contacts", "contact", at.CONTACT_COLOUR, np.array([np.nan, *zeros]), t_us=contacts_us)
-    return [*curves, dataclasses.replace(contacts, marker="up", width=6.0)]
+    return curves
 
 
 def _magnitude_range(run: ViewedRun) -> Range:

@@ -96,7 +96,7 @@ def _all(run: ViewedRun) -> rrb.Container:
             panes.events(run), panes.surface(run), panes.close_up(run), panes.flight(run), column_shares=[4, 4, 3, 3]
         ),
         rrb.Horizontal(
-            rrb.Vertical(panes.status(), state, row_shares=[3, 5]),
+            rrb.Vertical(panes.status(), state, row_shares=[4, 5]),
             panes.logo_events(run),
             panes.flow(run),
             panes.derotated_logo(),
@@ -120,7 +120,7 @@ def _tracker(run: ViewedRun) -> rrb.Container:
     state, residuals = ([plot.view(run) for plot in some] for some in (plots.STATE_PLOTS, plots.RESIDUAL_PLOTS))
     return rrb.Horizontal(
         rrb.Vertical(surface, pictures, row_shares=[3, 2]),
-        rrb.Vertical(panes.status(), *state, row_shares=[1.2, *(2 for _ in state)]),
+        rrb.Vertical(panes.status(), *state, row_shares=[2, *(2 for _ in state)]),
         rrb.Vertical(*residuals, plots.EVENT_PLOT.view(run)),
         column_shares=[5, 4, 3],
     )

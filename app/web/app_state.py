@@ -35,6 +35,8 @@ class AppState:
         Whether the page shows its tools (`tune`), or the viewer alone (`view`).
     layout : str
         Layout of the viewer in front.
+    followed : int, optional
+        Number of the shot, from 1, whose ball the detail views follow.
 
     Attributes
     ----------
@@ -42,10 +44,12 @@ class AppState:
         Open sessions by id.
     """
 
-    def __init__(self, path: Path, choices: Choices, *, tools: bool = True, layout: str = "all") -> None:
+    def __init__(
+        self, path: Path, choices: Choices, *, tools: bool = True, layout: str = "all", followed: int | None = None
+    ) -> None:
         self.path = path.absolute()
         self.folder = self.path.parent
-        self.tools, self.layout = tools, layout
+        self.tools, self.layout, self.followed = tools, layout, followed
         self.drawings = DrawingCache()
         self._choices = choices
         self._recordings: OrderedDict[Path, OpenRecording] = OrderedDict()

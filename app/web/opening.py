@@ -32,6 +32,7 @@ def opening(state: AppState, session: ClientSession) -> Opening:
         viewer_version=viewer_version(),
         tools=state.tools,
         tab=VIEWS[state.layout].label,
+        followed=state.followed,
         recording=recording_description(recording),
         recordings=state.recording_names(),
         sections=sections(),

@@ -81,16 +81,16 @@ class Publisher:
         """Bytes of a picture; None where a newer one has taken its place."""
         return self._pictures.get(picture_id)
 
-    def draw(self, b: Result, a: Result | None, report: RunReport, *, partial: bool) -> Picture:
-        """Draw a run, beside that of A if there is one, and keep the picture."""
+    def draw(self, b: Result, a: Result | None, report: RunReport, *, followed: int | None, partial: bool) -> Picture:
+        """Draw a run with a shot followed, beside that of A if there is one, and keep the picture."""
         report.tell("drawing", 1.0)
         began_s = time.perf_counter()
-        run = ViewedRun.of(b)
+        run = ViewedRun.of(b, followed)
         chunks = self._chunks(b, run)
         if a is None:
             chunks += note_without_a(run)
         else:
-            chunks += [*compared(self._chunks(a, ViewedRun.of(a))), *note_with_a(run, _difference_text(a, b))]
+            chunks += [*compared(self._chunks(a, ViewedRun.of(a, followed))), *note_with_a(run, _difference_text(a, b))]
         picture_id = f"{self._session_id}-{report.serial}{f'-part{len(b.ticks)}' if partial else ''}"
         content = rrd_bytes(chunks, picture_id)
         report.add({DRAWING: time.perf_counter() - began_s})

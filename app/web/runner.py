@@ -105,7 +105,7 @@ class Runner:
         if is_fast_first:
             self._show(early, a, request, report, partial=True)
         else:
-            self._publisher.drawings.begin(ViewedRun.of(early), chain.keys(parameters))
+            self._publisher.drawings.begin(ViewedRun.of(early, request.followed), chain.keys(parameters))
         return Result.of(session, self._whole(clip, request, report) if whole is None else whole.result())
 
     def _whole(self, clip: Session, request: RunRequest, report: RunReport) -> list[Tick]:
@@ -149,7 +149,7 @@ class Runner:
     ) -> None:
         """Draw and publish a result, unless something newer was requested meanwhile."""
         self._requests.check(request)
-        picture = self._publisher.draw(b, a, report, partial=partial)
+        picture = self._publisher.draw(b, a, report, followed=request.followed, partial=partial)
         self._requests.check(request)
         self._publisher.publish(self.recording, picture, b, a, report, partial=partial)
 

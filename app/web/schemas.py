@@ -38,7 +38,8 @@ class OpenRequest(Request):
 class RunRequest(Request):
     """Run a clip with `parameters`, beside those pinned as A; the request with the highest serial is the newest.
 
-    While a slider is being dragged (`interactive`) a picture without the slowest stages comes first.
+    While a slider is being dragged (`interactive`) a picture without the slowest stages comes first. The detail views
+    follow the ball of shot number `followed`, from 1, while it flies; by default the tracker's first ball.
     """
 
     serial: int = Field(ge=0, lt=2**53)
@@ -48,6 +49,7 @@ class RunRequest(Request):
     end_us: Microseconds
     playhead_us: float | None = Field(default=None, allow_inf_nan=False)
     interactive: bool = False
+    followed: int | None = Field(default=None, ge=1)
 
 
 class TextRequest(Request):
@@ -185,12 +187,16 @@ class SectionInfo(Response):
 
 
 class Opening(Response):
-    """Everything that the page needs to know at first; without `tools` it shows the viewer alone, `tab` in front."""
+    """Everything that the page needs to know at first; without `tools` it shows the viewer alone, `tab` in front.
+
+    The detail views follow the ball of shot number `followed`, if given.
+    """
 
     session: str
     viewer_version: str
     tools: bool
     tab: str
+    followed: int | None
     recording: RecordingDescription
     recordings: list[str]
     sections: list[SectionInfo]

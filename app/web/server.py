@@ -50,6 +50,7 @@ def serve(
     open_browser: bool = True,
     tools: bool = True,
     layout: str = "all",
+    followed: int | None = None,
 ) -> None:
     """Open a recording and serve its page until Ctrl-C.
 
@@ -59,7 +60,7 @@ def serve(
         Port asked for; another free one is taken when it is busy. None for the usual one.
     open_browser : bool
         Whether to open the page where there is a browser; the address is printed in any case.
-    tools, layout
+    tools, layout, followed
         See AppState.
 
     Raises
@@ -67,7 +68,7 @@ def serve(
     SpinscopeError
         For a recording or choices that cannot be used, or when no port can be opened.
     """
-    state = AppState(path, choices, tools=tools, layout=layout)
+    state = AppState(path, choices, tools=tools, layout=layout, followed=followed)
     recording = state.recording()
     # While the browser loads the page and the viewer, which takes longer.
     threading.Thread(target=_load_kernels, args=(recording,), name="kernels", daemon=True).start()

@@ -10,11 +10,15 @@ import { notice } from "./elements.js";
  * @property {{recording: string}} connection
  * @property {Settings} settings
  * @property {{playhead_us: number | null, tab: () => Promise<string | null>}} viewer
+ * @property {{followed: number | null}} runner
  * @property {Opening} opening
  * @property {{values: Record<string, number>} | null} biases
  */
 
-export async function linkOf(/** @type {Linked} */ { connection, settings, viewer, opening, biases }, withTab = false) {
+export async function linkOf(
+  /** @type {Linked} */ { connection, settings, viewer, runner, opening, biases },
+  withTab = false,
+) {
   const words = new URLSearchParams();
   words.set("recording", connection.recording);
   for (const text of assignments(settings.parameters, opening.presets.opened)) words.append("set", text);
@@ -23,6 +27,7 @@ export async function linkOf(/** @type {Linked} */ { connection, settings, viewe
     for (const text of assignments(settings.pinned, opening.presets.opened)) words.append("a", text);
   }
   if (String(settings.clip) !== String(opening.recording.clip_us)) words.set("clip", settings.clip.join("-"));
+  if (runner.followed !== null) words.set("shot", String(runner.followed));
   const time = viewer.playhead_us;
   if (time !== null) words.set("t", String(Math.round(time)));
   const changed = Object.entries(biases?.values ?? {}).filter(([name, value]) => value !== opening.biases.values[name]);
@@ -40,6 +45,7 @@ export function linked() {
     clip: clip && /** @type {[number, number]} */ ([Number(clip[1]), Number(clip[2])]),
     time_us: Number(words.get("t")) || null,
     tab: words.get("tab"),
+    followed: Number(words.get("shot")) || null,
     biases: Object.fromEntries(biases.map(([name, value]) => [name, Number(value)])),
     parameters: (/** @type {Opening} */ opening) => applied(opening, words.getAll("set")),
     pinned: (/** @type {Opening} */ opening) => (words.get("pinned") ? applied(opening, words.getAll("a")) : null),

@@ -1,7 +1,7 @@
 // The page: opens a session on the server and connects settings, controls, viewer and tools. Without tools it is the
 // viewer alone (`spinscope view`, or ?tools=off).
 
-/** @import { Opening, RecordingDescription, RunMessage } from "./messages.d.ts" */
+/** @import { Opening, RecordingDescription, RunMessage, RunMetrics } from "./messages.d.ts" */
 
 import { Ball } from "./ball.js";
 import { Bar } from "./bar.js";
@@ -57,6 +57,7 @@ async function start() {
   const tab = encodeURIComponent(link.tab ?? opening.tab);
   const first = { layout: `layout?tab=${tab}&tools=${hasTools}`, time_us: link.time_us };
   app.runner = new RunRequests(connection, settings, viewer, first);
+  app.runner.followed = link.followed ?? opening.followed;
   app.overview = new Overview(byId("overview"), recording);
   app.bar = new Bar(byId("bar"), opening.stages);
   describe(recording);
@@ -103,6 +104,7 @@ function listen() {
     byId("progress").textContent = app.bar.status.textContent;
     if (detail.error) notice(detail.error);
     if (["done", "failed"].includes(state)) document.body.dataset.done = String(detail.serial);
+    if (metrics) offerShots(metrics);
     if (metrics && !app.opening.recording.is_long) {
       app.overview.show(settings.clip, metrics.shots.map(({ start_us, end_us }) => [start_us, end_us]));
     }
@@ -137,6 +139,23 @@ function listen() {
   viewer.addEventListener("moved", (event) => overview.move(/** @type {CustomEvent} */ (event).detail));
   globalThis.addEventListener("pagehide", () => connection.close());
   globalThis.addEventListener("hashchange", () => location.reload()); // a link that was pasted, or the way back
+}
+
+// Where there are several shots: the ball that the detail views follow.
+function offerShots(/** @type {RunMetrics} */ { shots }) {
+  const ms = (/** @type {number} */ us) => (us / 1000).toFixed(0);
+  const options = shots.map(({ start_us, end_us }, i) => {
+    const span = `${ms(start_us)} to ${ms(end_us)} ms`;
+    return element(
+      "option",
+      { value: i + 1, selected: app.runner.followed === i + 1 },
+      `Follow shot ${i + 1}, ${span}`,
+    );
+  });
+  const select = byId("follow");
+  select.replaceChildren(element("option", { value: "" }, "Follow the first ball"), ...options);
+  select.hidden = shots.length < 2;
+  select.onchange = (/** @type {any} */ { target }) => app.runner.follow(Number(target.value) || null);
 }
 
 function addTools(/** @type {Opening} */ opening) {

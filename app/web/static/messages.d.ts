@@ -38,7 +38,7 @@ export type MetricInfo = { name: string; label: string; unit: string };
 /** Open a session on a recording of the folder; None for the one the program was started with. */
 export type OpenRequest = { recording?: string | null };
 /** Everything that the page needs to know at first; without `tools` it shows the viewer alone, `tab` in front. */
-export type Opening = { session: string; viewer_version: string; tools: boolean; tab: string; recording: RecordingDescription; recordings: string[]; sections: SectionInfo[]; stages: Choice[]; methods: MethodInfo[]; run_metrics: MetricInfo[]; shot_metrics: MetricInfo[]; estimate_metrics: MetricInfo[]; tabs: Choice[]; exports: Choice[]; objectives: Choice[]; suggested: string[]; colours: Record<string, string>; presets: Record<string, Record<string, Record<string, any>>>; renamed: Record<string, string>; biases: BiasState };
+export type Opening = { session: string; viewer_version: string; tools: boolean; tab: string; followed: number | null; recording: RecordingDescription; recordings: string[]; sections: SectionInfo[]; stages: Choice[]; methods: MethodInfo[]; run_metrics: MetricInfo[]; shot_metrics: MetricInfo[]; estimate_metrics: MetricInfo[]; tabs: Choice[]; exports: Choice[]; objectives: Choice[]; suggested: string[]; colours: Record<string, string>; presets: Record<string, Record<string, Record<string, any>>>; renamed: Record<string, string>; biases: BiasState };
 /** The trials of an optimization so far. */
 export type Optimization = { objective: string; total: number; trials: number[]; best: number | null; values: Record<string, boolean | number | string | null> };
 /** Progress of an optimization. */
@@ -62,7 +62,7 @@ export type RunMessage = { kind: "run"; serial: number; state: "loading" | "comp
 /** Metrics of a run over all its shots. */
 export type RunMetrics = { ticks: number; tracked_share: number; residual_px: number | null; jitter_px: number | null; logo_events: number; shots: ShotMetrics[]; no_shot_reason: string | null };
 /** Run a clip with `parameters`, beside those pinned as A; the request with the highest serial is the newest. */
-export type RunRequest = { serial: number; parameters: Record<string, Record<string, any>>; pinned?: Record<string, Record<string, any>> | null; start_us: number; end_us: number; playhead_us?: number | null; interactive?: boolean };
+export type RunRequest = { serial: number; parameters: Record<string, Record<string, any>>; pinned?: Record<string, Record<string, any>> | null; start_us: number; end_us: number; playhead_us?: number | null; interactive?: boolean; followed?: number | null };
 /** A group of controls; `is_setup` where it belongs to the set-up and not to the method. */
 export type SectionInfo = { title: string; is_setup: boolean; controls: ControlInfo[] };
 /** Parameters, and the clip when it is not the first one of the recording. */

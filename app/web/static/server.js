@@ -136,6 +136,8 @@ export class Connection extends EventTarget {
 export class RunRequests extends EventTarget {
   serial = 0;
   isBlind = false; // there is no viewer: numbers alone
+  /** @type {number | null} number of the shot whose ball the detail views follow */
+  followed = null;
   #hasLayout = false;
   #dirty = false;
   #settled = false;
@@ -165,6 +167,15 @@ export class RunRequests extends EventTarget {
     settings.onChange((settled) => this.#change(settled));
   }
 
+  follow(/** @type {number | null} */ shot) {
+    this.followed = shot;
+    this.request(true);
+  }
+
+  get #wanted() {
+    return JSON.stringify({ ...this.settings.run, followed: this.followed });
+  }
+
   request(/** @type {boolean} */ settled) {
     this.#dirty = true;
     this.#settled ||= settled;
@@ -176,7 +187,7 @@ export class RunRequests extends EventTarget {
    * @param {boolean} settled
    */
   #change(settled) {
-    if (!settled || this.#dirty || this.#last !== JSON.stringify(this.settings.run)) this.request(settled);
+    if (!settled || this.#dirty || this.#last !== this.#wanted) this.request(settled);
   }
 
   #schedule() {
@@ -193,7 +204,7 @@ export class RunRequests extends EventTarget {
     this.#dirty = this.#settled = false;
     this.#sending = this.#running = true;
     this.#sentAt = performance.now();
-    this.#last = JSON.stringify(this.settings.run);
+    this.#last = this.#wanted;
     const playhead_us = this.viewer.playhead_us;
     try {
       await this.connection.post("run", { serial: ++this.serial, ...JSON.parse(this.#last), interactive, playhead_us });

@@ -16,19 +16,18 @@ from spinscope.app.viewer.rrd import write_rrd
 from spinscope.app.viewer.run import ViewedRun
 from spinscope.pipeline.registry import STAGES
 from spinscope.pipeline.session import Choices, Result, Session
+from spinscope.pipeline.stage import Stage
 from spinscope.pipeline.stages.track import ShotEnd, TrackResult
 from tests.app.viewer.reading import Rows, read_back
 
 CONTACT_US, KNOWN_US, OTHER_US = 52_000, 65_000, (30_000, 80_000)
 
 
-@pytest.fixture(scope="module")
-def result(samples: Path) -> Iterator[Result]:
-    """A flight whose tracker tells of a bounce in its middle three ticks late, and of a second ball beside it."""
-    tracker = STAGES["track"]
+def bouncing(tracker: Stage) -> Stage:
+    """The tracker, telling of a bounce in the middle of its flight three ticks late, and of a second ball beside it."""
 
     def step(parameters: Any, state: Any, packet: Any, *inputs: Any) -> TrackResult:
-        told = tracker.step(parameters, state[0], packet, *inputs)
+        told: TrackResult = tracker.step(parameters, state[0], packet, *inputs)
         if told.ball is None:
             return told
         after = dataclasses.replace(told.ball, shot=2, start_us=CONTACT_US, began_by="bounce")
@@ -41,17 +40,21 @@ def result(samples: Path) -> Iterator[Result]:
             state[1].clear()
         balls = [ball]
         if OTHER_US[0] < packet.end_us <= OTHER_US[1]:
-            beside = told.ball.mean + [0, 100, 0, 0, 0]
-            balls.append(dataclasses.replace(told.ball, shot=1, mean=beside, start_us=OTHER_US[0]))
+            beside = np.add(told.ball.mean, [0, 100, 0, 0, 0])
+            balls.append(dataclasses.replace(told.ball, shot=1, mean=beside, start_us=OTHER_US[0], earlier=()))
         return dataclasses.replace(told, balls=tuple(balls), ended=ended)
 
     def start(parameters: Any, context: Any) -> Any:
         return tracker.start(parameters, context), []
 
+    return dataclasses.replace(tracker, start=start, step=step)
+
+
+@pytest.fixture(scope="module")
+def result(samples: Path) -> Iterator[Result]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(STAGES._entries, "track", dataclasses.replace(tracker, start=start, step=step))
-        session = Session.open(samples / "flight_fast_top.h5", Choices())
-        yield session.estimate_keeping_ticks()
+        patch.setitem(STAGES._entries, "track", bouncing(STAGES["track"]))
+        yield Session.open(samples / "flight_fast_top.h5", Choices()).estimate_keeping_ticks()
 
 
 @pytest.fixture(scope="module")
@@ -122,7 +125,8 @@ def test_the_timeline_marks_shots_and_contacts(run: ViewedRun, logged: dict[str,
     (text,) = logged[entities.CONTACTS].at("text", CONTACT_US)
     assert "shot 1 ends: bounced" in str(text) and "shot 3 begins: from a bounce" in str(text)
     assert run.contacts_us.tolist() == [CONTACT_US]
-    assert CONTACT_US in logged[f"{entities.SPIN_MAGNITUDE}/contacts"].t_us["scalars"]
+    for plot in (entities.SPIN_MAGNITUDE, f"{entities.PLOT}/radius"):
+        assert CONTACT_US in logged[f"{plot}/contacts"].t_us["scalars"]
 
 
 def test_every_ball_has_its_circle_its_number_and_its_track(run: ViewedRun, logged: dict[str, Rows]) -> None:

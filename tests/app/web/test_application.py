@@ -70,6 +70,15 @@ def test_a_change_runs_its_stage_and_those_below_and_going_back_runs_nothing(
     assert stages_run(client.run()) == set()
 
 
+def test_another_shot_is_followed_without_a_stage_run_again(client: Client) -> None:
+    client.run()
+    done = client.run(followed=1)
+    assert done["state"] == "done" and done["picture"]
+    assert stages_run(done) == set()
+    answer = client.http.post(client.path("run"), json=client.request(followed=0))
+    assert answer.status_code == 422
+
+
 def test_frames_that_would_not_fit_are_refused(client: Client, tuner: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tuner.state.recording(), "max_frame_bytes", 30 * 1280 * 720)
     answer = client.http.post(client.path("run"), json=client.request({"track": {"tick_us": 1000}}))
