@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 from .camera import Camera
 from .errors import ParameterError
 from .events import EventBatch
-from .registry import STAGES, Parameters, methods, needed_stages, trusted_method
+from .registry import STAGES, Parameters, distrust_reason, methods, needed_stages, trusted_method
 from .results import MethodResult, Packet, SpinEstimate, nbytes
 from .stage import Context, Stage
 from .track_evidence import NO_EVIDENCE, TrackEvidence
@@ -88,6 +88,11 @@ class BallTick(StageResults):
     def best(self) -> str | None:
         """Method whose estimate is trusted, None where none is."""
         return trusted_method(self.estimates, self.evidence.doubt)
+
+    @property
+    def best_reason(self) -> str | None:
+        """Why no estimate is trusted, in words for people; None where one is."""
+        return distrust_reason(self.estimates, self.evidence.doubt)
 
 
 @dataclass(frozen=True, eq=False)

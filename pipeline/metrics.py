@@ -56,6 +56,8 @@ class ShotMetrics:
     ----------
     best : str or None
         Trusted method.
+    best_reason : str or None
+        Why no method is trusted.
     kind : str or None
         Kind of the trusted spin, like "topspin".
     sentence : str
@@ -67,6 +69,7 @@ class ShotMetrics:
     logo_events: int
     speed_m_s: float | None = _metric("Speed", "m/s")
     best: str | None
+    best_reason: str | None
     kind: str | None
     sentence: str
     spin: dict[str, EstimateMetrics]
@@ -156,6 +159,7 @@ def _shot(session: Session, shot: Shot) -> ShotMetrics:
         logo_events=shot.logo_events or 0,
         speed_m_s=None if velocity is None else _finite(float(np.linalg.norm(velocity))),
         best=shot.best,
+        best_reason=shot.best_reason,
         kind=kind.name if kind else None,
         sentence=coach_sentence(trusted, kind, velocity),
         spin={name: _estimate(session, shot, estimate) for name, estimate in shot.estimates.items()},

@@ -39,7 +39,8 @@ SCORE_MAGNITUDE = "/score"
 SCORE_AXES = "/score_axes"
 
 # Over time.
-STATUS = "/tracker"
+TRACKER = "/tracker"
+STATUS = "/tracker/ball"
 SHOTS = "/tracker/shots"
 CONTACTS = "/contacts"
 PLOT = "/plots"

@@ -76,7 +76,7 @@ def score_over_magnitude() -> rrb.View:
 def status() -> rrb.View:
     """Lanes of the tracker's status and of the shots, one below the other for balls in flight at the same time."""
     return rrb.StateTimelineView(
-        origin=at.STATUS,
+        origin=at.TRACKER,
         name="State of the tracker, shots by how they began",
         time_view=rrb.TimeAxis(link="LinkToGlobal"),
     )

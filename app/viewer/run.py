@@ -112,14 +112,19 @@ class ViewedRun:
 
     @cached_property
     def first_sight_us(self) -> int:
-        """Time at which the first track starts; the first tick's end if there is none."""
-        found = [tick.packet.end_us for tick in self.ticks if tick.track.has_ball]
-        return found[0] if found else self.ticks[0].packet.end_us
+        """Time at which the first track, or the followed one, starts; the first tick's end if there is none."""
+        return self._flown[0].packet.end_us if self._flown else self.ticks[0].packet.end_us
+
+    @cached_property
+    def _flown(self) -> list[Tick]:
+        """Ticks with a ball, of the followed shot where one was chosen."""
+        number = None if self.followed is None else self.shots[self.followed - 1].number
+        return [tick for tick in self.ticks if tick.track.has_ball and number in (None, tick.track.shot)]
 
     @cached_property
     def opening_us(self) -> int:
         """Time at which the viewer opens: a spin is first trusted, or the track starts where none is."""
-        return next((tick.packet.end_us for tick in self.ticks if tick.best is not None), self.first_sight_us)
+        return next((tick.packet.end_us for tick in self._flown if tick.best is not None), self.first_sight_us)
 
     @cached_property
     def true_spins_rps(self) -> Floats | None:

@@ -109,7 +109,8 @@ class _TickState:
             estimate = self.tick.estimates[method.name]
             name = f"**{method.label} ✔**" if self.tick.best == method.name else method.label
             lines.append(f"| {name} | {_magnitude(estimate)} | {axis_words(estimate)} |")
-        return [*lines, *self._truth_rows(), ""]
+        reason = self.tick.balls[0].best_reason
+        return [*lines, *self._truth_rows(), "", *([] if reason is None else [f"No spin is trusted: {reason}.", ""])]
 
     def _truth_rows(self) -> list[str]:
         """Last row of the table with the truth, and below it the errors of every answer."""

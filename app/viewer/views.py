@@ -62,14 +62,14 @@ def blueprint(run: ViewedRun, layout: str, *, compare: bool = False, is_lasting:
         Whether there are the views of two runs.
     is_lasting : bool
         Whether other recordings are to be shown with it: all of each is played, for the viewer forgets the selection.
-        Otherwise the first shot is played over and over.
+        Otherwise the followed shot, by default the first, is played over and over.
     """
     shown = views(compare=compare)
     tabs = [view.panes(run) for view in shown]
     for tab, view in zip(tabs, shown, strict=True):
         tab.name = view.label
     front = next((i for i, view in enumerate(shown) if view.name == layout), 0)
-    end_us = run.shots[0].end_us if run.shots else run.end_us
+    end_us = run.shots[(run.followed or 1) - 1].end_us if run.shots else run.end_us
     shot = rrb.components.AbsoluteTimeRange(min=run.first_sight_us * 1000, max=end_us * 1000)
     return rrb.Blueprint(
         rrb.Tabs(*tabs, active_tab=front),
@@ -120,7 +120,7 @@ def _tracker(run: ViewedRun) -> rrb.Container:
     state, residuals = ([plot.view(run) for plot in some] for some in (plots.STATE_PLOTS, plots.RESIDUAL_PLOTS))
     return rrb.Horizontal(
         rrb.Vertical(surface, pictures, row_shares=[3, 2]),
-        rrb.Vertical(panes.status(), *state, row_shares=[2, *(2 for _ in state)]),
+        rrb.Vertical(panes.status(), *state, row_shares=[3, *(2 for _ in state)]),
         rrb.Vertical(*residuals, plots.EVENT_PLOT.view(run)),
         column_shares=[5, 4, 3],
     )

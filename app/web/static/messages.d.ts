@@ -68,7 +68,7 @@ export type SectionInfo = { title: string; is_setup: boolean; controls: ControlI
 /** Parameters, and the clip when it is not the first one of the recording. */
 export type SettingsRequest = { parameters: Record<string, Record<string, any>>; start_us?: number | null; end_us?: number | null };
 /** One shot with the estimate of every method. */
-export type ShotMetrics = { start_us: number; end_us: number; logo_events: number; speed_m_s: number | null; best: string | null; kind: string | null; sentence: string; spin: Record<string, EstimateMetrics> };
+export type ShotMetrics = { start_us: number; end_us: number; logo_events: number; speed_m_s: number | null; best: string | null; best_reason: string | null; kind: string | null; sentence: string; spin: Record<string, EstimateMetrics> };
 /** Shots of a long recording found so far, [start, end) in us, and the share of it that was searched. */
 export type ShotsMessage = { kind: "shots"; share: number; shots: [number, number][]; error: string | null };
 /** Progress of a parameter sweep. */

@@ -28,6 +28,9 @@ export class Results extends EventTarget {
     for (const reason of new Set(both.map((one) => one.no_shot_reason).filter(Boolean))) {
       parts.push(element("p.note", {}, `No shot: ${reason}`));
     }
+    for (const reason of new Set(both.map((one) => mainShot(one)?.best_reason).filter(Boolean))) {
+      parts.push(element("p.note", {}, `No spin is trusted: ${reason}`));
+    }
     this.parent.replaceChildren(...parts);
     this.sentence = mainShot(metrics)?.sentence ?? null;
     this.dispatchEvent(new CustomEvent("shown"));

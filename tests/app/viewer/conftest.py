@@ -12,6 +12,7 @@ import pytest
 
 from spinscope.app.viewer.run import ViewedRun
 from spinscope.pipeline.chain import Tick
+from spinscope.pipeline.registry import STAGES
 from spinscope.pipeline.session import Choices, Session
 
 
@@ -21,9 +22,11 @@ def run_of(path: Path, choices: Choices) -> ViewedRun:
 
 
 def with_results(tick: Tick, **results: Any) -> Tick:
-    """The tick with other results of some stages; None for a stage that was not run."""
+    """The tick, and its only ball, with other results of some stages; None for a stage that was not run."""
     changed = {name: result for name, result in {**tick.results, **results}.items() if result is not None}
-    return dataclasses.replace(tick, results=changed)
+    own = {name: result for name, result in changed.items() if STAGES[name].scope == "ball"}
+    balls = tuple(dataclasses.replace(ball, results=own) for ball in tick.balls)
+    return dataclasses.replace(tick, results=changed, balls=balls)
 
 
 @pytest.fixture(scope="session")

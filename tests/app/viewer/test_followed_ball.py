@@ -104,6 +104,7 @@ def test_another_shot_is_followed_while_it_flies_without_a_stage_run_again(resul
         elif tick.balls:
             assert tick.track.shot in (0, 2)
     assert result.session.chain.seconds == seconds
+    assert OTHER_US[0] < other.opening_us <= OTHER_US[1], "the viewer opens where it flies"
     assert ViewedRun.of(result, followed=9).followed is None
 
 

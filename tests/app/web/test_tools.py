@@ -114,6 +114,7 @@ def metrics_with(best: str | None, estimate: EstimateMetrics | None) -> RunMetri
         logo_events=5,
         speed_m_s=None,
         best=best,
+        best_reason=None,
         kind=None,
         sentence="",
         spin={} if estimate is None else {"triplet": estimate},
