@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import subprocess
 import sys
@@ -15,6 +16,7 @@ import pytest
 from click.testing import CliRunner
 
 from spinscope.app.cli import cli
+from spinscope.app.commands.analyze import print_reports
 from spinscope.pipeline.session import Choices, Session
 from spinscope.pipeline.stages.logo import LogoParameters
 
@@ -47,6 +49,8 @@ def test_reports_keep_the_schema(reports: dict[str, dict[str, Any]], name: str) 
     for shot in reports[name]["shots"]:
         lengths = {key: len(column) for key, column in shot["track"].items()}
         assert len(set(lengths.values())) == 1, lengths
+        assert {"began_by", "ended_by"} <= set(shot)
+        assert (shot["best"] is None) == bool(shot["best_reason"]), "where none is trusted it says why"
 
 
 @pytest.mark.parametrize("name", FLIGHTS)
@@ -114,6 +118,7 @@ def test_one_method_only(samples: Path) -> None:
     report = json.loads(done.stdout)
     assert list(report["shots"][0]["spin"]) == ["triplet"]
     assert report["shots"][0]["best"] is None, "triplet is never trusted"
+    assert report["shots"][0]["best_reason"]
     assert any("fixed ball found" in warning for warning in report["warnings"])
     session = Session.open(samples / "flight_back.h5", Choices())
     for method, best in (("normal_flow", "normal_flow"), ("contrast", "contrast")):
@@ -150,8 +155,19 @@ def test_no_ball_is_an_answer_not_an_error(samples: Path) -> None:
 def test_the_table_for_people_names_units_and_methods(samples: Path) -> None:
     done = spinscope("analyze", samples / "flight_slow_top.h5")
     assert done.returncode == 0
-    for word in ("rps", "m/s", "triplet", "normal_flow", "contrast", "deg"):
+    for word in ("rps", "m/s", "triplet", "normal_flow", "contrast", "deg", "view"):
         assert word in done.stdout
+
+
+def test_the_table_says_how_a_shot_began_and_ended_and_why_nothing_is_trusted(
+    reports: dict[str, dict[str, Any]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    report = copy.deepcopy(reports["flight_side"])
+    report["shots"][0] |= {"began_by": "hit", "ended_by": "bounce"}
+    print_reports([report])
+    table = capsys.readouterr().out
+    assert "(from a hit, bounced)" in table
+    assert f"none is trusted: {report['shots'][0]['best_reason']}" in table
 
 
 @pytest.mark.parametrize(
