@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING
-
-import numpy as np
-from numpy.typing import NDArray
 
 from .results import Circle
 
@@ -20,12 +16,16 @@ if TYPE_CHECKING:
 FEWEST_IN_ROW, SHORTEST_US = 3, 10_000.0
 # The slowest shot that the tracker looks for (1 m/s, 50 radii a second) flies so many radii within SHORTEST_US.
 SHORTEST_REACH = 0.5
-# A parabola fits flights to a tenth of a radius, in vibration of 2 px too; a hand, noise or two balls taken for one
-# it does not.
-ERRATIC_RADII, FEWEST_FOR_PARABOLA = 0.25, 5
+# Centres scatter by a hundredth of a radius about a flight, by a seventh where a camera vibrates by 2 px at the worst
+# frequency. Fewer differences than these tell nothing.
+LARGEST_SCATTER, FEWEST_DIFFERENCES = 0.25, 4
+# Third differences of white noise of 1 sigma have sqrt(1 + 9 + 9 + 1) sigma.
+NOISE_OF_DIFFERENCE = math.sqrt(20.0)
+
+Place = tuple[float, float, float]  # t_us, x_px, y_px
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TrackEvidence:
     """Evidence of one track from its start to a tick, brought up to date in constant time.
 
@@ -39,51 +39,50 @@ class TrackEvidence:
         Scene time of the first tick of the present row; longest time from a row's first tick to its last.
     first : Circle, optional
         First measured circle; None before.
-    first_us : float
-        Its scene time.
     reach_px : float
         Largest distance of a measured centre from the first one.
-    moments : (5, 5) float64
-        Sums over the measured ticks of products of [1, s, s^2, x, y], s in seconds from the first circle, x and y in px
-        from its centre: what the fit of a parabola needs.
+    recent : tuple of (t_us, x_px, y_px)
+        Centres of the row's last three ticks.
+    differences, sum_px2 : int, float
+        Number of third differences of the centres of ticks in a row, and the sum of their squares. A flight has next
+        to none: it is a parabola, and perspective changes slowly.
     """
 
-    is_fixed: bool
-    ticks: int
-    in_row: int
-    most_in_row: int
-    row_since_us: float
-    longest_row_us: float
-    first: Circle | None
-    first_us: float
-    reach_px: float
-    moments: NDArray[np.float64]
+    is_fixed: bool = False
+    ticks: int = 0
+    in_row: int = 0
+    most_in_row: int = 0
+    row_since_us: float = 0.0
+    longest_row_us: float = 0.0
+    first: Circle | None = None
+    reach_px: float = 0.0
+    recent: tuple[Place, ...] = ()
+    differences: int = 0
+    sum_px2: float = 0.0
 
     def with_tick(self, ball: BallTrack) -> TrackEvidence:
         """The evidence one tick later."""
         circle = ball.measured
         if circle is None:
-            return replace(self, is_fixed=not ball.mean[2:4].any(), ticks=self.ticks + 1, in_row=0)
-        first, first_us = (circle, ball.t_us) if self.first is None else (self.first, self.first_us)
-        since_us = self.row_since_us if self.in_row else ball.t_us
-        s, x, y = (ball.t_us - first_us) * 1e-6, circle.x_px - first.x_px, circle.y_px - first.y_px
-        terms = np.array([1.0, s, s * s, x, y])
-        moments = self.moments + terms[:, None] * terms
-        moments.flags.writeable = False
+            is_fixed = not ball.mean[2:4].any()
+            return replace(self, is_fixed=is_fixed, ticks=self.ticks + 1, in_row=0, recent=())
+        first, since_us = self.first or circle, self.row_since_us if self.in_row else ball.t_us
+        places = (*self.recent, (ball.t_us, circle.x_px, circle.y_px))
+        difference_px2 = _third_difference_px2(places)
         return TrackEvidence(
-            is_fixed=False,
             ticks=self.ticks + 1,
             in_row=self.in_row + 1,
             most_in_row=max(self.most_in_row, self.in_row + 1),
             row_since_us=since_us,
             longest_row_us=max(self.longest_row_us, ball.t_us - since_us),
             first=first,
-            first_us=first_us,
-            reach_px=max(self.reach_px, math.hypot(x, y)),
-            moments=moments,
+            reach_px=max(self.reach_px, math.hypot(circle.x_px - first.x_px, circle.y_px - first.y_px)),
+            recent=places[-3:],
+            differences=self.differences + (difference_px2 is not None),
+            sum_px2=self.sum_px2 + (difference_px2 or 0.0),
         )
 
-    @cached_property
+    @property
     def doubt(self) -> str | None:
         """Why no spin of this ball is trusted, in words for people; None where the track gives no reason to doubt."""
         if self.is_fixed:
@@ -91,32 +90,36 @@ class TrackEvidence:
         if self.first is None or self.most_in_row < FEWEST_IN_ROW or self.longest_row_us < SHORTEST_US:
             return (
                 f"too little of the track is measured: {self.most_in_row} of {self.ticks} ticks in a row, "
-                f"{FEWEST_IN_ROW} over {SHORTEST_US / 1000:g} ms are needed{_if_fixed('auto')}"
+                f"{FEWEST_IN_ROW} over {SHORTEST_US / 1000:g} ms are needed "
+                "(a ball on a spinner needs --fixed-ball auto)"
             )
-        if self.reach_px < SHORTEST_REACH * self.first.radius_px:
-            place = f"{self.first.x_px:.0f} {self.first.y_px:.0f} {self.first.radius_px:.0f}"
-            return f"the ball stays in its place, within {self.reach_px:.1f} px{_if_fixed(place, 'auto')}"
-        if (scatter_px := self.scatter_px) > ERRATIC_RADII * self.first.radius_px:
-            return f"the track is no flight: its circles lie {scatter_px:.1f} px beside a parabola{_if_fixed('auto')}"
+        radius_px = self.first.radius_px
+        if self.reach_px < SHORTEST_REACH * radius_px:
+            circle = f"{self.first.x_px:.0f} {self.first.y_px:.0f} {radius_px:.0f}"
+            return (
+                f"the ball stays in its place, within {self.reach_px:.1f} px "
+                f"(a ball on a spinner needs --fixed-ball {circle} or --fixed-ball auto)"
+            )
+        if self.scatter_px > LARGEST_SCATTER * radius_px:
+            return f"the track is no flight: its circles scatter by {self.scatter_px:.1f} px about a smooth path"
         return None
 
     @property
     def scatter_px(self) -> float:
-        """RMS distance of the measured centres from the parabola through them, px; 0 where too few are measured."""
-        count = float(self.moments[0, 0])
-        if count < FEWEST_FOR_PARABOLA:
+        """1 sigma of the measured centres about a smooth path, px; 0 where too few are measured in a row."""
+        if self.differences < FEWEST_DIFFERENCES:
             return 0.0
-        powers, places = self.moments[:3, :3], self.moments[:3, 3:]
-        explained = places * np.linalg.lstsq(powers, places, rcond=None)[0]
-        left = np.trace(self.moments[3:, 3:]) - explained.sum()
-        return math.sqrt(max(float(left), 0.0) / count)
+        return math.sqrt(self.sum_px2 / (2 * self.differences)) / NOISE_OF_DIFFERENCE
 
 
-def _if_fixed(*circles: str) -> str:
-    options = " or ".join(f"--fixed-ball {circle}" for circle in circles)
-    return f" (a ball on a spinner needs {options})"
+def _third_difference_px2(places: tuple[Place, ...]) -> float | None:
+    """Square of the third difference of four centres at even times; None for fewer, or uneven times."""
+    if len(places) < 4:
+        return None
+    (a_us, ax, ay), (b_us, bx, by), (c_us, cx, cy), (d_us, dx, dy) = places
+    if max(abs(a_us - 2 * b_us + c_us), abs(b_us - 2 * c_us + d_us)) > 1.0:
+        return None  # the last tick of a recording may be shorter
+    return (dx - 3 * cx + 3 * bx - ax) ** 2 + (dy - 3 * cy + 3 * by - ay) ** 2
 
 
-_NOWHERE = np.zeros((5, 5))
-_NOWHERE.flags.writeable = False
-NO_EVIDENCE = TrackEvidence(False, 0, 0, 0, 0.0, 0.0, None, 0.0, 0.0, _NOWHERE)
+NO_EVIDENCE = TrackEvidence()
