@@ -1,9 +1,10 @@
-"""Track: Hough circle and Kalman filter together (section 3.1).
+"""Track: Hough circle and Kalman filter together (section 3.1), for every ball in view.
 
 The Hough transform finds the ball in the surface: anywhere while there is no track, near the prediction and
 within the radii that the filter allows while there is one. Unlike the paper, which feeds the Hough circle to the
 filter, the filter gets the circle refined on the ball's outline in the events (track_outline): an EROS surface
-shows the outline one to two pixels late on fast balls, the events to a tenth of a pixel.
+shows the outline one to two pixels late on fast balls, the events to a tenth of a pixel. A ball's track is cut into
+shots where a contact bends its path (track_contact).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..camera import Camera
 from ..errors import ParameterError
 from ..events import EventBatch
 from ..parameters import ParameterGroup, choice, tunable
@@ -22,10 +24,12 @@ from ..results import Circle, Packet, ReadOnlyArrays
 from ..stage import Context, Stage
 from .filter import FilterResult
 from .surface import SurfaceResult
+from .track_ball import Measuring, TrackedBall
+from .track_contact import ROLLING_M_S, Contact, find_contact, rolls
 from .track_hough import hough_near
-from .track_kalman import OBSERVED, OBSERVED_BLOCK, BallFilter, load_filter
-from .track_outline import VOTE_US, Edge, Limits, Sighting, measure
-from .track_search import MOST_CANDIDATES, OtherBalls, agree, look
+from .track_kalman import load_filter
+from .track_outline import VOTE_US, Edge, Limits, Sighting
+from .track_search import MOST_CANDIDATES, MOST_RIVALS, agree, look, moved, outside_balls
 
 Status = Literal["searching", "starting", "tracking", "coasting", "lost"]
 # How a shot began: across the border, at a contact, with the recording, or first seen in the middle of the view.
@@ -80,7 +84,8 @@ class BallTrack(ReadOnlyArrays):
     began_by : str
         How the shot began: entered, bounce, hit, start (of the recording) or found (in the middle of the view).
     is_shot : bool
-        Whether the ball is in free flight; False for one that rolls or lies, which is tracked without being a shot.
+        Whether the ball is in free flight. False from the tick on in which it is seen to roll: the last state decides
+        whether this was a shot.
     earlier : tuple of BallTrack
         States at the ends of the ticks since start_us before this one, oldest first: a contact is known only some
         ticks later. Given in the one tick in which the shot is announced, else empty.
@@ -142,7 +147,8 @@ class TrackResult:
     t_us : float
         Scene time: the tick's end less the pixels' latency.
     balls : tuple of BallTrack
-        Every ball in flight. The first one is followed by the detail views.
+        Every ball in view. The first one is followed by the detail views: the one in view for longest, of the shots if
+        there are any.
     hough : Circle, optional
         Circle of the Hough transform on the surface, before refinement and gating.
     candidate : Circle, optional
@@ -190,25 +196,16 @@ class TrackResult:
         return self.balls[0].covariance if self.balls else NO_COVARIANCE
 
 
-# Share of the half outline ahead that a tracked ball must show to be measured: a third pins down its circle.
-LEAST_AHEAD = 0.3
-# Squared Mahalanobis distance (three degrees of freedom) beyond which an outline is not the ball's: 5 sigma.
-MOST_SURPRISE = 25.0
-# Scatter of an outline's centre and radius from tick to tick beyond the statistical one, on the samples.
-OUTLINE_STD_PX = 0.05
-OUTLINE_COVARIANCE = OUTLINE_STD_PX**2 * np.eye(3)
-# What no filtering takes away: the calibration of latency, place and radius. The first two differ from shot to shot;
-# how far outside the outline is seen, from sensor to sensor: two simulators with the same biases are 0.3 px apart.
-LATENCY_STD_US = 12.0
-PLACE_STD_PX, RADIUS_STD_PX = 0.06, 0.3
-COMMON_COVARIANCE = np.diag([PLACE_STD_PX**2, PLACE_STD_PX**2, 0.0, 0.0, RADIUS_STD_PX**2])
-# A second ball takes the track over only when this much faster (a slower one rolls back), or while the first
-# is out of sight and when not much slower (a ball that was hit).
-RIVAL_SPEED, RIVAL_SPEED_UNSEEN = 1.5, 0.7
+# Beside a track that is seen, other balls are looked for this often: soon enough to find one within 15 ms.
+LOOK_US = 10_000
 # Shots come in across the border, within so many radii of it when first seen. A slow ball that turns up in the
 # middle rather rolls about: it is watched for a while, in which a real shot may come.
 COMING_IN, SLOW_M_S, WATCH_US = 5.0, 3.5, 20_000
-FREE = np.full(5, 1e9)
+# A ball that was outside the view, or the recording not yet begun, so long ago was not there before it was found.
+BEFORE_US = 30_000
+# Circles measured after a contact until it is announced; fewer would not tell when it was. At a shot's end, the one
+# there is.
+AFTER_CONTACT, AFTER_CONTACT_AT_END = 3, 1
 
 
 @dataclass(slots=True)
@@ -217,14 +214,13 @@ class TrackState:
 
     context: Context
     limits: Limits
+    measuring: Measuring
     contour: EventBatch = field(default_factory=EventBatch.empty)
-    ball: BallFilter | None = None
-    pending: tuple[int, Sighting] | None = None
-    others: OtherBalls = field(default_factory=OtherBalls)
-    seen_us: int = 0
+    balls: list[TrackedBall] = field(default_factory=list)
+    pending: list[tuple[int, Sighting]] = field(default_factory=list)
+    first_us: int | None = None
+    looked_us: int = 0
     shots: int = 0
-    start_us: int = 0
-    began_by: BeganBy = "start"
 
 
 def start(parameters: TrackParameters, context: Context) -> TrackState:
@@ -243,9 +239,17 @@ def start(parameters: TrackParameters, context: Context) -> TrackState:
         parameters.speed_min_m_s * per_m,
         parameters.speed_max_m_s * per_m,
     )
+    measuring = Measuring(
+        context.camera,
+        context.ball_radius_m,
+        Edge(parameters.outline_px, parameters.lag_px),
+        parameters.contour_us,
+        parameters.acceleration_m_s2,
+        parameters.approach_m_s,
+    )
     if parameters.ball == "flying":
         load_filter()  # loaded now and not in the middle of a shot
-    return TrackState(context, limits)
+    return TrackState(context, limits, measuring)
 
 
 def step(
@@ -264,51 +268,137 @@ def _step_fixed(
 ) -> TrackResult:
     """A ball spinner's ball: the stated circle."""
     variance = np.array([1.0, 1.0, 0.0, 0.0, 1.0]) * parameters.fixed_std_px**2
-    if state.shots == 0:
-        state.shots, state.start_us = 1, packet.start_us
-    return _ball(parameters, state, packet, "tracking", 0, _fixed_ring(parameters), np.diag(variance))
+    if state.first_us is None:
+        state.first_us = packet.start_us
+    t_us = packet.end_us - parameters.latency_us
+    ball = BallTrack(
+        0, t_us, parameters.latency_us, _fixed_ring(parameters), np.diag(variance), None, state.first_us, "start"
+    )
+    return TrackResult("tracking", None, t_us, (ball,), None)
 
 
 def _step_flying(
     parameters: TrackParameters, state: TrackState, packet: Packet, filtered: FilterResult, surface: SurfaceResult
 ) -> TrackResult:
-    """A flying ball: searched for, then followed."""
+    """Flying balls: followed from tick to tick, cut into shots at contacts, and others searched for."""
     since_us, events = packet.end_us - max(parameters.contour_us, VOTE_US), filtered.logo_events
     if since_us < packet.start_us:
         events = EventBatch.concatenate([state.contour, events])
     state.contour = events.between(since_us, packet.end_us)
-    if state.ball is None:
-        return _search(parameters, state, packet, surface)
-    return _follow(parameters, state, state.ball, packet, surface)
+    state.first_us = packet.start_us if state.first_us is None else state.first_us
+    for ball in state.balls:
+        ball.filter.predict((packet.end_us - packet.start_us) * 1e-6)
+    hough = _hough_near(state, state.balls[0], surface) if state.balls else None
+    lost, ended = None, []
+    for ball in tuple(state.balls):
+        lost, end = _follow(parameters, state, ball, packet)
+        if end is not None:
+            state.balls.remove(ball)
+            ended.append(end)
+    waiting = None
+    if _is_search_due(state, packet):
+        anywhere, waiting = _search(parameters, state, packet, surface)
+        hough = hough or anywhere
+    contacts, earlier = _announce_contacts(parameters, state)
+    for ball in state.balls:
+        _judge(state, ball)
+    state.balls.sort(key=lambda ball: not ball.is_shot)
+    balls = tuple(_ball_track(parameters, ball, packet.end_us, earlier.get(ball.shot, ())) for ball in state.balls)
+    status: Status = "coasting"
+    reason = None
+    if balls:
+        status = "coasting" if balls[0].measured is None else "tracking"
+    elif ended:
+        status, reason = "lost", lost
+    elif waiting is not None:
+        status, reason = "starting", "no ball yet: a circle moves like a ball, but it must be seen once more"
+    else:
+        status = "searching"
+        reason = "no ball: no circle in the surface" if hough is None else "no ball: no circle moves like a ball"
+    candidate = state.measuring.circle(waiting) if status == "starting" and waiting else None
+    t_us = packet.end_us - parameters.latency_us
+    return TrackResult(status, reason, t_us, balls, hough, candidate, (*ended, *contacts))
 
 
 _STEPS = {"flying": _step_flying, "fixed": _step_fixed}
 
 
-def _search(parameters: TrackParameters, state: TrackState, packet: Packet, surface: SurfaceResult) -> TrackResult:
-    """A tick without a track: start one from a sighting that is trusted, or promising for long enough."""
-    camera = state.context.camera
-    hough, found = look(surface, state.contour, packet.end_us, camera, state.limits, MOST_CANDIDATES)
-    pending, state.pending = state.pending, None
-    if not found:
-        reason = "no ball: no circle in the surface" if hough is None else "no ball: no circle moves like a ball"
-        return _no_ball(parameters, packet, "searching", reason, hough)
-    best, hough = found[0]
-    since_us, first = pending or (packet.end_us, best)
-    apart_us = packet.end_us - since_us
-    same = agree(first, best, apart_us)
-    wait_us = _wait_us(parameters, state, best)
-    if wait_us == 0 or (same and apart_us >= wait_us):
-        return _begin(parameters, state, packet, best, hough, state.shots)
-    state.pending = (since_us, first) if same else (packet.end_us, best)
-    return _no_ball(
-        parameters,
-        packet,
-        "starting",
-        "no ball yet: a circle moves like a ball, but it must be seen once more",
-        hough,
-        _circle(parameters, best),
+def _follow(
+    parameters: TrackParameters, state: TrackState, ball: TrackedBall, packet: Packet
+) -> tuple[str | None, ShotEnd | None]:
+    """Measure a ball that was predicted; why and how its shot ends if it does."""
+    start_us, end_us = packet.start_us, packet.end_us
+    if _beyond(ball.filter.mean, state.context.camera):
+        return "the ball left the view", _end(parameters, state, ball, start_us, "left")
+    others = [other for other in state.balls if other is not ball]
+    events = ball.own_events(state.contour, others, end_us)
+    seen = ball.measure(state.measuring, events, start_us, end_us)
+    if seen is None and events is state.contour:  # not while another ball's outline may be taken for its own
+        seen = ball.measure_off_path(state.measuring, events, start_us, end_us)
+    if seen is None:
+        ball.coast(end_us)
+        if end_us - ball.seen_us > parameters.coast_us:
+            reason = f"the ball was not seen for {parameters.coast_us / 1000:g} ms"
+            return reason, _end(parameters, state, ball, ball.seen_us, "lost")
+    return None, None
+
+
+def _end(parameters: TrackParameters, state: TrackState, ball: TrackedBall, end_us: int, ended_by: EndedBy) -> ShotEnd:
+    """End of a shot, at a contact if one came so late that the ball was hardly seen after it."""
+    contact = _contact(parameters, state, ball, AFTER_CONTACT_AT_END)
+    return (
+        ShotEnd(ball.shot, end_us, ended_by) if contact is None else ShotEnd(ball.shot, contact.time_us, contact.kind)
     )
+
+
+def _contact(parameters: TrackParameters, state: TrackState, ball: TrackedBall, circles_after: int) -> Contact | None:
+    context = state.context
+    return find_contact(ball.path, context.camera, context.ball_radius_m, parameters.contour_us, circles_after)
+
+
+def _announce_contacts(
+    parameters: TrackParameters, state: TrackState
+) -> tuple[list[ShotEnd], dict[int, tuple[BallTrack, ...]]]:
+    """End the shots whose contact is known now; the earlier states of those that it began, by shot."""
+    ended, earlier = [], {}
+    for place, ball in enumerate(state.balls):
+        contact = None if ball.measured is None else _contact(parameters, state, ball, AFTER_CONTACT)
+        if contact is None:
+            continue
+        after = ball.after(contact, state.measuring, state.shots)
+        tracks = [_ball_track(parameters, after, point.end_us) for point in after.follow(ball.path, state.measuring)]
+        ended.append(ShotEnd(ball.shot, contact.time_us, contact.kind))
+        earlier[after.shot] = tuple(tracks[:-1])
+        state.balls[place] = after
+        state.shots += 1
+    return ended, earlier
+
+
+def _is_search_due(state: TrackState, packet: Packet) -> bool:
+    """Whether to look for balls anywhere: always while one is missed, else every LOOK_US."""
+    missed = not state.balls or any(ball.measured is None for ball in state.balls)
+    return missed or bool(state.pending) or packet.end_us - state.looked_us >= LOOK_US
+
+
+def _search(
+    parameters: TrackParameters, state: TrackState, packet: Packet, surface: SurfaceResult
+) -> tuple[Circle | None, Sighting | None]:
+    """Begin tracks of sightings that are trusted, or promising for long enough; the best circle and what must wait."""
+    state.looked_us = packet.end_us
+    measured = [ball.filter.mean for ball in state.balls if ball.measured is not None]
+    events = outside_balls(state.contour, measured, packet.end_us)
+    most = MOST_RIVALS if state.balls else MOST_CANDIDATES
+    hough, found = look(surface, events, packet.end_us, state.context.camera, state.limits, most)
+    pending, state.pending = state.pending, []
+    for sighting, circle in found:
+        since = packet.end_us, sighting
+        since = next((one for one in pending if agree(one[1], sighting, packet.end_us - one[0])), since)
+        if packet.end_us - since[0] < _wait_us(parameters, state, sighting):
+            state.pending.append(since)
+        else:
+            _begin(state, packet, sighting)
+            hough = circle
+    return hough, state.pending[0][1] if state.pending else None
 
 
 def _wait_us(parameters: TrackParameters, state: TrackState, sighting: Sighting) -> int:
@@ -321,116 +411,45 @@ def _wait_us(parameters: TrackParameters, state: TrackState, sighting: Sighting)
     return 0 if sighting.trusted else parameters.contour_us
 
 
-def _follow(
-    parameters: TrackParameters, state: TrackState, ball: BallFilter, packet: Packet, surface: SurfaceResult
-) -> TrackResult:
-    """A tick with a track: predict, measure near the prediction, update; let a better ball take over."""
-    ball.predict((packet.end_us - packet.start_us) * 1e-6)
-    camera = state.context.camera
-    expected = ball.mean
-    if _beyond(expected, camera.width_px, camera.height_px):
-        return _end(parameters, state, packet, "the ball left the view")
-    expected = _edge(parameters).outline(expected)
-    spread = np.sqrt(np.diag(ball.covariance))
-    span = max(2.0, 3.0 * spread[4])
-    hough = hough_near(surface, expected[0], expected[1], expected[4] - span, expected[4] + span)
-    measured = _update(parameters, state, ball, packet, expected, spread)
-    if measured is None:
-        bounced = measure(state.contour, packet.end_us, camera, expected, 0.5 * expected[4], FREE)
-        if bounced is not None and bounced.trusted and abs(bounced.ring[4] / expected[4] - 1) < 0.1:
-            return _begin(parameters, state, packet, bounced, hough, state.shots - 1)
-    now = ball.mean
-    if measured is None or state.others.due(packet.end_us):
-        least = (RIVAL_SPEED if measured else RIVAL_SPEED_UNSEEN) * math.hypot(now[2], now[3])
-        other = state.others.fastest(
-            surface, state.contour, packet.end_us, camera, state.limits, now if measured else None
-        )
-        if other is not None and other[0].speed_px_s > least:
-            return _begin(parameters, state, packet, *other, state.shots)
-    if measured is None and packet.end_us - state.seen_us > parameters.coast_us:
-        return _end(parameters, state, packet, f"the ball was not seen for {parameters.coast_us / 1000:g} ms")
-    status: Status = "tracking" if measured else "coasting"
-    return _ball(parameters, state, packet, status, state.shots - 1, now, _total_covariance(ball), hough, measured)
+def _begin(state: TrackState, packet: Packet, sighting: Sighting) -> None:
+    """Follow a sighting: as the ball out of sight whose path it meets, else as a new shot."""
+    for ball in state.balls:
+        if ball.measured is None and ball.has_size(sighting) and ball.meets(sighting, packet.end_us):
+            ball.restart(state.measuring, sighting, packet.start_us, packet.end_us)
+            return
+    began_by = _began_by(state, packet, sighting)
+    ball = TrackedBall.at(sighting, state.measuring, state.shots, packet, began_by)
+    state.balls.append(ball)
+    state.shots += 1
 
 
-def _update(
-    parameters: TrackParameters,
-    state: TrackState,
-    ball: BallFilter,
-    packet: Packet,
-    expected: NDArray[np.float64],
-    spread: NDArray[np.float64],
-) -> Circle | None:
-    """Measure the outline near the expected ring (5,) with 1 sigma spread (5,) and give it to the filter."""
-    # The velocity may leave the prediction by ten radii a second and the radius by half a pixel: loose for a
-    # ball wholly in view, and it keeps the fit sane on short arcs.
-    loose = np.array([1e9, 1e9, 10 * expected[4] + spread[2], 10 * expected[4] + spread[3], 0.5])
-    gate = 2.0 + 3.0 * max(spread[0], spread[1])
-    sighting = measure(state.contour, packet.end_us, state.context.camera, expected, gate, loose)
-    if sighting is None or sighting.ahead < LEAST_AHEAD:
-        return None
-    observed = _edge(parameters).ball(sighting.ring)[OBSERVED]
-    # Outlines taken further back than one tick share events with the tick before and so count for less.
-    shared = max(1.0, parameters.contour_us / (packet.end_us - packet.start_us))
-    noise = sighting.covariance[OBSERVED_BLOCK] + OUTLINE_COVARIANCE
-    if not ball.update(observed, noise * shared, MOST_SURPRISE):
-        return None
-    state.seen_us = packet.end_us
-    return _circle(parameters, sighting)
+def _began_by(state: TrackState, packet: Packet, sighting: Sighting) -> BeganBy:
+    """Whether a ball first seen now came in across the border, or was there when the recording began."""
+    first_us = packet.start_us if state.first_us is None else state.first_us
+    since_us = max(first_us, packet.end_us - BEFORE_US)
+    if _beyond(moved(sighting.ring, since_us - packet.end_us), state.context.camera):
+        return "entered"
+    return "start" if since_us == first_us else "found"
 
 
-def _begin(
-    parameters: TrackParameters,
-    state: TrackState,
-    packet: Packet,
-    sighting: Sighting,
-    hough: Circle | None,
-    shot: int,
-) -> TrackResult:
-    """Start the filter at a sighting."""
-    per_m = sighting.ring[4] / state.context.ball_radius_m
-    mean = _edge(parameters).ball(sighting.ring)
-    covariance = sighting.covariance.copy()
-    covariance[OBSERVED, OBSERVED] += OUTLINE_STD_PX**2
-    # The paper: high enough to converge fast. The fit bends by what the ball accelerates within its window.
-    covariance[[2, 3], [2, 3]] += (0.2 * per_m) ** 2
-    growth = parameters.approach_m_s * per_m * mean[4] / state.context.camera.focal_px
-    state.ball = BallFilter(mean, covariance, parameters.acceleration_m_s2 * per_m, growth)
-    state.pending, state.others = None, OtherBalls()
-    state.seen_us = packet.end_us
-    state.shots = shot + 1
-    state.start_us, state.began_by = packet.start_us, "found"
-    measured = _circle(parameters, sighting)
-    return _ball(parameters, state, packet, "tracking", shot, mean, _total_covariance(state.ball), hough, measured)
+def _judge(state: TrackState, ball: TrackedBall) -> None:
+    """Tell whether a slow ball rolls: then it is no shot."""
+    if ball.is_judged or ball.speed_m_s(state.context.ball_radius_m) > ROLLING_M_S:
+        return
+    rolling = rolls(ball.path, state.context.camera, state.context.ball_radius_m)
+    ball.is_judged, ball.is_shot = rolling is not None, not rolling
 
 
-def _end(parameters: TrackParameters, state: TrackState, packet: Packet, reason: str) -> TrackResult:
-    state.ball = None
-    return _no_ball(parameters, packet, "lost", reason)
+def _hough_near(state: TrackState, ball: TrackedBall, surface: SurfaceResult) -> Circle | None:
+    x, y, _, _, radius = state.measuring.edge.outline(ball.filter.mean)
+    span = max(2.0, 3.0 * math.sqrt(ball.filter.covariance[4, 4]))
+    return hough_near(surface, x, y, radius - span, radius + span)
 
 
-def _total_covariance(ball: BallFilter) -> NDArray[np.float64]:
-    """The filter's covariance plus the errors that every tick has in common."""
-    late = ball.mean[2:4] * LATENCY_STD_US * 1e-6
-    covariance = ball.covariance + COMMON_COVARIANCE
-    covariance[:2, :2] += late[:, None] * late
-    return covariance
-
-
-def _edge(parameters: TrackParameters) -> Edge:
-    return Edge(parameters.outline_px, parameters.lag_px)
-
-
-def _circle(parameters: TrackParameters, sighting: Sighting) -> Circle:
-    """The ball's silhouette as sighted."""
-    x, y, _, _, radius = _edge(parameters).ball(sighting.ring).tolist()
-    return Circle(x, y, radius, sighting.score)
-
-
-def _beyond(mean: NDArray[np.float64], width_px: int, height_px: int) -> bool:
+def _beyond(mean: NDArray[np.float64], camera: Camera) -> bool:
     """Whether hardly anything of the ball is in the image."""
     x, y, margin = mean[0], mean[1], 0.8 * mean[4]
-    return bool(x < -margin or y < -margin or x > width_px - 1 + margin or y > height_px - 1 + margin)
+    return bool(x < -margin or y < -margin or x > camera.width_px - 1 + margin or y > camera.height_px - 1 + margin)
 
 
 def _fixed_ring(parameters: TrackParameters) -> NDArray[np.float64]:
@@ -443,37 +462,28 @@ def _fixed_ring(parameters: TrackParameters) -> NDArray[np.float64]:
     return np.array([x, y, 0.0, 0.0, radius])
 
 
-def _ball(
-    parameters: TrackParameters,
-    state: TrackState,
-    packet: Packet,
-    status: Status,
-    shot: int,
-    mean: NDArray[np.float64],
-    covariance: NDArray[np.float64],
-    hough: Circle | None = None,
-    measured: Circle | None = None,
-) -> TrackResult:
-    t_us = packet.end_us - parameters.latency_us
-    ball = BallTrack(shot, t_us, parameters.latency_us, mean, covariance, measured, state.start_us, state.began_by)
-    return TrackResult(status, None, t_us, (ball,), hough)
-
-
-def _no_ball(
-    parameters: TrackParameters,
-    packet: Packet,
-    status: Status,
-    reason: str,
-    hough: Circle | None = None,
-    candidate: Circle | None = None,
-) -> TrackResult:
-    return TrackResult(status, reason, packet.end_us - parameters.latency_us, (), hough, candidate)
+def _ball_track(
+    parameters: TrackParameters, ball: TrackedBall, end_us: int, earlier: tuple[BallTrack, ...] = ()
+) -> BallTrack:
+    """The ball's present state."""
+    return BallTrack(
+        ball.shot,
+        end_us - parameters.latency_us,
+        parameters.latency_us,
+        ball.filter.mean,
+        ball.total_covariance(),
+        ball.measured,
+        ball.start_us,
+        ball.began_by,
+        ball.is_shot,
+        earlier,
+    )
 
 
 STAGE = Stage(
     name="track",
     label="Tracker",
-    help="Hough circle in the surface, refined on the ball's outline, and Kalman filter: the ball's place and speed.",
+    help="Hough circle in the surface, refined on the ball's outline, and Kalman filter: each ball's place and speed.",
     scope="recording",
     inputs=("packet", "filter", "surface"),
     parameters=TrackParameters,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,10 +16,6 @@ from .track_outline import Limits, Sighting, sight
 
 # Circles of the full-frame vote looked at in one tick, without a track and beside one.
 MOST_CANDIDATES, MOST_RIVALS = 4, 2
-# Beside a track that is seen, other balls are looked for this often: soon enough to find one within 10 ms.
-LOOK_US = 10_000
-# A ball looked at is not looked at again for so long; by then it may be half a radius off its straight path.
-RIVAL_US = 25_000
 
 Found = list[tuple[Sighting, Circle]]
 
@@ -42,39 +36,13 @@ def look(
     return first, sorted(found, key=lambda one: (one[0].trusted, one[0].speed_px_s), reverse=True)
 
 
-@dataclass(slots=True)
-class OtherBalls:
-    """The search beside a track, and the balls it came upon lately."""
-
-    looked_us: int = 0
-    known: list[tuple[int, Sighting]] = field(default_factory=list)
-
-    def due(self, end_us: int) -> bool:
-        """Whether it is time to look again."""
-        return end_us - self.looked_us >= LOOK_US
-
-    def fastest(
-        self,
-        surface: SurfaceResult,
-        events: EventBatch,
-        end_us: int,
-        camera: Camera,
-        limits: Limits,
-        tracked: NDArray[np.float64] | None,
-    ) -> tuple[Sighting, Circle] | None:
-        """The fastest trusted ball apart from the tracked ring (5,) and the balls known already."""
-        self.looked_us = end_us
-        self.known = [(since, one) for since, one in self.known if end_us - since < RIVAL_US]
-        rings = [moved(one.ring, end_us - since) for since, one in self.known]
-        if tracked is not None:
-            rings.append(tracked)
-        for ring in rings:
-            margin = 0.3 * ring[4] + 2.0  # for trails, and for errors of the older ones
-            rows = kernels.outside_circle(ring, events.columns, end_us, margin)
-            events = EventBatch(*take_events(rows, events.columns))
-        _, found = look(surface, events, end_us, camera, limits, MOST_RIVALS)
-        self.known += [(end_us, one) for one, _ in found]
-        return found[0] if found and found[0][0].trusted else None
+def outside_balls(events: EventBatch, rings: list[NDArray[np.float64]], end_us: int) -> EventBatch:
+    """The events outside these balls' rings (5,) at end_us."""
+    for ring in rings:
+        margin = 0.3 * ring[4] + 2.0  # for trails
+        rows = kernels.outside_circle(ring, events.columns, end_us, margin)
+        events = EventBatch(*take_events(rows, events.columns))
+    return events
 
 
 def moved(ring: NDArray[np.float64], by_us: int) -> NDArray[np.float64]:

@@ -1,0 +1,245 @@
+"""One ball in view: its Kalman filter, the path of its measured circles, and how it is measured in the events."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Camera
+from ..events import EventBatch
+from ..kernels import crossing
+from ..kernels.take_events import take_events
+from ..results import Circle, Packet
+from .track_contact import PATH_US, Contact, PathPoint
+from .track_kalman import OBSERVED, OBSERVED_BLOCK, BallFilter
+from .track_outline import Edge, Sighting, measure
+
+Floats = NDArray[np.float64]
+
+# Share of the half outline ahead that a tracked ball must show to be measured: a third pins down its circle.
+LEAST_AHEAD = 0.3
+# Squared Mahalanobis distance (three degrees of freedom) beyond which an outline is not the ball's: 5 sigma.
+MOST_SURPRISE = 25.0
+# Scatter of an outline's centre and radius from tick to tick beyond the statistical one, on the samples.
+OUTLINE_STD_PX = 0.05
+OUTLINE_COVARIANCE = OUTLINE_STD_PX**2 * np.eye(3)
+# What no filtering takes away: the calibration of latency, place and radius. The first two differ from shot to shot;
+# how far outside the outline is seen, from sensor to sensor: two simulators with the same biases are 0.3 px apart.
+LATENCY_STD_US = 12.0
+PLACE_STD_PX, RADIUS_STD_PX = 0.06, 0.3
+COMMON_COVARIANCE = np.diag([PLACE_STD_PX**2, PLACE_STD_PX**2, 0.0, 0.0, RADIUS_STD_PX**2])
+# A velocity from one outline is wrong by what the ball accelerates within its window; the paper: high enough to
+# converge fast.
+FIRST_SPEED_STD_M_S = 0.2
+# A ball keeps its radius: an outline this much larger or smaller is another's.
+SAME_RADIUS = 0.1
+# Outlines nearer to each other than this share events.
+APART_PX = 5.0
+# Error of the centre and radius of an outline that the border cuts, for each radius of it that is out of view.
+HIDDEN_ERROR = 0.3
+FREE = np.full(5, 1e9)
+# 1 sigma of a state just after a contact, of place and radius: what a few circles leave open.
+AFTER_CONTACT_COVARIANCE = np.diag([0.3**2, 0.3**2, 0.0, 0.0, 0.3**2])
+BeganBy = Literal["entered", "bounce", "hit", "start", "found"]
+
+
+@dataclass(frozen=True, slots=True)
+class Measuring:
+    """What measuring a ball needs beside the ball.
+
+    Attributes
+    ----------
+    camera : Camera
+    ball_radius_m : float
+    edge : Edge
+    contour_us : int
+        How far back the outline's events are taken.
+    acceleration_m_s2, approach_m_s : float
+        1 sigma of the acceleration and of the speed towards the camera.
+    """
+
+    camera: Camera
+    ball_radius_m: float
+    edge: Edge
+    contour_us: int
+    acceleration_m_s2: float
+    approach_m_s: float
+
+    def filter_at(self, mean: Floats, covariance: Floats) -> BallFilter:
+        """A filter that starts at this state (5,) with this covariance (5, 5) of a single outline."""
+        per_m = self.edge.outline(mean)[4] / self.ball_radius_m
+        spread = covariance.copy()
+        spread[OBSERVED, OBSERVED] += OUTLINE_STD_PX**2
+        spread[[2, 3], [2, 3]] += (FIRST_SPEED_STD_M_S * per_m) ** 2
+        growth = self.approach_m_s * per_m * mean[4] / self.camera.focal_px
+        return BallFilter(mean, spread, self.acceleration_m_s2 * per_m, growth)
+
+    def circle(self, sighting: Sighting) -> Circle:
+        """The ball's silhouette as sighted."""
+        x, y, _, _, radius = self.edge.ball(sighting.ring).tolist()
+        return Circle(x, y, radius, sighting.score)
+
+
+@dataclass(slots=True, eq=False)
+class TrackedBall:
+    """A ball in view, from tick to tick.
+
+    Attributes
+    ----------
+    shot : int
+        Number of its shot.
+    start_us : int
+        Start of the shot (file time).
+    began_by : str
+        How it began.
+    filter : BallFilter
+    seen_us : int
+        End of the last tick in which it was measured.
+    seen : (5,) float64
+        Its state then.
+    path : list of PathPoint
+        The shot's ticks of the last PATH_US.
+    is_shot : bool
+        Whether it is taken for a flight; False once it is seen to roll.
+    is_judged : bool
+        Whether it is known to fly or to roll.
+    """
+
+    shot: int
+    start_us: int
+    began_by: BeganBy
+    filter: BallFilter
+    seen_us: int
+    seen: Floats
+    path: list[PathPoint] = field(default_factory=list)
+    is_shot: bool = True
+    is_judged: bool = False
+
+    @classmethod
+    def at(cls, sighting: Sighting, measuring: Measuring, shot: int, packet: Packet, began_by: BeganBy) -> TrackedBall:
+        """The ball of a sighting at a packet's end."""
+        state = measuring.edge.ball(sighting.ring)
+        ball = cls(shot, packet.start_us, began_by, measuring.filter_at(state, sighting.covariance), 0, state)
+        ball._see(measuring, sighting, ball._noise(measuring, sighting, packet.start_us, packet.end_us), packet.end_us)
+        return ball
+
+    def after(self, contact: Contact, measuring: Measuring, shot: int) -> TrackedBall:
+        """The ball's next shot, at the end of the first tick after a contact, by the path since."""
+        first_us = next(point.end_us for point in self.path if point.end_us > contact.time_us)
+        state = contact.state(first_us)
+        new = measuring.filter_at(state, AFTER_CONTACT_COVARIANCE)
+        return TrackedBall(shot, contact.time_us, contact.kind, new, first_us, state)
+
+    def follow(self, path: list[PathPoint], measuring: Measuring) -> Iterator[PathPoint]:
+        """Go along the rest of a path from the shot's first tick on, with the circles that show no other shot."""
+        for point in path:
+            if point.end_us < self.seen_us and not self.path:
+                continue
+            if self.path:
+                self.filter.predict((point.end_us - self.path[-1].end_us) * 1e-6)
+            circle = point.circle if point.end_us - self.start_us >= measuring.contour_us else None
+            if circle is not None:
+                observed = np.array([circle.x_px, circle.y_px, circle.radius_px])
+                self.filter.update(observed, point.noise, math.inf)
+                self.seen_us, self.seen = point.end_us, self.filter.mean
+            self._add(PathPoint(point.end_us, circle, point.noise))
+            yield point
+
+    def speed_m_s(self, ball_radius_m: float) -> float:
+        """Speed across the view."""
+        _, _, vx, vy, radius = self.filter.mean.tolist()
+        return float(math.hypot(vx, vy) / radius * ball_radius_m)
+
+    @property
+    def measured(self) -> Circle | None:
+        """The circle measured in the present tick, None if the ball coasts."""
+        return self.path[-1].circle if self.path else None
+
+    def own_events(self, events: EventBatch, others: list[TrackedBall], end_us: int) -> EventBatch:
+        """Events without those that are nearer to the outline of another ball which this one's touches."""
+        mean = self.filter.mean
+        near = [
+            other.filter.mean
+            for other in others
+            if np.hypot(*(other.filter.mean - mean)[:2]) < other.filter.mean[4] + mean[4] + APART_PX
+        ]
+        if not near:
+            return events
+        rows = crossing.nearest_outline(mean, np.array(near), events.columns, end_us)
+        return EventBatch(*take_events(rows, events.columns))
+
+    def measure(self, measuring: Measuring, events: EventBatch, start_us: int, end_us: int) -> Sighting | None:
+        """Measure the outline near the predicted ball and give it to the filter; None if it is not there."""
+        spread = np.sqrt(np.diag(self.filter.covariance))
+        expected = measuring.edge.outline(self.filter.mean)
+        # The velocity may leave the prediction by ten radii a second and the radius by half a pixel: loose for a
+        # ball wholly in view, and it keeps the fit sane on short arcs.
+        loose = np.array([1e9, 1e9, 10 * expected[4] + spread[2], 10 * expected[4] + spread[3], 0.5])
+        gate = 2.0 + 3.0 * max(spread[0], spread[1])
+        sighting = measure(events, end_us, measuring.camera, expected, gate, loose)
+        if sighting is None or sighting.ahead < LEAST_AHEAD:
+            return None
+        noise = self._noise(measuring, sighting, start_us, end_us)
+        if not self.filter.update(measuring.edge.ball(sighting.ring)[OBSERVED], noise, MOST_SURPRISE):
+            return None
+        self._see(measuring, sighting, noise, end_us)
+        return sighting
+
+    def measure_off_path(self, measuring: Measuring, events: EventBatch, start_us: int, end_us: int) -> Sighting | None:
+        """A clear outline of the ball's size up to half a radius off its path, as after a contact: start anew there."""
+        expected = measuring.edge.outline(self.filter.mean)
+        sighting = measure(events, end_us, measuring.camera, expected, 0.5 * expected[4], FREE)
+        if sighting is None or not sighting.trusted or not self.has_size(sighting):
+            return None
+        self.restart(measuring, sighting, start_us, end_us)
+        return sighting
+
+    def has_size(self, sighting: Sighting) -> bool:
+        """Whether an outline is as large as the ball's."""
+        return bool(abs(sighting.ring[4] / self.filter.mean[4] - 1.0) < SAME_RADIUS)
+
+    def restart(self, measuring: Measuring, sighting: Sighting, start_us: int, end_us: int) -> None:
+        """Start the filter anew at a sighting of the ball off its path."""
+        self.filter = measuring.filter_at(measuring.edge.ball(sighting.ring), sighting.covariance)
+        self._see(measuring, sighting, self._noise(measuring, sighting, start_us, end_us), end_us)
+
+    def coast(self, end_us: int) -> None:
+        """Note a tick in which it was not measured."""
+        self._add(PathPoint(end_us, None, np.zeros((3, 3))))
+
+    def meets(self, sighting: Sighting, end_us: int) -> bool:
+        """Whether a sighting's straight path meets that of this ball since it was last seen, within half a radius."""
+        times_s = np.linspace(self.seen_us - end_us, 0.0, 50)[:, None] * 1e-6
+        old = self.seen[:2] + (times_s + (end_us - self.seen_us) * 1e-6) * self.seen[2:4]
+        new = sighting.ring[:2] + times_s * sighting.ring[2:4]
+        return bool(np.hypot(*(old - new).T).min() < 0.5 * self.seen[4])
+
+    def total_covariance(self) -> Floats:
+        """(5, 5) float64: the filter's covariance plus the errors that every tick has in common."""
+        late = self.filter.mean[2:4] * LATENCY_STD_US * 1e-6
+        covariance = self.filter.covariance + COMMON_COVARIANCE
+        covariance[:2, :2] += late[:, None] * late
+        return covariance
+
+    def _noise(self, measuring: Measuring, sighting: Sighting, start_us: int, end_us: int) -> Floats:
+        # Outlines taken further back than one tick share events with the tick before and so count for less.
+        shared = max(1.0, measuring.contour_us / (end_us - start_us))
+        noise: Floats = (sighting.covariance[OBSERVED_BLOCK] + OUTLINE_COVARIANCE) * shared
+        return noise
+
+    def _see(self, measuring: Measuring, sighting: Sighting, noise: Floats, end_us: int) -> None:
+        self.seen_us, self.seen = end_us, self.filter.mean
+        hidden = HIDDEN_ERROR * (1.0 - sighting.visible) * sighting.ring[4]
+        self._add(PathPoint(end_us, measuring.circle(sighting), noise + hidden**2 * np.eye(3)))
+
+    def _add(self, point: PathPoint) -> None:
+        if self.path and self.path[-1].end_us == point.end_us:  # found again elsewhere after all
+            del self.path[-1]
+        self.path.append(point)
+        while self.path[0].end_us < point.end_us - PATH_US:
+            del self.path[0]
