@@ -391,6 +391,8 @@ def _search(
     hough, found = look(surface, events, packet.end_us, state.context.camera, state.limits, most)
     pending, state.pending = state.pending, []
     for sighting, circle in found:
+        if any(ball.covers(sighting) for ball in state.balls if ball.measured is not None):
+            continue
         since = packet.end_us, sighting
         since = next((one for one in pending if agree(one[1], sighting, packet.end_us - one[0])), since)
         if packet.end_us - since[0] < _wait_us(parameters, state, sighting):

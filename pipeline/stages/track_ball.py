@@ -131,7 +131,7 @@ class TrackedBall:
     def after(self, contact: Contact, measuring: Measuring, shot: int) -> TrackedBall:
         """The ball's next shot, at the end of the first tick after a contact, by the path since."""
         first_us = next(point.end_us for point in self.path if point.end_us > contact.time_us)
-        state = contact.state(first_us)
+        state = contact.path.state(first_us)
         new = measuring.filter_at(state, AFTER_CONTACT_COVARIANCE)
         return TrackedBall(shot, contact.time_us, contact.kind, new, first_us, state)
 
@@ -211,6 +211,10 @@ class TrackedBall:
     def coast(self, end_us: int) -> None:
         """Note a tick in which it was not measured."""
         self._add(PathPoint(end_us, None, np.zeros((3, 3))))
+
+    def covers(self, sighting: Sighting) -> bool:
+        """Whether a sighting's centre lies within the ball: it is the ball again, or not to be told from it."""
+        return bool(np.hypot(*(sighting.ring - self.filter.mean)[:2]) < self.filter.mean[4])
 
     def meets(self, sighting: Sighting, end_us: int) -> bool:
         """Whether a sighting's straight path meets that of this ball since it was last seen, within half a radius."""

@@ -22,22 +22,26 @@ Floats = NDArray[np.float64]
 
 # A path is kept for so long, enough to tell that a ball rolls; the change test looks for a hinge in the last part of
 # a shorter one, over which one cubic describes any flight.
-PATH_US, TESTED_US, RECENT_US = 250_000, 120_000, 60_000
-# Scatter of the measured centre and radius from tick to tick, in clutter; 0.03 to 0.08 px on clean scenes.
-CENTRE_STD_PX, RADIUS_STD_PX = 0.1, 0.08
+PATH_US, TESTED_US, RECENT_US = 250_000, 100_000, 40_000
+# Errors of the outline's edge ahead and of the circle's radius from tick to tick: what the test must bear in clutter,
+# and on clean scenes, where 0.2 px of the radius are bias that changes with the ball's motion.
+EDGE_STD_PX, RADIUS_STD_PX = 0.1, 0.15
+CLEAN_EDGE_STD_PX, CLEAN_RADIUS_STD_PX = 0.03, 0.25
+# And of a circle whose events are from both sides of a contact: a bounce jumps by 100 to 500 px/s, for up to 3 ms.
+STRADDLING_STD_PX = 0.3
 # Gain in chi^2 that a hinge must bring. 300 simulated flights of 3 to 22 m/s and up to 120 rps without a contact stay
 # below 33, whatever the time of the hinge; bounces reach 100 to 5000, hits 10^5.
 LEAST_GAIN = 60.0
 # And the jump of velocity: a table turns a fall from 15 mm round by this.
 LEAST_JUMP_M_S = 1.0
 # Steps of the hinge's time: of the test, and of its refinement.
-STEP_US, FINE_STEP_US, REFINED_US = 2000, 200, 8000
+STEP_US, FINE_STEP_US, REFINED_US = 2000, 250, 8000
 GRAVITY_M_S2 = 9.81
-# Deceleration by drag over speed squared (median of 203 measured flights: 0.16), and the largest lift of spinning
-# balls. Double their sum is the 1 sigma of what a flight's acceleration may be.
-DRAG_1_M, LIFT_M_S2 = 0.16, 10.0
-# 1 sigma of the jumps at a contact: velocity (a smash gives 30 m/s), acceleration (the spin, and with it the lift).
-JUMP_M_S, JUMP_M_S2 = 30.0, 10.0
+# Largest accelerations by drag and by lift, over speed squared (203 measured flights: drag coefficient 0.16 / m, lift
+# coefficient up to 0.26). Double their sum is the 1 sigma of what a flight's acceleration may be.
+DRAG_1_M, LIFT_1_M = 0.16, 0.07
+# 1 sigma of the jump of velocity at a contact: a smash gives 30 m/s.
+JUMP_M_S = 30.0
 # A table's friction is at most this share of its push (0.25 to 0.5 published for rubber-free contact).
 MOST_FRICTION = 0.6
 # Balls faster than this do not roll.
@@ -74,24 +78,13 @@ class Contact:
         When it was (file time).
     kind : str
         bounce or hit.
-    gain : float
-        Gain in chi^2 of the path with the hinge.
-    coefficients : (3, 6) float64
-        The path (see kernels.hinged_path) in x, y and radius, px, over the seconds since origin_us.
-    origin_us : int
+    path : HingedPath
+        The ball's path in space before and after it.
     """
 
     time_us: int
     kind: Kind
-    gain: float
-    coefficients: Floats
-    origin_us: int
-
-    def state(self, time_us: float) -> Floats:
-        """(5,) float64 [x_px, y_px, vx_px_s, vy_px_s, radius_px] of the path at a time after the contact."""
-        s, hinge_s = ((time - self.origin_us) * 1e-6 for time in (time_us, self.time_us))
-        (x, y, radius), (vx, vy, _) = _values(self.coefficients, s, hinge_s), _slopes(self.coefficients, s, hinge_s)
-        return np.array([x, y, vx, vy, radius])
+    path: HingedPath
 
 
 def find_contact(
@@ -106,7 +99,7 @@ def find_contact(
     least_after : int
         Circles that must have been measured after the contact.
     """
-    points = [point for point in path if point.circle is not None and point.end_us > path[-1].end_us - TESTED_US]
+    points = _independent(path, straddled_us)
     # Two circles on one side of the hinge and as many more as tell a jump from an acceleration.
     if len(points) < 3 + least_after:
         return None
@@ -117,21 +110,35 @@ def find_contact(
     coarse_us, gain = float(hinges_us[np.argmax(gains)]), float(gains.max())
     if gain < LEAST_GAIN or coarse_us > min(points[-least_after].end_us, last_us - straddled_us):
         return None  # or not yet
-    fit = fit.without(coarse_us - STEP_US / 2, coarse_us + straddled_us + STEP_US / 2)
-    fine_us = np.arange(coarse_us - REFINED_US, coarse_us + REFINED_US, FINE_STEP_US)
-    time_us = float(fine_us[np.argmax(fit.gains(fine_us))])
-    coefficients, radius_jump_std_px_s = fit.path(time_us)
-    before, after = _velocities(coefficients, fit.seconds(time_us), camera, ball_radius_m)
+    paths = [
+        HingedPath(points, float(time_us), (coarse_us, coarse_us + straddled_us), camera, ball_radius_m)
+        for time_us in np.arange(coarse_us - REFINED_US, min(coarse_us + REFINED_US, last_us), FINE_STEP_US)
+    ]
+    refined = min(paths, key=lambda one: one.cost)
+    before, after = refined.velocity_m_s(refined.hinge_us - 1), refined.velocity_m_s(refined.hinge_us)
     if np.linalg.norm(after - before) < LEAST_JUMP_M_S:
         return None
-    radius_px = _values(coefficients, fit.seconds(time_us), fit.seconds(time_us))[2]
-    std_m_s = radius_jump_std_px_s * camera.focal_px * ball_radius_m / radius_px**2
-    kind = _kind(before, after, std_m_s, np.array(camera.up))
-    return Contact(round(time_us), kind, gain, coefficients, fit.origin_us)
+    kind = _kind(before, after, refined.jump_std_m_s, np.array(camera.up))
+    return Contact(round(refined.hinge_us), kind, refined)
+
+
+def _independent(path: list[PathPoint], apart_us: int) -> list[PathPoint]:
+    """The points of the last TESTED_US with circles that share no events, oldest first."""
+    points: list[PathPoint] = []
+    for point in reversed(path):
+        if point.end_us <= path[-1].end_us - TESTED_US:
+            break
+        if point.circle is not None and (not points or points[-1].end_us - point.end_us >= apart_us):
+            points.append(point)
+    return points[::-1]
 
 
 class _PathFit:
     """Least-squares paths through measured circles.
+
+    Its channels are not x, y and radius but the place of the edge ahead (along the flight, plus radius), the place
+    across it, and the radius: only the half of the outline ahead is fitted, so that a circle too large by 0.2 px lies
+    0.2 px back, and its edge ahead is right.
 
     Parameters
     ----------
@@ -141,23 +148,19 @@ class _PathFit:
 
     def __init__(self, points: list[PathPoint], camera: Camera, ball_radius_m: float) -> None:
         self.origin_us = points[-1].end_us
-        self._points, self._camera, self._ball_radius_m = points, camera, ball_radius_m
         self._times_s = np.array([(point.end_us - self.origin_us) * 1e-6 for point in points])
-        self._circles = np.array([[c.x_px, c.y_px, c.radius_px] for point in points if (c := point.circle)])
-        floor = np.array([CENTRE_STD_PX, CENTRE_STD_PX, RADIUS_STD_PX]) ** 2
-        self._weights = 1.0 / (np.array([np.diag(point.noise) for point in points]) + floor)
-        self._precisions = _precisions(self._times_s, self._circles, camera, ball_radius_m)
-
-    def seconds(self, time_us: float) -> float:
-        """Time since the origin, s."""
-        return (time_us - self.origin_us) * 1e-6
-
-    def without(self, start_us: float, end_us: float) -> _PathFit:
-        """The fit without the circles of [start_us, end_us), if some are left after them; else this one."""
-        kept = [point for point in self._points if not start_us <= point.end_us < end_us]
-        if kept[-1].end_us < end_us:
-            return self
-        return _PathFit(kept, self._camera, self._ball_radius_m)
+        circles = np.array([[c.x_px, c.y_px, c.radius_px] for point in points if (c := point.circle)])
+        steps = np.diff(circles[:, :2], axis=0)
+        speed_px_s = float(np.hypot(*steps.T).sum()) / float(self._times_s[-1] - self._times_s[0])
+        ux, uy = steps.sum(axis=0).tolist()
+        length = math.hypot(ux, uy) or 1.0
+        ux, uy = ux / length, uy / length
+        self._channels = np.array([[ux, uy, 1.0], [-uy, ux, 0.0], [0.0, 0.0, 1.0]])
+        self._values = circles @ self._channels.T
+        noises = np.array([point.noise for point in points])
+        noise = np.sum((self._channels @ noises) * self._channels, axis=2)  # the diagonals of C N C^T
+        self._weights = 1.0 / (noise + np.array([EDGE_STD_PX, EDGE_STD_PX, RADIUS_STD_PX]) ** 2)
+        self._precisions = _precisions(speed_px_s, float(circles[-1, 2]), camera, ball_radius_m)
 
     def gains(self, hinges_us: Floats) -> Floats:
         """Gains (m,) in chi^2 by a hinge at these times (m,).
@@ -166,66 +169,108 @@ class _PathFit:
         """
         costs = np.empty(1 + hinges_us.size)
         hinges_s = (hinges_us - self.origin_us) * 1e-6
-        kernels.path_costs(costs, self._times_s, self._circles, self._weights, self._precisions, hinges_s)
+        kernels.path_costs(costs, self._times_s, self._values, self._weights, self._precisions, hinges_s)
         freedom = max(1, 3 * (self._times_s.size - kernels.SMOOTH_TERMS))
         gains: Floats = (costs[0] - costs[1:]) / np.maximum(1.0, costs[1:] / freedom)
         return gains
 
-    def path(self, time_us: float) -> tuple[Floats, float]:
-        """Coefficients (3, 6) of the path with a hinge at this time, 1 sigma of the radius' jump of velocity, px/s."""
-        s = self._times_s
-        after = np.maximum(s - self.seconds(time_us), 0.0)
-        terms = np.stack([s**0, s, s**2, s**3, after, after**2], axis=1)
-        spread = [
-            np.linalg.inv((terms.T * weights) @ terms + np.diag(prior))
-            for weights, prior in zip(self._weights.T, self._precisions, strict=True)
-        ]
-        moments = terms.T @ (self._weights * self._circles)
-        coefficients = np.stack([spread[channel] @ moments[:, channel] for channel in range(3)])
-        return coefficients, math.sqrt(spread[2][4, 4])
 
-
-def _precisions(times_s: Floats, circles: Floats, camera: Camera, ball_radius_m: float) -> Floats:
+def _precisions(speed_px_s: float, radius_px: float, camera: Camera, ball_radius_m: float) -> Floats:
     """(3, 6) float64 one over the variances of each channel's coefficients: what flight and contacts allow."""
-    radius_px = float(np.median(circles[:, 2]))
     depth_m = camera.focal_px * ball_radius_m / radius_px
     across, along = radius_px / ball_radius_m, radius_px / depth_m  # px a metre across the view, and along it
-    way_px = math.hypot(*(circles[-1, :2] - circles[0, :2]))
-    speed_m_s = way_px / across / max(times_s[-1] - times_s[0], 1e-6)
-    acceleration = 2.0 * (GRAVITY_M_S2 + LIFT_M_S2 + DRAG_1_M * speed_m_s**2)
+    speed_m_s = speed_px_s / across
+    acceleration = 2.0 * (GRAVITY_M_S2 + (LIFT_1_M + DRAG_1_M) * speed_m_s**2)
     # Drag falls with the speed that it takes, and a depth that changes by gravity bends the path in perspective.
     jerk = 3.0 * acceleration * max(speed_m_s, 1.0) / depth_m + 2.0 * DRAG_1_M**2 * speed_m_s**3
-    largest = np.array([1e6, 1e6, acceleration / 2, jerk / 6, JUMP_M_S, JUMP_M_S2 / 2])
+    # A contact changes the image's acceleration by perspective, as it changes the speed towards the camera.
+    largest = np.array([1e6, 1e6, acceleration / 2, jerk / 6, JUMP_M_S, acceleration / 4])
     return 1.0 / np.outer([across, across, along], largest) ** 2
 
 
-def _values(coefficients: Floats, s: float, hinge_s: float) -> Floats:
-    after = max(s - hinge_s, 0.0)
-    values: Floats = coefficients @ np.array([1.0, s, s**2, s**3, after, after**2])
-    return values
+class HingedPath:
+    """A ball's path in space, a cubic in time with a hinge, fitted to its measured circles.
+
+    In space, as perspective bends the path in the image when a contact turns the speed towards the camera.
+
+    Parameters
+    ----------
+    points : list of PathPoint
+        With circles.
+    hinge_us : float
+        Time of the hinge.
+    straddling_us : tuple of float
+        First and last end of the circles that have events from before and after the contact.
+    """
+
+    def __init__(
+        self,
+        points: list[PathPoint],
+        hinge_us: float,
+        straddling_us: tuple[float, float],
+        camera: Camera,
+        ball_radius_m: float,
+    ) -> None:
+        self.hinge_us = hinge_us
+        self._camera, self._ball_radius_m = camera, ball_radius_m
+        times_us = np.array([point.end_us for point in points], np.float64)
+        circles = np.array([[c.x_px, c.y_px, c.radius_px] for point in points if (c := point.circle)])
+        centres_m, weights = _located(circles, camera, ball_radius_m)
+        straddles = (times_us >= straddling_us[0]) & (times_us < straddling_us[1])
+        weights[straddles] *= (CLEAN_EDGE_STD_PX / STRADDLING_STD_PX) ** 2
+        terms = self._terms(times_us)
+        span_s = (times_us[-1] - times_us[0]) * 1e-6
+        speed_m_s = float(np.linalg.norm(np.diff(centres_m, axis=0)[:, :2], axis=1).sum()) / span_s
+        lift_m_s2, drag_m_s2 = LIFT_1_M * speed_m_s**2, DRAG_1_M * speed_m_s**2
+        jerk_m_s3 = 2.0 * DRAG_1_M * speed_m_s * (drag_m_s2 + lift_m_s2 + GRAVITY_M_S2)
+        acceleration_m_s2 = GRAVITY_M_S2 + lift_m_s2 + drag_m_s2
+        largest = np.array([1e3, 1e3, acceleration_m_s2 / 2, jerk_m_s3 / 6, JUMP_M_S, (1.0 + lift_m_s2) / 2])
+        normal = np.einsum("ni,nj,nab->iajb", terms, terms, weights).reshape(18, 18)
+        moment = np.einsum("ni,nab,nb->ia", terms, weights, centres_m).reshape(18)
+        spread = np.linalg.inv(normal + np.diag(np.repeat(largest**-2.0, 3)))
+        solution = spread @ moment
+        self._coefficients = solution.reshape(6, 3)
+        square = float(np.einsum("na,nab,nb->", centres_m, weights, centres_m))
+        self.cost = square - float(solution @ moment)
+        self.roughness = max(1.0, self.cost / max(1, 3 * len(points) - 12))
+        self.jump_std_m_s = math.sqrt(self.roughness * np.linalg.eigvalsh(spread[12:15, 12:15])[-1])
+
+    def _terms(self, times_us: Floats) -> Floats:
+        s = (times_us - self.hinge_us) * 1e-6
+        after = np.maximum(s, 0.0)
+        return np.stack([s**0, s, s**2, s**3, after, after**2], axis=-1)
+
+    def velocity_m_s(self, time_us: float) -> Floats:
+        """(3,) float64 velocity in m/s, camera frame."""
+        s = (time_us - self.hinge_us) * 1e-6
+        after = float(s >= 0.0)
+        velocity: Floats = np.array([0.0, 1.0, 2 * s, 3 * s**2, after, 2 * after * s]) @ self._coefficients
+        return velocity
+
+    def state(self, time_us: float) -> Floats:
+        """(5,) float64 [x_px, y_px, vx_px_s, vy_px_s, radius_px] of the ball in the image."""
+        centres_m = self._terms(np.array([time_us, time_us + 1.0])) @ self._coefficients
+        x, y, radius = self._camera.silhouette(centres_m, self._ball_radius_m)
+        return np.array([x[0], y[0], (x[1] - x[0]) * 1e6, (y[1] - y[0]) * 1e6, radius[0]])
 
 
-def _slopes(coefficients: Floats, s: float, hinge_s: float) -> Floats:
-    after = max(s - hinge_s, 0.0)
-    slopes: Floats = coefficients @ np.array([0.0, 1.0, 2 * s, 3 * s**2, float(s >= hinge_s), 2 * after])
-    return slopes
-
-
-def _velocities(coefficients: Floats, hinge_s: float, camera: Camera, ball_radius_m: float) -> tuple[Floats, Floats]:
-    """Velocities (3,) in m/s, camera frame, before and after the contact."""
-    dt_s = 1e-4
-    circle = _values(coefficients, hinge_s, hinge_s)
-    jump = coefficients[:, 4]
-    after = _slopes(coefficients, hinge_s, hinge_s)
-    moved = np.stack([circle, circle + (after - jump) * dt_s, circle + after * dt_s])
-    here, before, later = camera.ball_centre_m(moved[:, 0], moved[:, 1], moved[:, 2], ball_radius_m)
-    return (before - here) / dt_s, (later - here) / dt_s
+def _located(circles: Floats, camera: Camera, ball_radius_m: float) -> tuple[Floats, Floats]:
+    """Centres (n, 3) of balls in m, camera frame, and the inverses (n, 3, 3) of their covariances."""
+    steps = circles[-1, :2] - circles[0, :2]
+    ux, uy = steps / (math.hypot(*steps) or 1.0)
+    # Errors of the edge ahead, of the place across the flight, and of the radius, which the centre makes up for.
+    edge, size = CLEAN_EDGE_STD_PX, CLEAN_RADIUS_STD_PX
+    modes_px = np.array([[edge * ux, edge * uy, 0.0], [-edge * uy, edge * ux, 0.0], [-size * ux, -size * uy, size]])
+    changed = (circles[:, None] + np.vstack([np.zeros(3), modes_px])).reshape(-1, 3)
+    centres_m = camera.ball_centre_m(changed[:, 0], changed[:, 1], changed[:, 2], ball_radius_m).reshape(-1, 4, 3)
+    errors_m = centres_m[:, 1:] - centres_m[:, :1]
+    return centres_m[:, 0], np.asarray(np.linalg.inv(np.swapaxes(errors_m, 1, 2) @ errors_m))
 
 
 def _kind(before_m_s: Floats, after_m_s: Floats, std_m_s: float, up: Floats) -> Kind:
     """What the ball met: a table pushes up a ball that falls, and rubs it along by no more than its friction.
 
-    std_m_s is 1 sigma of the jump's depth, all else is known far better.
+    std_m_s is 1 sigma of the jump along its least known direction, that of the view; the others are known far better.
     """
     jump = after_m_s - before_m_s
     push = float(jump @ up)
@@ -248,7 +293,7 @@ def rolls(path: list[PathPoint], camera: Camera, ball_radius_m: float) -> bool |
     middle, half = (s[0] + s[-1]) / 2, (s[-1] - s[0]) / 2
     design = np.vander((s - middle) / half, 3)
     coefficients = np.linalg.lstsq(design, circles)[0]
-    noise_px = np.maximum([CENTRE_STD_PX, CENTRE_STD_PX, RADIUS_STD_PX], (circles - design @ coefficients).std(axis=0))
+    noise_px = np.maximum([EDGE_STD_PX, EDGE_STD_PX, RADIUS_STD_PX], (circles - design @ coefficients).std(axis=0))
     bend_px = noise_px * math.sqrt(np.linalg.inv(design.T @ design)[0, 0])
     circle = coefficients[2]
 
