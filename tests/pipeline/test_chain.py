@@ -31,6 +31,7 @@ INPUTS = {
     "triplet": ("packet", "flow", "rate"),
     "normal_flow": ("packet", "logo", "flow", "rate"),
     "contrast": ("packet", "ball", "logo", "normal_flow"),
+    "trajectory": ("packet", "ball"),
 }
 OF_RECORDING = ("filter", "surface", "track")
 BELOW_LOGO = {"logo", "rate", "flow", "triplet", "normal_flow", "contrast"}
