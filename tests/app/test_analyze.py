@@ -6,6 +6,7 @@ import copy
 import json
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from click.testing import CliRunner
 
 from spinscope.app.cli import cli
 from spinscope.app.commands.analyze import print_reports
+from spinscope.pipeline import calibrate_flights
 from spinscope.pipeline.session import Choices, Session
 from spinscope.pipeline.stages.logo import LogoParameters
 
@@ -206,3 +208,31 @@ def test_a_former_name_of_a_parameter_is_taken_with_a_notice(samples: Path, monk
     report = json.loads(CliRunner().invoke(cli, ["analyze", *arguments, "--json", "-"]).stdout)
     assert report["parameters"]["logo"]["pad_px"] == 3.0
     assert report["warnings"] == ["logo.margin_px is now called logo.pad_px"]
+
+
+def test_flights_calibrate_their_set_up_and_later_calls_read_it(samples: Path, tmp_path: Path) -> None:
+    sample, file = samples / "flight_fast_top.h5", tmp_path / "club.toml"
+    done = CliRunner().invoke(cli, ["analyze", str(sample), "--json", "-", "--calibrate-flight", str(file)])
+    assert done.exit_code == 0, done.output
+    written = tomllib.loads(file.read_text())
+    report = json.loads(done.stdout)
+    for group, fields in written.items():
+        for name, value in fields.items():
+            assert report["parameters"][group][name] == value
+    assert written["trajectory"]["lift_std"] < 0.12
+    session = Session.open(sample, Choices(flight_calibration=file, assignments=["trajectory.lift_scale=1"]))
+    assert session.parameters.trajectory.lift_std == written["trajectory"]["lift_std"]
+    assert session.parameters.trajectory.lift_scale == 1.0, "what is set by hand comes last"
+    assert session.parameters.camera.up == tuple(written["camera"]["up"])
+    calibration = calibrate_flights([sample])
+    assert calibration.flights == 1 and calibration.values == written
+    assert calibration.values["trajectory"]["plumb_std_deg"] < 1.0
+
+
+def test_without_a_flight_whose_logo_is_seen_there_is_no_calibration(samples: Path, tmp_path: Path) -> None:
+    arguments = ["analyze", str(samples / "flight_side.h5"), "--calibrate-flight"]
+    done = CliRunner().invoke(cli, [*arguments, str(tmp_path / "club.toml")])
+    assert done.exit_code != 0 and "no flight to calibrate by" in f"{done.output}{done.exception}"
+    assert not (tmp_path / "club.toml").exists()
+    done = CliRunner().invoke(cli, [*arguments, str(tmp_path / "club.txt")])
+    assert done.exit_code != 0 and ".toml" in f"{done.output}{done.exception}"

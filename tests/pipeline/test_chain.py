@@ -142,7 +142,7 @@ def test_an_unchanged_run_computes_nothing_again(calls: dict[str, int]) -> None:
         ("logo.pad_px=3", BELOW_LOGO),
         ("surface.k_px=5", set(INPUTS) - {"filter"}),
         ("spin.triplet_solve=least_squares", {"triplet", "normal_flow", "contrast"}),
-        ("spin.max_spin_rps=90", BELOW_LOGO - {"logo"}),
+        ("spin.max_spin_rps=90", BELOW_LOGO - {"logo"} | {"trajectory"}),
         ("rate.bin_us=1000", BELOW_LOGO - {"logo"}),
         ("contrast.kernel_rad=0.05", {"contrast"}),
         ("filter.mode=off", set(INPUTS)),
@@ -415,7 +415,7 @@ def test_a_stage_that_raises_leaves_no_half_column(toys: Toys) -> None:
     assert [tick.contrast for tick in chain.run(DEFAULT)] == [tick.contrast for tick in Chain(source()).run(DEFAULT)]
 
 
-@pytest.mark.parametrize("limit", [{"budget_bytes": 9 * 20 * 1000 + 6 * 20 * 1000}, {"max_columns": 9 + 6}])
+@pytest.mark.parametrize("limit", [{"budget_bytes": 10 * 20 * 1000 + 6 * 20 * 1000}, {"max_columns": 10 + 6}])
 def test_the_budget_drops_what_was_not_used_for_longest(
     calls: dict[str, int], monkeypatch: pytest.MonkeyPatch, limit: dict[str, int]
 ) -> None:
