@@ -82,13 +82,14 @@ def flight_calibration(results: Iterable[Result]) -> FlightCalibration:
 
 
 def known_flights(shots: Iterable[Shot]) -> list[KnownFlight]:
-    """The shots whose flight was fitted and whose spin the logo tells."""
+    """The shots whose flight was fitted and whose spin the logo tells, without doubts about their track."""
     method = STAGES[LOGO_METHOD]
     assert isinstance(method, SpinMethod)
     return [
         KnownFlight(shot.motion, shot.estimates[LOGO_METHOD])
         for shot in shots
-        if shot.motion is not None and LOGO_METHOD in shot.estimates and method.is_trusted(shot.estimates)
+        if shot.best is not None and shot.motion is not None
+        if LOGO_METHOD in shot.estimates and method.is_trusted(shot.estimates)
     ]
 
 

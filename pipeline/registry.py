@@ -114,8 +114,9 @@ def distrust_reason(estimates: Mapping[str, SpinEstimate], doubt: str | None = N
     """
     if doubt is not None or trusted_method(estimates) is not None:
         return doubt
+    in_order = sorted(methods(), key=lambda method: not method.is_last_resort)
     refusals = [
-        f"{m.label}: {estimates[m.name].reason}" for m in methods() if m.name in estimates and estimates[m.name].reason
+        f"{m.label}: {estimates[m.name].reason}" for m in in_order if m.name in estimates and estimates[m.name].reason
     ]
     return refusals[-1] if refusals else "the methods that were run answer, but are not sure enough to be trusted alone"
 

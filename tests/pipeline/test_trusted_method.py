@@ -87,3 +87,13 @@ def test_a_refusal_against_another_method_leaves_normal_flow_trusted() -> None:
     refused = SpinEstimate.refused("contrast", "it says otherwise", against="triplet")
     assert trusted_method({**normal_flow(50.0, 1.0, 2.0), "contrast": refused}) == "normal_flow"
     assert trusted_method({"normal_flow": SpinEstimate("normal_flow", np.zeros(3), np.eye(3), None)}) is None
+
+
+def test_the_trajectory_is_trusted_only_where_no_logo_tells_the_spin() -> None:
+    sure = {"trajectory": estimate("trajectory", 1.0)}
+    assert trusted_method(sure) == "trajectory"
+    assert trusted_method({**sure, "contrast": estimate("contrast", 8.0)}) == "contrast"
+    assert trusted_method({**sure, "normal_flow": estimate("normal_flow", 1.0)}) == "normal_flow"
+    assert trusted_method({**sure, "normal_flow": estimate("normal_flow", 6.0)}) == "trajectory"
+    assert trusted_method({**sure, "contrast": estimate("contrast", None)}) == "trajectory"
+    assert trusted_method({"trajectory": estimate("trajectory", 8.0)}) is None, "50 +- 8 rps is too wide"
