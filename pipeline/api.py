@@ -43,7 +43,8 @@ def estimate(
     preset : str or Path, optional
         `default`, `paper`, or a TOML file of [group] tables.
     method : str
-        Name of one spin method (`triplet`, `normal_flow`, `contrast`, `trajectory`), or `all`; only what it needs is computed.
+        Name of one spin method (`triplet`, `normal_flow`, `contrast`, `trajectory`), or `all`; only what it needs is
+        computed.
     window_us : (int, int), optional
         [start, end) in us of the file's own time: only these events are used.
     fixed_ball : (float, float, float) or "auto", optional

@@ -236,3 +236,14 @@ def test_without_a_flight_whose_logo_is_seen_there_is_no_calibration(samples: Pa
     assert not (tmp_path / "club.toml").exists()
     done = CliRunner().invoke(cli, [*arguments, str(tmp_path / "club.txt")])
     assert done.exit_code != 0 and ".toml" in f"{done.output}{done.exception}"
+
+
+@pytest.mark.parametrize(("up", "is_doubted"), [("0,0,-1", False), ("0,-0.6,-0.8", True)])
+def test_flights_that_contradict_the_up_direction_are_said(samples: Path, up: str, is_doubted: bool) -> None:
+    sample = samples / "own" / "shot_slow_top.h5"
+    done = CliRunner().invoke(cli, ["analyze", str(sample), "--json", "-", "--set", f"camera.up={up}"])
+    warnings = [one for one in json.loads(done.stdout)["warnings"] if "camera.up" in one]
+    assert len(warnings) == int(is_doubted)
+    for warning in warnings:
+        words = warning.rpartition("--set camera.up=")[2]
+        assert np.array([float(word) for word in words.split(",")]) == pytest.approx([0, 0, -1], abs=0.1)
