@@ -28,7 +28,7 @@ DOUBT_SIGMAS, DOUBT_DEG = 5.0, 3.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FlightCalibration:
-    """What the flights of a set-up share, as they tell it.
+    """Lift, drag and plumb line of a set-up by its flights.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What the flights of one set-up share (lift, drag, plumb line), from flights whose spin the logo tells."""
+"""Calibration of lift, drag and plumb line by flights of one set-up whose spin the logo tells."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which spins bend a flight as it is bent: their likelihood, and the estimate that follows from it."""
+"""Likelihood of spins by the bend of a flight, and the estimate that follows from it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FREEDOM = 7.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SetUp(ReadOnlyArrays):
-    """What flights of one set-up share, each with its 1 sigma.
+    """Lift, drag and plumb line, which flights of one set-up share, each with its 1 sigma.
 
     Attributes
     ----------

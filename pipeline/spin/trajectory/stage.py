@@ -22,7 +22,7 @@ METHOD = "trajectory"
 
 @dataclass(frozen=True, kw_only=True)
 class TrajectoryParameters(ParameterGroup):
-    """What flights of one set-up share, and what is asked of a flight."""
+    """Lift, drag and plumb line of a set-up, and the demands on a flight."""
 
     lift_scale: float = tunable(1.0, 0.1, 5.0, 0.01, "", "lift of the spin over that measured on real balls")
     lift_std: float = tunable(0.12, 0.001, 1.0, 0.01, "", "1 sigma of lift_scale")
@@ -111,7 +111,7 @@ def step(parameters: TrajectoryParameters, state: TrajectoryState, packet: Packe
 
 
 def set_up_of(parameters: TrajectoryParameters, up: tuple[float, ...]) -> SetUp:
-    """What these parameters and camera.up say of the set-up."""
+    """The set-up by these parameters and camera.up."""
     return SetUp(
         np.array(up),
         parameters.plumb_std_deg,
