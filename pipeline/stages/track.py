@@ -295,6 +295,9 @@ def _step_flying(
         if end is not None:
             state.balls.remove(ball)
             ended.append(end)
+    for ball in _doubles(state.balls):
+        state.balls.remove(ball)
+        ended.append(ShotEnd(ball.shot, packet.start_us, "lost"))
     waiting = None
     if _is_search_due(state, packet):
         anywhere, waiting = _search(parameters, state, packet, surface)
@@ -341,6 +344,11 @@ def _follow(
             reason = f"the ball was not seen for {parameters.coast_us / 1000:g} ms"
             return reason, _end(parameters, state, ball, ball.seen_us, "lost")
     return None, None
+
+
+def _doubles(balls: list[TrackedBall]) -> list[TrackedBall]:
+    """The balls that follow the same outline as one found before them."""
+    return [ball for place, ball in enumerate(balls) if any(ball.shares_outline(other) for other in balls[:place])]
 
 
 def _end(parameters: TrackParameters, state: TrackState, ball: TrackedBall, end_us: int, ended_by: EndedBy) -> ShotEnd:
@@ -416,7 +424,7 @@ def _wait_us(parameters: TrackParameters, state: TrackState, sighting: Sighting)
 def _begin(state: TrackState, packet: Packet, sighting: Sighting) -> None:
     """Follow a sighting: as the ball out of sight whose path it meets, else as a new shot."""
     for ball in state.balls:
-        if ball.measured is None and ball.has_size(sighting) and ball.meets(sighting, packet.end_us):
+        if ball.measured is None and ball.is_found(sighting, packet.end_us):
             ball.restart(state.measuring, sighting, packet.start_us, packet.end_us)
             return
     began_by = _began_by(state, packet, sighting)

@@ -38,10 +38,14 @@ COMMON_COVARIANCE = np.diag([PLACE_STD_PX**2, PLACE_STD_PX**2, 0.0, 0.0, RADIUS_
 FIRST_SPEED_STD_M_S = 0.2
 # A ball keeps its radius: an outline this much larger or smaller is another's.
 SAME_RADIUS = 0.1
+# Two tracks of one ball agree in velocity to this share.
+SAME_VELOCITY = 0.2
 # Outlines nearer to each other than this share events.
 APART_PX = 5.0
 # Error of the centre and radius of an outline that the border cuts, for each radius of it that is out of view.
 HIDDEN_ERROR = 0.3
+# A ball that turned is taken for one that flies on for up to so long: paths are compared from so long before.
+MEETING_US = 10_000
 FREE = np.full(5, 1e9)
 # 1 sigma of a state just after a contact, of place and radius: what a few circles leave open.
 AFTER_CONTACT_COVARIANCE = np.diag([0.3**2, 0.3**2, 0.0, 0.0, 0.3**2])
@@ -216,12 +220,22 @@ class TrackedBall:
         """Whether a sighting's centre lies within the ball: it is the ball again, or not to be told from it."""
         return bool(np.hypot(*(sighting.ring - self.filter.mean)[:2]) < self.filter.mean[4])
 
-    def meets(self, sighting: Sighting, end_us: int) -> bool:
-        """Whether a sighting's straight path meets that of this ball since it was last seen, within half a radius."""
-        times_s = np.linspace(self.seen_us - end_us, 0.0, 50)[:, None] * 1e-6
+    def is_found(self, sighting: Sighting, end_us: int) -> bool:
+        """Whether a sighting is this ball, out of sight: at its place, or on a path that meets its own of late."""
+        times_s = np.linspace(self.seen_us - MEETING_US - end_us, 0.0, 50)[:, None] * 1e-6
         old = self.seen[:2] + (times_s + (end_us - self.seen_us) * 1e-6) * self.seen[2:4]
         new = sighting.ring[:2] + times_s * sighting.ring[2:4]
-        return bool(np.hypot(*(old - new).T).min() < 0.5 * self.seen[4])
+        meets = np.hypot(*(old - new).T).min() < 0.5 * self.seen[4]
+        return self.has_size(sighting) and bool(meets or self.covers(sighting))
+
+    def shares_outline(self, other: TrackedBall) -> bool:
+        """Whether both are measured at the same place and fly the same way: crossing balls differ in velocity."""
+        off = np.abs(self.filter.mean - other.filter.mean)
+        both = self.measured is not None and other.measured is not None
+        return both and bool(
+            np.hypot(*off[:2]) < 0.5 * self.filter.mean[4]
+            and np.hypot(*off[2:4]) < SAME_VELOCITY * np.hypot(*self.filter.mean[2:4])
+        )
 
     def total_covariance(self) -> Floats:
         """(5, 5) float64: the filter's covariance plus the errors that every tick has in common."""

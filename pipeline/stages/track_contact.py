@@ -20,9 +20,9 @@ from ..results import Circle
 
 Floats = NDArray[np.float64]
 
-# A path is kept for so long, enough to tell that a ball rolls; the change test looks for a hinge in the last part of
-# a shorter one, over which one cubic describes any flight.
-PATH_US, TESTED_US, RECENT_US = 250_000, 100_000, 40_000
+# A path is kept for so long, enough to tell that a ball rolls; the change test looks for a hinge between the last
+# circles of a shorter one, over which one cubic describes any flight.
+PATH_US, TESTED_US, RECENT_CIRCLES = 250_000, 100_000, 8
 # Errors of the outline's edge ahead and of the circle's radius from tick to tick: what the test must bear in clutter,
 # and on clean scenes, where 0.2 px of the radius are bias that changes with the ball's motion.
 EDGE_STD_PX, RADIUS_STD_PX = 0.1, 0.15
@@ -105,7 +105,8 @@ def find_contact(
         return None
     fit = _PathFit(points, camera, ball_radius_m)
     last_us = points[-1].end_us
-    hinges_us = np.arange(max(points[1].end_us, last_us - RECENT_US) + 1, last_us, STEP_US, dtype=np.float64)
+    first_us = points[max(1, len(points) - RECENT_CIRCLES)].end_us
+    hinges_us = np.arange(first_us + 1, last_us, STEP_US, dtype=np.float64)
     gains = fit.gains(hinges_us)
     coarse_us, gain = float(hinges_us[np.argmax(gains)]), float(gains.max())
     if gain < LEAST_GAIN or coarse_us > min(points[-least_after].end_us, last_us - straddled_us):
