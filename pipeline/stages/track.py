@@ -196,8 +196,9 @@ class TrackResult:
         return self.balls[0].covariance if self.balls else NO_COVARIANCE
 
 
-# Beside a track that is seen, other balls are looked for this often: soon enough to find one within 15 ms.
-LOOK_US = 10_000
+# Beside a track that is seen, other balls are looked for this often, or in every tick that few events make cheap:
+# soon enough to find one within 15 ms.
+LOOK_US, FEW_EVENTS = 10_000, 5000
 # Shots come in across the border, within so many radii of it when first seen. A slow ball that turns up in the
 # middle rather rolls about: it is watched for a while, in which a real shot may come.
 COMING_IN, SLOW_M_S, WATCH_US = 5.0, 3.5, 20_000
@@ -304,7 +305,8 @@ def _step_flying(
         hough = hough or anywhere
     contacts, earlier = _announce_contacts(parameters, state)
     for ball in state.balls:
-        _judge(state, ball)
+        if ball.is_shot and ball.speed_m_s(state.context.ball_radius_m) < ROLLING_M_S:
+            ball.is_shot = not rolls(ball.path, state.context.camera, state.context.ball_radius_m)
     state.balls.sort(key=lambda ball: not ball.is_shot)
     balls = tuple(_ball_track(parameters, ball, packet.end_us, earlier.get(ball.shot, ())) for ball in state.balls)
     status: Status = "coasting"
@@ -383,9 +385,9 @@ def _announce_contacts(
 
 
 def _is_search_due(state: TrackState, packet: Packet) -> bool:
-    """Whether to look for balls anywhere: always while one is missed, else every LOOK_US."""
-    missed = not state.balls or any(ball.measured is None for ball in state.balls)
-    return missed or bool(state.pending) or packet.end_us - state.looked_us >= LOOK_US
+    """Whether to look for balls anywhere: always while one is missed or it is cheap, else every LOOK_US."""
+    missed = bool(state.pending) or not state.balls or any(ball.measured is None for ball in state.balls)
+    return missed or len(state.contour) < FEW_EVENTS or packet.end_us - state.looked_us >= LOOK_US
 
 
 def _search(
@@ -440,14 +442,6 @@ def _began_by(state: TrackState, packet: Packet, sighting: Sighting) -> BeganBy:
     if _beyond(moved(sighting.ring, since_us - packet.end_us), state.context.camera):
         return "entered"
     return "start" if since_us == first_us else "found"
-
-
-def _judge(state: TrackState, ball: TrackedBall) -> None:
-    """Tell whether a slow ball rolls: then it is no shot."""
-    if ball.is_judged or ball.speed_m_s(state.context.ball_radius_m) > ROLLING_M_S:
-        return
-    rolling = rolls(ball.path, state.context.camera, state.context.ball_radius_m)
-    ball.is_judged, ball.is_shot = rolling is not None, not rolling
 
 
 def _hough_near(state: TrackState, ball: TrackedBall, surface: SurfaceResult) -> Circle | None:

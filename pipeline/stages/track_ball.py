@@ -109,9 +109,7 @@ class TrackedBall:
     path : list of PathPoint
         The shot's ticks of the last PATH_US.
     is_shot : bool
-        Whether it is taken for a flight; False once it is seen to roll.
-    is_judged : bool
-        Whether it is known to fly or to roll.
+        Whether it is taken for a flight: until it is seen to roll.
     """
 
     shot: int
@@ -122,7 +120,6 @@ class TrackedBall:
     seen: Floats
     path: list[PathPoint] = field(default_factory=list)
     is_shot: bool = True
-    is_judged: bool = False
 
     @classmethod
     def at(cls, sighting: Sighting, measuring: Measuring, shot: int, packet: Packet, began_by: BeganBy) -> TrackedBall:

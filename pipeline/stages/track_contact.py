@@ -44,6 +44,8 @@ DRAG_1_M, LIFT_1_M = 0.16, 0.07
 JUMP_M_S = 30.0
 # A table's friction is at most this share of its push (0.25 to 0.5 published for rubber-free contact).
 MOST_FRICTION = 0.6
+# And its push at most turns round a fall from 3 m.
+MOST_PUSH_M_S = 15.0
 # Balls faster than this do not roll.
 ROLLING_M_S = 3.5
 Kind = Literal["bounce", "hit"]
@@ -119,7 +121,7 @@ def find_contact(
     before, after = refined.velocity_m_s(refined.hinge_us - 1), refined.velocity_m_s(refined.hinge_us)
     if np.linalg.norm(after - before) < LEAST_JUMP_M_S:
         return None
-    kind = _kind(before, after, refined.jump_std_m_s, np.array(camera.up))
+    kind = _kind(before, after, refined.unsure_m_s, np.array(camera.up))
     return Contact(round(refined.hinge_us), kind, refined)
 
 
@@ -233,8 +235,9 @@ class HingedPath:
         self._coefficients = solution.reshape(6, 3)
         square = float(np.einsum("na,nab,nb->", centres_m, weights, centres_m))
         self.cost = square - float(solution @ moment)
-        self.roughness = max(1.0, self.cost / max(1, 3 * len(points) - 12))
-        self.jump_std_m_s = math.sqrt(self.roughness * np.linalg.eigvalsh(spread[12:15, 12:15])[-1])
+        rough = max(1.0, self.cost / max(1, 3 * len(points) - 12))  # beyond the clean scene's errors
+        variances, directions = np.linalg.eigh(rough * spread[12:15, 12:15])
+        self.unsure_m_s: Floats = 2.0 * math.sqrt(variances[-1]) * directions[:, -1]
 
     def _terms(self, times_us: Floats) -> Floats:
         s = (times_us - self.hinge_us) * 1e-6
@@ -268,27 +271,28 @@ def _located(circles: Floats, camera: Camera, ball_radius_m: float) -> tuple[Flo
     return centres_m[:, 0], np.asarray(np.linalg.inv(np.swapaxes(errors_m, 1, 2) @ errors_m))
 
 
-def _kind(before_m_s: Floats, after_m_s: Floats, std_m_s: float, up: Floats) -> Kind:
+def _kind(before_m_s: Floats, after_m_s: Floats, unsure_m_s: Floats, up: Floats) -> Kind:
     """What the ball met: a table pushes up a ball that falls, and rubs it along by no more than its friction.
 
-    std_m_s is 1 sigma of the jump along its least known direction, that of the view; the others are known far better.
+    unsure_m_s (3,) is 2 sigma of the jump along its least known direction, that of the view; the rest is known well.
     """
     jump = after_m_s - before_m_s
-    push = float(jump @ up)
+    push, unsure_push = float(jump @ up), abs(float(unsure_m_s @ up))
     rubbed = float(np.linalg.norm(jump - push * up))
-    margin_m_s = 2.0 * std_m_s
-    falls = before_m_s @ up < margin_m_s and push > -margin_m_s
-    return "bounce" if falls and rubbed <= MOST_FRICTION * max(push, 0.0) + margin_m_s else "hit"
+    unsure_rubbed = math.sqrt(max(float(unsure_m_s @ unsure_m_s) - unsure_push**2, 0.0))
+    falls = before_m_s @ up < unsure_push and push > -unsure_push
+    most_push = min(max(push + unsure_push, 0.0), MOST_PUSH_M_S)
+    return "bounce" if falls and rubbed - unsure_rubbed <= MOST_FRICTION * most_push else "hit"
 
 
-def rolls(path: list[PathPoint], camera: Camera, ball_radius_m: float) -> bool | None:
-    """Whether a ball rolls, which no force bends, or flies, which gravity does; None while it cannot be told.
+def rolls(path: list[PathPoint], camera: Camera, ball_radius_m: float) -> bool:
+    """Whether a ball is seen to roll: gravity does not bend its path. A path too short to tell may be a flight's.
 
     Judged by the size of the acceleration, whatever its direction: camera.up may be unknown.
     """
     points = [point for point in path if point.circle is not None]
     if len(points) < 4:
-        return None
+        return False
     circles = np.array([[c.x_px, c.y_px, c.radius_px] for point in points if (c := point.circle)])
     s = np.array([(point.end_us - points[0].end_us) * 1e-6 for point in points])
     middle, half = (s[0] + s[-1]) / 2, (s[-1] - s[0]) / 2
@@ -306,8 +310,4 @@ def rolls(path: list[PathPoint], camera: Camera, ball_radius_m: float) -> bool |
 
     here = acceleration_m_s2(coefficients[0])
     spread = [acceleration_m_s2(coefficients[0] + step) - here for step in np.diag(bend_px)]
-    sure_m_s2 = 3.0 * float(np.linalg.norm(spread))
-    size_m_s2 = float(np.linalg.norm(here))
-    if size_m_s2 + sure_m_s2 < GRAVITY_M_S2 / 2:
-        return True
-    return False if size_m_s2 - sure_m_s2 > GRAVITY_M_S2 / 2 else None
+    return float(np.linalg.norm(here)) + 3.0 * float(np.linalg.norm(spread)) < GRAVITY_M_S2 / 2

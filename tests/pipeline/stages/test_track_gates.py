@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.results import Packet
-from spinscope.pipeline.stages import track
-from spinscope.pipeline.stages.track import TrackParameters, TrackState
+from spinscope.pipeline.stages import track, track_ball
+from spinscope.pipeline.stages.track import TrackParameters
+from spinscope.pipeline.stages.track_ball import TrackedBall
 from spinscope.pipeline.stages.track_kalman import BallFilter
 from spinscope.pipeline.stages.track_outline import Sighting
-from spinscope.pipeline.stages.track_search import OtherBalls, agree
+from spinscope.pipeline.stages.track_search import agree
 from tests.track_runs import PAPER_CONTEXT
 
 RING = np.array([600.0, 350.0, 3000.0, -4000.0, 17.0])
@@ -82,9 +82,22 @@ def test_two_sightings_are_of_one_ball_if_it_moved_as_it_said(near: list[float],
     assert not agree(sighting(), sighting(ring=moved + far), 5000)
 
 
-def test_other_balls_are_looked_for_every_10_ms() -> None:
-    others = OtherBalls(looked_us=50_000)
-    assert not others.due(59_999) and others.due(60_000)
+def test_other_balls_are_looked_for_every_10_ms_and_at_once_when_one_is_missed() -> None:
+    state = track.start(TrackParameters(), PAPER_CONTEXT)
+    state.looked_us = 50_000
+    many = np.zeros(track.FEW_EVENTS, np.int64)
+    state.contour = EventBatch(many, many.astype(np.uint16), many.astype(np.uint16), many.astype(bool))
+    assert track._is_search_due(state, packet_to(51_000)), "no ball yet"
+    state.balls = [tracked_ball()]
+    assert not track._is_search_due(state, packet_to(59_999)) and track._is_search_due(state, packet_to(60_000))
+    state.pending = [(50_000, sighting())]
+    assert track._is_search_due(state, packet_to(51_000)), "a sighting waits"
+    state.pending = []
+    few = dataclasses.replace(state, contour=state.contour[1:])
+    assert track._is_search_due(few, packet_to(51_000))
+    assert not track._is_search_due(state, packet_to(51_000))
+    state.balls[0].coast(51_000)
+    assert track._is_search_due(state, packet_to(51_000))
 
 
 @pytest.mark.parametrize(
@@ -124,7 +137,7 @@ def test_the_filter_takes_in_what_is_within_its_gate() -> None:
         for towards in (np.array([1.0, 0, 0]), np.array([0, 0.6, -0.8]), np.array([2.0, -1.0, 2.0]) / 3):
             ball = ball_filter()
             observed = RING[[0, 1, 4]] + distance * sigmas * towards
-            assert ball.update(observed, noise, track.MOST_SURPRISE) == taken
+            assert ball.update(observed, noise, track_ball.MOST_SURPRISE) == taken
             assert np.array_equal(ball.mean, RING) != taken
             assert np.array_equal(ball.covariance, SPREAD) != taken
 
@@ -155,31 +168,41 @@ def test_a_prediction_moves_the_ball_and_spreads_by_its_acceleration() -> None:
     np.testing.assert_allclose(ball.covariance, covariance, rtol=1e-9)
 
 
+MEASURING = track.start(TrackParameters(), PAPER_CONTEXT).measuring
+
+
+def packet_to(end_us: int, tick_us: int = 5000) -> Packet:
+    return Packet(end_us // tick_us - 1, end_us - tick_us, end_us, EventBatch.empty())
+
+
+def tracked_ball() -> TrackedBall:
+    """A ball of the clear sighting, seen until 15 ms."""
+    return TrackedBall.at(sighting(), MEASURING, 0, packet_to(15_000), "start")
+
+
 def updated(
     monkeypatch: pytest.MonkeyPatch, seen: Sighting | None, tick_us: int = 5000
-) -> tuple[bool, TrackState, list[np.ndarray]]:
-    """(whether it was measured, the state, noise given to the filter) of one update with this sighting."""
-    parameters = TrackParameters()
-    state = track.start(parameters, PAPER_CONTEXT)
+) -> tuple[bool, TrackedBall, list[np.ndarray]]:
+    """(whether it was measured, the ball, noise given to the filter) of one measurement with this sighting."""
     given: list[np.ndarray] = []
 
-    def update(observed: np.ndarray, noise: np.ndarray, most_surprise: float) -> bool:
+    def update(self: BallFilter, observed: np.ndarray, noise: np.ndarray, most_surprise: float) -> bool:
         given.append(noise)
         return True
 
-    monkeypatch.setattr(track, "measure", lambda *arguments: seen)
-    packet = Packet(3, 3 * tick_us, 4 * tick_us, EventBatch.empty())
-    ball = SimpleNamespace(update=update)
-    measured = track._update(parameters, state, ball, packet, RING, np.full(5, 0.1))
-    return measured is not None, state, given
+    ball = tracked_ball()
+    monkeypatch.setattr(track_ball, "measure", lambda *arguments: seen)
+    monkeypatch.setattr(BallFilter, "update", update)
+    measured = ball.measure(MEASURING, EventBatch.empty(), 20_000 - tick_us, 20_000)
+    return measured is not None, ball, given
 
 
 def test_an_outline_must_show_some_of_its_half_ahead(monkeypatch: pytest.MonkeyPatch) -> None:
-    measured, state, _ = updated(monkeypatch, sighting(ahead=0.31))
-    assert measured and state.seen_us == 20_000
+    measured, ball, _ = updated(monkeypatch, sighting(ahead=0.31))
+    assert measured and ball.seen_us == 20_000
     for seen in (sighting(ahead=0.29), None):
-        measured, state, given = updated(monkeypatch, seen)
-        assert not measured and state.seen_us == 0 and not given
+        measured, ball, given = updated(monkeypatch, seen)
+        assert not measured and ball.seen_us == 15_000 and not given
 
 
 @pytest.mark.parametrize(("tick_us", "shared"), [(1000, 3.0), (2000, 1.5), (3000, 1.0), (5000, 1.0)])
@@ -189,14 +212,20 @@ def test_events_shared_by_two_ticks_count_less(monkeypatch: pytest.MonkeyPatch, 
     np.testing.assert_allclose(noise, shared * (np.diag([0.01, 0.02, 0.03]) + 0.05**2 * np.eye(3)))
 
 
+def test_an_outline_cut_by_the_border_counts_less_in_the_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A fifth of it hidden: by 0.3 of a fifth of the radius more."""
+    _, ball, (noise,) = updated(monkeypatch, sighting(visible=0.8))
+    np.testing.assert_allclose(ball.path[-1].noise - noise, (0.3 * 0.2 * 17.0) ** 2 * np.eye(3))
+
+
 def test_the_stated_error_holds_what_no_filtering_takes_away() -> None:
     """12 us of latency along the flight, 0.06 px of place and 0.3 px of radius, beside the filter's own."""
     late_px = np.array([3000.0, -4000.0]) * 12e-6
     expected = SPREAD + np.diag([0.06**2, 0.06**2, 0.0, 0.0, 0.3**2])
     expected[:2, :2] += np.outer(late_px, late_px)
-    ball = ball_filter()
-    np.testing.assert_allclose(track._total_covariance(ball), expected, rtol=1e-12)
-    np.testing.assert_array_equal(ball.covariance, SPREAD)
+    ball = dataclasses.replace(tracked_ball(), filter=ball_filter())
+    np.testing.assert_allclose(ball.total_covariance(), expected, rtol=1e-12)
+    np.testing.assert_array_equal(ball.filter.covariance, SPREAD)
 
 
 @pytest.mark.parametrize("axis", [0, 1])
@@ -206,12 +235,12 @@ def test_a_ball_has_left_when_less_than_a_tenth_of_its_width_is_in_view(axis: in
         for inwards, beyond in ((0.05, False), (-0.05, True)):
             mean = RING.copy()
             mean[axis] = place - last * inwards
-            assert track._beyond(mean, 1280, 720) == beyond
+            assert track._beyond(mean, PAPER_CONTEXT.camera) == beyond
 
 
 def test_the_ball_is_smaller_than_its_outline_and_ahead_of_it() -> None:
     """By 0.5 px, and by 0.1 px along the flight whatever the speed; there and back is nothing."""
-    edge = track._edge(TrackParameters())
+    edge = MEASURING.edge
     shift = 0.1 * np.array([0.6, -0.8])
     np.testing.assert_allclose(edge.ball(RING), np.add(RING, [*shift, 0, 0, -0.5]))
     np.testing.assert_allclose(edge.ball(edge.outline(RING)), RING)
@@ -220,16 +249,52 @@ def test_the_ball_is_smaller_than_its_outline_and_ahead_of_it() -> None:
 
 
 def test_a_new_track_begins_with_the_sightings_spread_and_room_for_acceleration() -> None:
-    parameters = TrackParameters(outline_px=0.0, lag_px=0.0)
-    state = track.start(parameters, PAPER_CONTEXT)
-    state.shots, state.pending = 4, (0, sighting())
-    result = track._begin(parameters, state, Packet(1, 5000, 10_000, EventBatch.empty()), sighting(), None, 4)
-    assert state.ball is not None and state.pending is None
+    state = track.start(TrackParameters(outline_px=0.0, lag_px=0.0), PAPER_CONTEXT)
+    state.shots = 4
+    track._begin(state, packet_to(10_000), sighting())
+    (ball,) = state.balls
     speed_std_px_s = 0.2 * 17.0 / 0.02
     expected = SPREAD + np.diag([0.05**2, 0.05**2, speed_std_px_s**2, speed_std_px_s**2, 0.05**2])
-    np.testing.assert_allclose(state.ball.covariance, expected)
-    assert (result.shot, state.shots, state.seen_us, result.status) == (4, 5, 10_000, "tracking")
-    assert result.t_us == 10_000 - 40.0 and result.ball is not None and result.ball.latency_us == 40.0
-    state.ball.predict(1.0)
+    np.testing.assert_allclose(ball.filter.covariance, expected)
+    assert (ball.shot, state.shots, ball.seen_us, ball.start_us) == (4, 5, 10_000, 5000)
+    ball.filter.predict(1.0)
     radius_std_px = math.sqrt(0.03 + 0.05**2 + (3.0 * 17.0 / 0.02 * 17.0 / 1646.09) ** 2)
-    assert math.sqrt(state.ball.covariance[4, 4]) == pytest.approx(radius_std_px, rel=1e-4)
+    assert math.sqrt(ball.filter.covariance[4, 4]) == pytest.approx(radius_std_px, rel=1e-4)
+
+
+def moved_on(by_us: int, **changes: object) -> Sighting:
+    """The clear sighting's ball so much later."""
+    return sighting(ring=RING + np.array([3000.0, -4000.0, 0, 0, 0]) * by_us * 1e-6, **changes)
+
+
+def test_a_ball_out_of_sight_is_found_again_where_the_paths_meet() -> None:
+    """5 ms after its last sight: on its way, or turned round at a racket, but not elsewhere nor of another size."""
+    ball = tracked_ball()
+    assert ball.is_found(moved_on(5000), 20_000)
+    turned = RING * [1, 1, -1, -1, 1] + [-3.0, 4.0, 0, 0, 0]
+    assert ball.is_found(sighting(ring=turned), 20_000)
+    aside = np.add(turned, [40.0, 30.0, 0, 0, 0])  # fifty pixels beside the old path, parallel to it
+    assert not ball.is_found(sighting(ring=aside), 20_000)
+    assert not ball.is_found(sighting(ring=turned * [1, 1, 1, 1, 1.15]), 20_000)
+
+
+def test_two_tracks_of_one_outline_are_told_from_two_balls_that_cross() -> None:
+    ball, double, crossing = tracked_ball(), tracked_ball(), tracked_ball()
+    assert double.shares_outline(ball)
+    assert track._doubles([ball, double]) == [double]
+    crossing.filter = BallFilter(RING * [1, 1, -1, 1, 1], SPREAD, 2e4, 100.0)
+    assert not crossing.shares_outline(ball)
+    double.coast(20_000)
+    assert not double.shares_outline(ball)
+
+
+@pytest.mark.parametrize(
+    ("x_px", "first_us", "began_by"),
+    [(100.0, 0, "start"), (640.0, 0, "start"), (60.0, -100_000, "entered"), (640.0, -100_000, "found")],
+)
+def test_how_a_shot_began(x_px: float, first_us: int, began_by: str) -> None:
+    """Back along its flight by 30 ms or to the recording's start: out of view, in view, or too late to say."""
+    state = track.start(TrackParameters(), PAPER_CONTEXT)
+    state.first_us = first_us
+    seen = sighting(ring=np.array([x_px, 300.0, 3000.0, 0.0, 17.0]))
+    assert track._began_by(state, packet_to(10_000), seen) == began_by

@@ -1,0 +1,191 @@
+"""The change test on paths of circles: contacts found, when and of which kind, and none where there is none."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from spinscope.pipeline.camera import Camera, CameraParameters
+from spinscope.pipeline.results import Circle
+from spinscope.pipeline.simulator import Air, Ball, Flight, Scene, flight
+from spinscope.pipeline.simulator.motion import Trajectory, trajectory, triple
+from spinscope.pipeline.stages import track_contact
+from spinscope.pipeline.stages.track_contact import Contact, PathPoint, find_contact, rolls
+
+ABOVE = Camera.of(CameraParameters(), 1280, 720)
+SIDE = Camera.of(CameraParameters(up=(0.0, -1.0, 0.0)), 1280, 720)
+TICK_US, CONTOUR_US = 5000, 3000
+# Of the outline's edge ahead, across the flight, and of the radius, on simulated flights.
+NOISE_PX = np.array([0.04, 0.03, 0.06])
+KINDS = ("top", "back", "left", "right", "corkscrew", "mixed")
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+
+
+def path_of(flown: Trajectory, camera: Camera, rng: np.random.Generator, tick_us: int = TICK_US) -> list[PathPoint]:
+    """Noisy circles of a ball at the ends of ticks, as the tracker keeps them."""
+    first = math.ceil(flown.start_s * 1e6 / tick_us) + 1
+    ends_us = np.arange(first * tick_us, flown.end_s * 1e6, tick_us).astype(np.int64)
+    x, y, radius = camera.silhouette(flown.at(ends_us * 1e-6).position_m, 0.02)
+    heading = np.arctan2(np.gradient(y), np.gradient(x))
+    ahead, across, size = (rng.standard_normal((ends_us.size, 3)) * NOISE_PX).T
+    x += (ahead - size) * np.cos(heading) - across * np.sin(heading)
+    y += (ahead - size) * np.sin(heading) + across * np.cos(heading)
+    return [
+        PathPoint(int(end), Circle(*row, 1.0), 0.005 * np.eye(3))
+        for end, row in zip(ends_us, np.stack([x, y, radius + size], axis=1).tolist(), strict=True)
+    ]
+
+
+def first_contact(path: list[PathPoint], camera: Camera) -> Contact | None:
+    """What the tracker finds, going along the path."""
+    found = (find_contact(path[: n + 1], camera, 0.02, CONTOUR_US, 3) for n in range(len(path)))
+    return next((contact for contact in found if contact is not None), None)
+
+
+def flown(scene: Scene) -> Trajectory:
+    return trajectory(scene.balls[0].motions[0], scene.balls[0], scene)
+
+
+def bounce_above(seed: int) -> tuple[Trajectory, Camera]:
+    rng = np.random.default_rng([seed, 1])
+    scene = flight(
+        kind=KINDS[seed % 6],
+        magnitude_rps=float(rng.uniform(0, 80)),
+        speed_m_s=float(rng.uniform(4, 9)),
+        heading_deg=float(rng.uniform(0, 360)),
+        bounce=True,
+        seed=seed,
+    )
+    return flown(scene), ABOVE
+
+
+def bounce_side(seed: int) -> tuple[Trajectory, Camera]:
+    rng = np.random.default_rng([seed, 2])
+    start = Flight(0.0, 0.15, (-0.5, -0.05, 2.0), (float(rng.uniform(3, 7)), 1.5, float(rng.uniform(-0.5, 0.5))),
+                   triple(rng.uniform(-40, 40, 3)), UPRIGHT, bounces=True)  # fmt: skip
+    scene = Scene(0.15, (Ball((start,)),), up=(0.0, -1.0, 0.0))
+    return flown(Scene(0.15, scene.balls, background=type(scene.background)(height_m=0.15), up=scene.up)), SIDE
+
+
+def hit(seed: int) -> tuple[Trajectory, Camera]:
+    rng = np.random.default_rng([seed, 3])
+    speed = float(rng.uniform(3, 9))
+    here = Flight(0.0, 0.06, (-0.4, float(rng.uniform(-0.1, 0.1)), 1.8), (speed, 0.5, 0.0), (0.0, 40.0, 0.0), UPRIGHT)
+    there = flown(Scene(0.06, (Ball((here,)),)))
+    back = Flight(0.06, 0.12, triple(there.position_m[-1]), (-float(rng.uniform(5, 14)), 0.5, -0.5),
+                  (0.0, -60.0, 0.0), UPRIGHT)  # fmt: skip
+    away = flown(Scene(0.12, (Ball((back,)),)))
+    joined = (
+        np.concatenate([getattr(there, name)[:-1], getattr(away, name)]) for name in Trajectory.__dataclass_fields__
+    )
+    return Trajectory(*joined), ABOVE
+
+
+def contact_s(flown: Trajectory) -> float:
+    """Time of the jump of velocity."""
+    jumps = np.abs(np.diff(flown.velocity_m_s, axis=0)).max(axis=1)
+    assert jumps.max() > 0.3, "no contact in the scene"
+    return float(flown.time_s[int(np.argmax(jumps)) + 1])
+
+
+@pytest.mark.parametrize(("scene", "kind"), [(bounce_above, "bounce"), (bounce_side, "bounce"), (hit, "hit")])
+def test_contacts_are_found_to_2_ms(scene: object, kind: str) -> None:
+    errors_ms = []
+    for seed in range(7700, 7720):
+        path, camera = scene(seed)  # type: ignore[operator]
+        contact = first_contact(path_of(path, camera, np.random.default_rng(seed)), camera)
+        assert contact is not None and contact.kind == kind
+        errors_ms.append(abs(contact.time_us * 1e-3 - contact_s(path) * 1e3))
+    assert np.percentile(errors_ms, 90) < 2.0
+    assert max(errors_ms) < 4.0
+
+
+def test_the_path_after_a_contact_is_the_balls() -> None:
+    path, camera = bounce_above(7701)
+    contact = first_contact(path_of(path, camera, np.random.default_rng(1)), camera)
+    assert contact is not None
+    later_s = contact.time_us * 1e-6 + np.array([0.004, 0.0041])
+    x, y, radius = camera.silhouette(path.at(later_s).position_m, 0.02)
+    state = contact.path.state(later_s[0] * 1e6)
+    assert np.hypot(state[0] - x[0], state[1] - y[0]) < 1.0
+    assert np.hypot(state[2] - np.diff(x)[0] * 1e4, state[3] - np.diff(y)[0] * 1e4) < 150.0
+    assert abs(state[4] - radius[0]) < 0.3
+
+
+def test_no_contact_where_there_is_none() -> None:
+    """Fast and slow, strongly curved: not a single one in 100 flights."""
+    for seed in range(7800, 7900):
+        rng = np.random.default_rng(seed)
+        speed_m_s = float(rng.choice([3.5, 6.0, 10.0, 15.0, 22.0]))
+        scene = flight(kind=KINDS[seed % 6], magnitude_rps=float(rng.uniform(0, 120)), speed_m_s=speed_m_s, seed=seed)
+        assert first_contact(path_of(flown(scene), ABOVE, rng), ABOVE) is None
+
+
+def test_an_outlier_is_no_contact() -> None:
+    """Clutter that draws one circle off by a pixel, or many by a third, bends no path."""
+    scene = flight(speed_m_s=7.0, magnitude_rps=60.0, seed=7790)
+    path = path_of(flown(scene), ABOVE, np.random.default_rng(2))
+    one = list(path)
+    circle = one[9].circle
+    assert circle is not None
+    one[9] = PathPoint(one[9].end_us, Circle(circle.x_px + 1.0, circle.y_px, circle.radius_px - 0.5, 1.0), one[9].noise)
+    assert first_contact(one, ABOVE) is None
+    rng = np.random.default_rng(3)
+    many = [
+        PathPoint(point.end_us, Circle(c.x_px + dx, c.y_px + dy, c.radius_px, 1.0), point.noise)
+        for point in path
+        if (c := point.circle)
+        for dx, dy in [rng.normal(0, 0.35, 2)]
+    ]
+    assert first_contact(many, ABOVE) is None
+
+
+def test_a_contact_is_announced_after_three_circles_and_at_the_end_after_one() -> None:
+    path, camera = bounce_above(7702)
+    circles = path_of(path, camera, np.random.default_rng(4))
+    after = next(n for n, point in enumerate(circles) if point.end_us > contact_s(path) * 1e6 + CONTOUR_US)
+    known = [n for n in range(len(circles)) if find_contact(circles[: n + 1], camera, 0.02, CONTOUR_US, 3)]
+    assert after + 1 <= known[0] <= after + 2
+    at_the_end = [n for n in range(after + 1) if find_contact(circles[: n + 1], camera, 0.02, CONTOUR_US, 1)]
+    assert at_the_end and at_the_end[0] <= after
+
+
+@pytest.mark.parametrize("camera", [ABOVE, SIDE])
+def test_a_ball_that_rolls_is_told_from_one_that_flies(camera: Camera) -> None:
+    """Within a quarter of a second; before, and for one that flies always, it may be a flight."""
+    for speed_m_s in (1.0, 2.5):
+        start = Flight(0.0, 0.25, (-0.2, 0.0, 1.9), (speed_m_s, 0.0, 0.0), (0.0, 0.0, 0.0), UPRIGHT)
+        for air, rolling in ((Air(gravity_m_s2=0.0, drag=0.0, magnus=0.0), True), (Air(), False)):
+            scene = Scene(0.25, (Ball((start,)),), air=air, up=camera.up)  # type: ignore[arg-type]
+            path = path_of(flown(scene), camera, np.random.default_rng(5))
+            judged = [rolls(path[: n + 1], camera, 0.02) for n in range(len(path))]
+            assert judged[-1] == rolling and any(judged) == rolling and not any(judged[:10])
+
+
+def test_a_short_path_tells_nothing() -> None:
+    path = path_of(bounce_above(7703)[0], ABOVE, np.random.default_rng(6))[:3]
+    assert find_contact(path, ABOVE, 0.02, CONTOUR_US, 3) is None
+    assert not rolls(path, ABOVE, 0.02)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "unsure", "kind"),
+    [
+        ((5.0, 0.0, -2.0), (4.2, 0.0, 1.7), (0.0, 0.0, 0.1), "bounce"),
+        ((5.0, 0.0, -2.0), (-5.0, 0.0, 1.7), (0.0, 0.0, 0.1), "hit"),  # rubbed by more than any table
+        ((5.0, 0.0, 2.0), (4.2, 0.0, 4.0), (0.0, 0.0, 0.1), "hit"),  # it rose
+        ((5.0, 0.0, -2.0), (4.2, 0.0, -4.0), (0.0, 0.0, 0.1), "hit"),  # pushed down
+        ((5.0, 0.0, -2.0), (4.2, 1.5, 1.0), (0.0, 0.0, 0.0), "bounce"),
+        ((5.0, 0.0, -2.0), (4.2, 1.8, 1.0), (0.0, 0.0, 0.0), "hit"),
+        ((5.0, 0.0, -2.0), (4.2, 1.8, 1.0), (0.0, 0.0, 1.0), "bounce"),  # seen from above: the push may be larger
+        ((5.0, 0.0, -2.0), (4.2, 4.0, 1.0), (0.0, 3.0, 0.0), "bounce"),  # from the side: rubbed by less
+        ((5.0, 0.0, -2.0), (-9.0, 0.0, 1.0), (0.0, 0.0, 90.0), "hit"),  # by no push that a table gives
+    ],
+)
+def test_a_table_pushes_up_and_rubs(
+    before: tuple[float, ...], after: tuple[float, ...], unsure: tuple[float, ...], kind: str
+) -> None:
+    up = np.array([0.0, 0.0, 1.0])
+    assert track_contact._kind(np.array(before), np.array(after), np.array(unsure), up) == kind
