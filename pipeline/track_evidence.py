@@ -18,7 +18,10 @@ FEWEST_IN_ROW, SHORTEST_US = 3, 10_000.0
 SHORTEST_REACH = 0.5
 # Centres scatter by a hundredth of a radius about a flight, by a seventh where a camera vibrates by 2 px at the worst
 # frequency. Fewer differences than these tell nothing.
-LARGEST_SCATTER, FEWEST_DIFFERENCES = 0.25, 4
+LARGEST_SCATTER, FEWEST_DIFFERENCES = 0.2, 4
+# The circles that are compared are so far apart: the paper's tick. Nearer ones share events, and what a dot on a
+# turning disc does within them is next to straight.
+SPACING_US = 5000.0
 # Third differences of white noise of 1 sigma have sqrt(1 + 9 + 9 + 1) sigma.
 NOISE_OF_DIFFERENCE = math.sqrt(20.0)
 
@@ -42,10 +45,10 @@ class TrackEvidence:
     reach_px : float
         Largest distance of a measured centre from the first one.
     recent : tuple of (t_us, x_px, y_px)
-        Centres of the row's last three ticks.
-    differences, sum_px2 : int, float
-        Number of third differences of the centres of ticks in a row, and the sum of their squares. A flight has next
-        to none: it is a parabola, and perspective changes slowly.
+        The row's last three centres that are SPACING_US apart.
+    differences, sum_squares : int, float
+        Number of third differences of such centres in radii, and the sum of their squares. A flight has next to none:
+        it is a parabola, and perspective changes slowly.
     """
 
     is_fixed: bool = False
@@ -58,7 +61,7 @@ class TrackEvidence:
     reach_px: float = 0.0
     recent: tuple[Place, ...] = ()
     differences: int = 0
-    sum_px2: float = 0.0
+    sum_squares: float = 0.0
 
     def with_tick(self, ball: BallTrack) -> TrackEvidence:
         """The evidence one tick later."""
@@ -67,8 +70,10 @@ class TrackEvidence:
             is_fixed = not ball.mean[2:4].any()
             return replace(self, is_fixed=is_fixed, ticks=self.ticks + 1, in_row=0, recent=())
         first, since_us = self.first or circle, self.row_since_us if self.in_row else ball.t_us
-        places = (*self.recent, (ball.t_us, circle.x_px, circle.y_px))
-        difference_px2 = _third_difference_px2(places)
+        places = self.recent
+        if not places or ball.t_us - places[-1][0] > SPACING_US - 1.0:
+            places = (*places, (ball.t_us, circle.x_px, circle.y_px))
+        square_px2 = _third_difference_px2(places)
         return TrackEvidence(
             ticks=self.ticks + 1,
             in_row=self.in_row + 1,
@@ -78,8 +83,8 @@ class TrackEvidence:
             first=first,
             reach_px=max(self.reach_px, math.hypot(circle.x_px - first.x_px, circle.y_px - first.y_px)),
             recent=places[-3:],
-            differences=self.differences + (difference_px2 is not None),
-            sum_px2=self.sum_px2 + (difference_px2 or 0.0),
+            differences=self.differences + (square_px2 is not None),
+            sum_squares=self.sum_squares + (square_px2 or 0.0) / circle.radius_px**2,
         )
 
     @property
@@ -93,23 +98,22 @@ class TrackEvidence:
                 f"{FEWEST_IN_ROW} over {SHORTEST_US / 1000:g} ms are needed "
                 "(a ball on a spinner needs --fixed-ball auto)"
             )
-        radius_px = self.first.radius_px
-        if self.reach_px < SHORTEST_REACH * radius_px:
-            circle = f"{self.first.x_px:.0f} {self.first.y_px:.0f} {radius_px:.0f}"
+        if self.reach_px < SHORTEST_REACH * self.first.radius_px:
+            circle = f"{self.first.x_px:.0f} {self.first.y_px:.0f} {self.first.radius_px:.0f}"
             return (
                 f"the ball stays in its place, within {self.reach_px:.1f} px "
                 f"(a ball on a spinner needs --fixed-ball {circle} or --fixed-ball auto)"
             )
-        if self.scatter_px > LARGEST_SCATTER * radius_px:
-            return f"the track is no flight: its circles scatter by {self.scatter_px:.1f} px about a smooth path"
+        if self.scatter > LARGEST_SCATTER:
+            return f"the track is no flight: its circles scatter by {self.scatter:.2f} radii about a smooth path"
         return None
 
     @property
-    def scatter_px(self) -> float:
-        """1 sigma of the measured centres about a smooth path, px; 0 where too few are measured in a row."""
+    def scatter(self) -> float:
+        """1 sigma of the measured centres about a smooth path, radii; 0 where too few are measured in a row."""
         if self.differences < FEWEST_DIFFERENCES:
             return 0.0
-        return math.sqrt(self.sum_px2 / (2 * self.differences)) / NOISE_OF_DIFFERENCE
+        return math.sqrt(self.sum_squares / (2 * self.differences)) / NOISE_OF_DIFFERENCE
 
 
 def _third_difference_px2(places: tuple[Place, ...]) -> float | None:
