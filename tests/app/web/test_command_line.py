@@ -44,7 +44,12 @@ def test_the_options_of_tune_are_handed_on(asked: list[Any]) -> None:
 
 def test_view_serves_the_page_without_tools(asked: list[Any]) -> None:
     assert CliRunner().invoke(cli, ["view", "shot.h5", "--layout", "spin", "--set", "logo.pad_px=3"]).exit_code == 0
-    assert asked == [((Path("shot.h5"), Choices(assignments=("logo.pad_px=3",))), {"tools": False, "layout": "spin"})]
+    assert asked == [
+        (
+            (Path("shot.h5"), Choices(assignments=("logo.pad_px=3",))),
+            {"tools": False, "layout": "spin", "followed": None},
+        )
+    ]
 
 
 def started(*arguments: str) -> subprocess.Popen[str]:
