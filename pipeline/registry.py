@@ -100,25 +100,26 @@ def trusted_method(estimates: Mapping[str, SpinEstimate], doubt: str | None = No
     """
     if doubt is not None:
         return None
-    from_the_last = methods()[::-1]
-    for method in sorted(from_the_last, key=lambda method: method.is_last_resort):
-        if method.name in estimates and method.is_trusted(estimates):
-            return method.name
-    return None
+    return next((method.name for method in _asked(estimates) if method.is_trusted(estimates)), None)
 
 
 def distrust_reason(estimates: Mapping[str, SpinEstimate], doubt: str | None = None) -> str | None:
     """Why no estimate is trusted, in words for people; None where one is. See `trusted_method`.
 
-    A method's own refusal is the reason where there is no doubt about the track: that of the most accurate one.
+    Without doubt about the track the reasons are the methods' own refusals: that of the most accurate one, and
+    those of a last resort.
     """
     if doubt is not None or trusted_method(estimates) is not None:
         return doubt
-    in_order = sorted(methods(), key=lambda method: not method.is_last_resort)
-    refusals = [
-        f"{m.label}: {estimates[m.name].reason}" for m in in_order if m.name in estimates and estimates[m.name].reason
-    ]
-    return refusals[-1] if refusals else "the methods that were run answer, but are not sure enough to be trusted alone"
+    refused = [method for method in _asked(estimates) if estimates[method.name].reason is not None]
+    reasons = [f"{m.label}: {estimates[m.name].reason}" for m in refused if m is refused[0] or m.is_last_resort]
+    return "; ".join(reasons) or "the methods that were run answer, but are not sure enough to be trusted alone"
+
+
+def _asked(estimates: Mapping[str, SpinEstimate]) -> list[SpinMethod]:
+    """The methods that were run, in the order in which they are asked."""
+    run = [method for method in reversed(methods()) if method.name in estimates]
+    return sorted(run, key=lambda method: method.is_last_resort)
 
 
 def quick_stages() -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from spinscope.pipeline.registry import trusted_method
+from spinscope.pipeline.registry import distrust_reason, trusted_method
 from spinscope.pipeline.results import SpinEstimate
 
 
@@ -97,3 +97,17 @@ def test_the_trajectory_is_trusted_only_where_no_logo_tells_the_spin() -> None:
     assert trusted_method({**sure, "normal_flow": estimate("normal_flow", 6.0)}) == "trajectory"
     assert trusted_method({**sure, "contrast": estimate("contrast", None)}) == "trajectory"
     assert trusted_method({"trajectory": estimate("trajectory", 8.0)}) is None, "50 +- 8 rps is too wide"
+
+
+def test_where_none_is_trusted_the_reason_is_the_tracks_or_the_methods_own() -> None:
+    refused = {name: SpinEstimate.refused(name, f"{name} says no") for name in ("triplet", "normal_flow", "contrast")}
+    assert distrust_reason(refused) == "Contrast maximisation: contrast says no"
+    with_flight = {**refused, "trajectory": SpinEstimate.refused("trajectory", "too short")}
+    assert distrust_reason(with_flight) == "Contrast maximisation: contrast says no; Trajectory: too short"
+    assert distrust_reason({"triplet": estimate("triplet", 0.1)}) == (
+        "the methods that were run answer, but are not sure enough to be trusted alone"
+    )
+    trusted = {"contrast": estimate("contrast", 1.0)}
+    assert distrust_reason(trusted) is None
+    assert trusted_method(trusted, "the ball stays") is None
+    assert distrust_reason(trusted, "the ball stays") == "the ball stays"

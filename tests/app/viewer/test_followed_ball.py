@@ -41,7 +41,8 @@ def bouncing(tracker: Stage) -> Stage:
         balls = [ball]
         if OTHER_US[0] < packet.end_us <= OTHER_US[1]:
             beside = np.add(told.ball.mean, [0, 100, 0, 0, 0])
-            balls.append(dataclasses.replace(told.ball, shot=1, mean=beside, start_us=OTHER_US[0], earlier=()))
+            other = dataclasses.replace(told.ball, shot=1, mean=beside, start_us=OTHER_US[0], began_by="found")
+            balls.append(other)
         return dataclasses.replace(told, balls=tuple(balls), ended=ended)
 
     def start(parameters: Any, context: Any) -> Any:
