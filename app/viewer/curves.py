@@ -99,6 +99,8 @@ class Plot:
         `y_range(run) -> (low, high)` of the axis, where it is not that of the curves.
     with_zero : bool
         Whether the axis begins at zero at the latest.
+    others : callable, optional
+        `others(run) -> (n,) float64`: values that the axis must reach as well, of balls that may be followed later.
     """
 
     entity: str
@@ -107,6 +109,7 @@ class Plot:
     legend: Literal["none", "top", "bottom"] = "none"
     y_range: Callable[[ViewedRun], Range] | None = None
     with_zero: bool = False
+    others: Callable[[ViewedRun], Floats] | None = None
 
     def chunks(self, run: ViewedRun) -> list[Chunk]:
         """All curves, and a vertical line at each contact."""
@@ -142,7 +145,7 @@ class Plot:
         """Range of the axis, or of the curves with a tenth to spare on either side; None where they have no values."""
         if self.y_range:
             return self.y_range(run)
-        values = np.zeros(int(self.with_zero))
+        values = np.concatenate([np.zeros(int(self.with_zero)), *([self.others(run)] if self.others else [])])
         for curve in self.curves(run):
             if curve.is_in_range:
                 deviations = 0.0 if curve.variances is None else np.sqrt(curve.variances)

@@ -51,8 +51,10 @@ def _with_balls(tick: Tick, balls: tuple[BallTick, ...], absent: Absent) -> Tick
     if balls == tick.balls:
         return tick
     if balls:
+        hough = tick.track.hough if balls[0].track.shot == tick.track.shot else None  # it is of the first ball
         status: Status = "coasting" if balls[0].track.measured is None else "tracking"
-        track = dataclasses.replace(tick.track, status=status, reason=None, balls=tuple(ball.track for ball in balls))
+        tracks = tuple(ball.track for ball in balls)
+        track = dataclasses.replace(tick.track, status=status, reason=None, balls=tracks, hough=hough)
         return Tick({**tick.results, "track": track, **balls[0].results}, tick.packet, balls)
     reason = "no ball: it bounced or was hit, and is not found again yet"
     track = dataclasses.replace(tick.track, status="lost", reason=reason, balls=())

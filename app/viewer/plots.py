@@ -198,8 +198,19 @@ def _numbers(values: Sequence[float | None]) -> Floats:
     return np.array([np.nan if value is None else value for value in values])
 
 
+def _all_shots(index: int, run: ViewedRun) -> Floats:
+    """A component of the state, of all shots."""
+    return np.concatenate([np.empty(0), *(shot.state[:, index] for shot in run.shots)])
+
+
 STATE_PLOTS = tuple(
-    Plot(f"{at.PLOT}/{c.name}", f"{c.label} [{c.unit}]", partial(_state_curves, i, False)) for i, c in enumerate(STATE)
+    Plot(
+        f"{at.PLOT}/{c.name}",
+        f"{c.label} [{c.unit}]",
+        partial(_state_curves, i, False),
+        others=partial(_all_shots, i),
+    )
+    for i, c in enumerate(STATE)
 )
 RESIDUAL_PLOTS = tuple(
     Plot(f"{at.RESIDUAL}/{c.name}", f"{c.name} minus Kalman [px]", partial(_state_curves, i, True))
