@@ -22,7 +22,7 @@ OFF, STC, TRAIL, STC_CUT_TRAIL = range(4)
 
 # State of a pixel, packed so that an event touches one word: 8 x the time of its last event (us) + one PASSED
 # bit a filter (set when the filter has passed an event since the polarity changed) + the polarity (1 = ON).
-PASSED, LOGO_PASSED = 2, 4
+PASSED, PASSED_2 = 2, 4
 # No event yet: an OFF event 18,000 years before time 0, so that no difference of times overflows.
 NEVER = np.int64(-(1 << 62))
 # Pixels fetched ahead of their use. Their cache misses then overlap: 3 x faster on events all over a 1280 x
@@ -49,10 +49,10 @@ def filter_events(
     events: Events,
     mode: int,
     threshold_us: int,
-    logo_mode: int,
-    logo_threshold_us: int,
+    mode_2: int,
+    threshold_2_us: int,
 ) -> tuple[Integers, Integers]:
-    """Apply the surface's and the logo's filter to events; writes into `last` only.
+    """Apply two filters to events; writes into `last` only.
 
     Both in one go, because they share the pixels' last events and fetching these is most of the work.
 
@@ -62,19 +62,19 @@ def filter_events(
         The pixels' states, NEVER at the start.
     width_px : int
         Width of the image.
-    mode, logo_mode : int
+    mode, mode_2 : int
         OFF, STC, TRAIL or STC_CUT_TRAIL.
 
     Returns
     -------
-    rows, logo_rows : (m,) int64
+    rows, rows_2 : (m,) int64
         Rising indices of the events that each filter passes.
     """
     t_us, x_px, y_px, on = events
     # Unsigned indices need no check for negative ones: a quarter faster.
     count, width = np.uint64(t_us.size), np.uint64(width_px)
-    rows, logo_rows = np.empty(t_us.size, np.int64), np.empty(t_us.size, np.int64)
-    m, logo_m = np.uint64(0), np.uint64(0)
+    rows, rows_2 = np.empty(t_us.size, np.int64), np.empty(t_us.size, np.int64)
+    m, m_2 = np.uint64(0), np.uint64(0)
     pixels = np.empty(AHEAD, np.uint64)
     for first in range(np.uint64(0), count, AHEAD):
         end = min(first + AHEAD, count)
@@ -90,13 +90,13 @@ def filter_events(
             same = (state & 1) == polarity
             pause_us = t_us[i] - (state >> 3)
             passed_before = same & ((state & PASSED) != 0)
-            logo_passed_before = same & ((state & LOGO_PASSED) != 0)
+            passed_before_2 = same & ((state & PASSED_2) != 0)
             passes = np.int64(_passes(mode, same, pause_us, threshold_us, passed_before))
-            logo_passes = np.int64(_passes(logo_mode, same, pause_us, logo_threshold_us, logo_passed_before))
-            bits = (passes | passed_before) * PASSED | (logo_passes | logo_passed_before) * LOGO_PASSED | polarity
+            passes_2 = np.int64(_passes(mode_2, same, pause_us, threshold_2_us, passed_before_2))
+            bits = (passes | passed_before) * PASSED | (passes_2 | passed_before_2) * PASSED_2 | polarity
             last[pixel] = t_us[i] * 8 | bits
             rows[m] = i  # stays only if counted: no branch to mispredict
             m += np.uint64(passes)
-            logo_rows[logo_m] = i
-            logo_m += np.uint64(logo_passes)
-    return rows[:m], logo_rows[:logo_m]
+            rows_2[m_2] = i
+            m_2 += np.uint64(passes_2)
+    return rows[:m], rows_2[:m_2]

@@ -282,7 +282,7 @@ def _step_flying(
     parameters: TrackParameters, state: TrackState, packet: Packet, filtered: FilterResult, surface: SurfaceResult
 ) -> TrackResult:
     """Flying balls: followed from tick to tick, cut into shots at contacts, and others searched for."""
-    since_us, events = packet.end_us - max(parameters.contour_us, VOTE_US), filtered.logo_events
+    since_us, events = packet.end_us - max(parameters.contour_us, VOTE_US), filtered.contour_events
     if since_us < packet.start_us:
         events = EventBatch.concatenate([state.contour, events])
     state.contour = events.between(since_us, packet.end_us)

@@ -24,7 +24,7 @@ SILENT = MethodResult(SpinEstimate.refused("normal_flow", "nothing yet"))
 def seen(packet: Packet, **known: float) -> logo.LogoResult:
     """The logo of a ball that stays, with what is said of how well the ball is known."""
     parameters = logo.LogoParameters(delay_us=0.0)
-    state, filtered = logo.start(parameters, CONTEXT), FilterResult(packet.events, packet.events)
+    state, filtered = logo.start(parameters, CONTEXT), FilterResult(packet.events, packet.events, packet.events)
     return dataclasses.replace(logo.step(parameters, state, packet, filtered, known_ball(packet.end_us)), **known)
 
 

@@ -40,28 +40,47 @@ def rows(batch: EventBatch) -> list[tuple[int, int, int, bool]]:
     return list(zip(batch.t_us.tolist(), batch.x_px.tolist(), batch.y_px.tolist(), batch.on.tolist(), strict=True))
 
 
-@pytest.mark.parametrize(("mode", "logo_mode"), list(itertools.product(MODES, MODES)))
+@pytest.mark.parametrize(("mode", "contour_mode", "logo_mode"), list(itertools.product(MODES, MODES, MODES)))
 @pytest.mark.parametrize("logo_threshold_us", [200, 500])
-def test_every_pair_of_filters_equals_two_twins(mode: str, logo_mode: str, logo_threshold_us: int) -> None:
-    parameters = FilterParameters(mode=mode, threshold_us=200, logo_mode=logo_mode, logo_threshold_us=logo_threshold_us)
+def test_any_three_filters_equal_three_twins(
+    mode: str, contour_mode: str, logo_mode: str, logo_threshold_us: int
+) -> None:
+    parameters = FilterParameters(
+        mode=mode,
+        threshold_us=200,
+        contour_mode=contour_mode,
+        contour_threshold_us=300,
+        logo_mode=logo_mode,
+        logo_threshold_us=logo_threshold_us,
+    )
     state = stage.start(parameters, CONTEXT)
-    twin, logo_twin = NaiveFilter(mode, 200), NaiveFilter(logo_mode, logo_threshold_us)
+    twins = NaiveFilter(mode, 200), NaiveFilter(contour_mode, 300), NaiveFilter(logo_mode, logo_threshold_us)
     for packet in packets(seed=1):
         result = stage.step(parameters, state, packet)
-        expected = [e for e in rows(packet.events) if twin.passes(*e)]
-        assert rows(result.surface_events) == expected
-        assert rows(result.logo_events) == [e for e in rows(packet.events) if logo_twin.passes(*e)]
+        batches = result.surface_events, result.contour_events, result.logo_events
+        for batch, twin in zip(batches, twins, strict=True):
+            assert rows(batch) == [e for e in rows(packet.events) if twin.passes(*e)]
 
 
 def test_equal_settings_are_filtered_once_and_off_copies_nothing() -> None:
     (packet, *_) = packets(seed=2)
-    same = FilterParameters(mode="trail", threshold_us=300, logo_mode="trail", logo_threshold_us=300)
+    same = FilterParameters(
+        mode="trail",
+        threshold_us=300,
+        contour_mode="trail",
+        contour_threshold_us=300,
+        logo_mode="trail",
+        logo_threshold_us=300,
+    )
     result = stage.step(same, stage.start(same, CONTEXT), packet)
-    assert result.surface_events is result.logo_events
+    assert result.surface_events is result.contour_events is result.logo_events
+    default = FilterParameters()
+    result = stage.step(default, stage.start(default, CONTEXT), packet)
+    assert result.contour_events is result.logo_events
     off = FilterParameters(mode="off", logo_mode="stc")
     result = stage.step(off, stage.start(off, CONTEXT), packet)
     assert result.surface_events is packet.events
     assert 0 < len(result.logo_events) < len(packet.events)
-    both_off = FilterParameters(mode="off", logo_mode="off", threshold_us=1)
-    result = stage.step(both_off, stage.start(both_off, CONTEXT), packet)
-    assert result.surface_events is result.logo_events is packet.events
+    all_off = FilterParameters(mode="off", contour_mode="off", logo_mode="off", threshold_us=1)
+    result = stage.step(all_off, stage.start(all_off, CONTEXT), packet)
+    assert result.surface_events is result.contour_events is result.logo_events is packet.events

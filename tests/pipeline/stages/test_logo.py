@@ -39,7 +39,7 @@ def logo_of(
 ) -> LogoResult:
     parameters = LogoParameters(delay_us=delay_us, **pads_px)
     state = stage.start(parameters, context)
-    return stage.step(parameters, state, packet, FilterResult(packet.events, packet.events), track)
+    return stage.step(parameters, state, packet, FilterResult(packet.events, packet.events, packet.events), track)
 
 
 @pytest.mark.parametrize("pad_px", [0.0, 2.5, 7.0])

@@ -43,7 +43,7 @@ def rates(
             continue
         if track.shot != shot:
             shot, state = track.shot, stage.start(group, CONTEXT)
-        filtered = FilterResult(packet.events, packet.events)
+        filtered = FilterResult(packet.events, packet.events, packet.events)
         seen = logo_stage.step(logo_stage.LogoParameters(), logo_state, packet, filtered, track.ball)
         results.append(stage.step(group, state, packet, seen))
     return results
@@ -96,7 +96,7 @@ def test_above_the_highest_spin_there_is_no_answer() -> None:
     seen = logo_stage.start(logo_stage.LogoParameters(), CONTEXT)
     for packet in packets(rhythm(80.0)):
         track = known_track(packet.end_us)
-        filtered = FilterResult(packet.events, packet.events)
+        filtered = FilterResult(packet.events, packet.events, packet.events)
         logo = logo_stage.step(logo_stage.LogoParameters(), seen, packet, filtered, track.ball)
         result = stage.step(group, state, packet, logo)
     assert result.spin_rps is None
@@ -127,7 +127,7 @@ def test_ticks_of_another_length_than_the_bins_give_the_same_bins() -> None:
     for start_us in range(0, 100_000, 1000):
         packet = Packet(start_us // 1000, start_us, start_us + 1000, events.between(start_us, start_us + 1000))
         track = known_track(packet.end_us)
-        filtered = FilterResult(packet.events, packet.events)
+        filtered = FilterResult(packet.events, packet.events, packet.events)
         logo = logo_stage.step(logo_stage.LogoParameters(), logo_state, packet, filtered, track.ball)
         result = stage.step(group, state, packet, logo)
     np.testing.assert_array_equal(result.rate_hz, rates(events, group)[-1].rate_hz)

@@ -30,7 +30,7 @@ TAU = 2 * math.pi
 def seen(packet: Packet) -> LogoResult:
     """The logo's events of a tick of a ball that stays."""
     parameters = logo.LogoParameters()
-    state, filtered = logo.start(parameters, CONTEXT), FilterResult(packet.events, packet.events)
+    state, filtered = logo.start(parameters, CONTEXT), FilterResult(packet.events, packet.events, packet.events)
     return logo.step(parameters, state, packet, filtered, known_ball(packet.end_us))
 
 
