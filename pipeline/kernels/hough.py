@@ -114,6 +114,15 @@ def active_cells(values: Bytes, x_px: Pixels, y_px: Pixels, least: int, cell_px:
     return xs[:m].copy(), ys[:m].copy()
 
 
+def twice_as_wide(columns: Integers, rows: Integers) -> tuple[Integers, Integers]:
+    """Columns and rows (m,) int64 of the cells of twice the width in which these cells lie, rising by row."""
+    if columns.size == 0:
+        return columns, rows
+    width = int(columns.max()) // 2 + 1
+    wide = np.unique(rows // 2 * width + columns // 2)
+    return wide % width, wide // width
+
+
 @njit(cache=True, nogil=True)
 def refined(votes: Pixels, a: int, b: int, k: int) -> tuple[float, float, float]:
     """Peak (a, b, k) to sub-pixel: the centre of mass of the squared votes in the 3 x 3 x 3 around it."""

@@ -41,9 +41,13 @@ def _support_of_velocity(
     x_px: Floats,
     y_px: Floats,
     sign: Floats,
+    always: float,
     gate_px: float,
 ) -> float:
-    """Vote for one velocity, see `vote_velocity`; sign (n,): +1 for ON, -1 for OFF events."""
+    """Vote for one velocity, see `vote_velocity`.
+
+    An event counts `always` plus, where the outline moves outwards, its sign (n,), minus that where it moves inwards.
+    """
     x0, y0, radius = circle[0], circle[1], circle[4]
     total = 0.0
     for e in range(tau_s.size):
@@ -51,7 +55,7 @@ def _support_of_velocity(
         dy = y_px[e] - (y0 + vy_px_s * tau_s[e])
         near = max(1.0 - abs(math.sqrt(dx * dx + dy * dy) - radius) / gate_px, 0.0)
         outwards = dx * vx_px_s + dy * vy_px_s
-        total += near * sign[e] * ((1.0 if outwards > 0.0 else 0.0) - (1.0 if outwards < 0.0 else 0.0))
+        total += near * (always + sign[e] * ((1.0 if outwards > 0.0 else 0.0) - (1.0 if outwards < 0.0 else 0.0)))
     return total
 
 
@@ -65,12 +69,14 @@ def vote_velocity(
     on: Flags,
     step_px_s: float,
     gate_px: float,
+    signed: bool,
 ) -> None:
     """Hough vote for the velocity of a circle around the one it has; adds into `votes` only.
 
     An event counts by its nearness to the outline moved to its time, plus where the outline moves outwards and
     its polarity is ON or inwards and OFF, minus for the opposite: |votes| is the support of a ball brighter (or,
-    where negative, darker) than its background that moves so.
+    where negative, darker) than its background that moves so. Unsigned, it counts by its nearness alone: a ball over
+    ground brighter here and darker there.
 
     Parameters
     ----------
@@ -80,14 +86,15 @@ def vote_velocity(
         Distance from the outline at which an event no longer counts.
     """
     m = votes.shape[0] // 2
-    sign = np.where(on, 1.0, -1.0)
+    sign = np.where(on, 1.0, -1.0) if signed else np.zeros(on.size)
+    always = 0.0 if signed else 1.0
     for j in range(-m, m + 1):
         for i in range(-m, m + 1):
             if i * i + j * j > m * m:
                 continue
             vx = circle[2] + i * step_px_s
             vy = circle[3] + j * step_px_s
-            votes[m + j, m + i] += _support_of_velocity(circle, vx, vy, tau_s, x_px, y_px, sign, gate_px)
+            votes[m + j, m + i] += _support_of_velocity(circle, vx, vy, tau_s, x_px, y_px, sign, always, gate_px)
 
 
 @njit(cache=True, nogil=True)
@@ -166,6 +173,22 @@ def support(
 
 
 @njit(cache=True, nogil=True)
+def disc_events(circle: Floats, events: Events, reference_us: float) -> tuple[int, int]:
+    """Number of events on the disc of a moving circle, its outline included, and within twice its radius."""
+    t_us, x_px, y_px, _ = events
+    disc, around = (circle[4] + ON_OUTLINE_PX) ** 2, (2.0 * circle[4]) ** 2
+    on_disc, within = 0, 0
+    for i in range(t_us.size):
+        tau = (t_us[i] - reference_us) * 1e-6
+        dx = x_px[i] - (circle[0] + circle[2] * tau)
+        dy = y_px[i] - (circle[1] + circle[3] * tau)
+        square = dx * dx + dy * dy
+        on_disc += square <= disc
+        within += square <= around
+    return on_disc, within
+
+
+@njit(cache=True, nogil=True)
 def fit_outline(
     expected: Floats,
     prior_std: Floats,
@@ -213,7 +236,14 @@ def fit_outline(
 
 @njit(cache=True, nogil=True)
 def find_moving_circle(
-    x_px: float, y_px: float, radius_px: float, events: Events, reference_us: float, span_s: float, fastest_px_s: float
+    x_px: float,
+    y_px: float,
+    radius_px: float,
+    events: Events,
+    reference_us: float,
+    span_s: float,
+    fastest_px_s: float,
+    signed: bool,
 ) -> tuple[Floats, float]:
     """Circle at this place and of this radius that moves as most events say.
 
@@ -225,6 +255,8 @@ def find_moving_circle(
         Place and radius at the reference time.
     span_s : float
         Time that the events go back.
+    signed : bool
+        See `vote_velocity`.
 
     Returns
     -------
@@ -247,7 +279,7 @@ def find_moving_circle(
         step = gate / span_s
         m = math.ceil(span / step)
         votes = np.zeros((2 * m + 1, 2 * m + 1))
-        vote_velocity(votes, circle, tau_s, x, y, events[3][chosen], step, gate)
+        vote_velocity(votes, circle, tau_s, x, y, events[3][chosen], step, gate, signed)
         row, column = divmod(np.argmax(np.abs(votes)), 2 * m + 1)
         if votes[row, column] != 0.0:
             circle[2] += (column - m) * step

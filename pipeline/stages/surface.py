@@ -77,6 +77,10 @@ class ErosSurface:
 
     def update(self, packet: Packet, events: EventBatch) -> NDArray[np.uint8]:
         """Draw the tick's events and return the (height, width) uint8 surface at its end."""
+        return self.drawn(events)
+
+    def drawn(self, events: EventBatch) -> NDArray[np.uint8]:
+        """Draw events and return the (height, width) uint8 surface after the last one."""
         values = np.zeros((self._height_px, self._width_px), np.uint8)
         eros.update(self._levels, self._width_px, self._k_px, len(self._table) - 1, events.x_px, events.y_px)
         eros.render(values, self._levels, self._table)

@@ -28,7 +28,8 @@ from .track_ball import Measuring, TrackedBall
 from .track_contact import ROLLING_M_S, Contact, find_contact, rolls
 from .track_hough import hough_near
 from .track_kalman import load_filter
-from .track_outline import VOTE_US, Edge, Limits, Sighting
+from .track_limits import Limits
+from .track_outline import VOTE_US, Edge, Sighting
 from .track_search import MOST_CANDIDATES, MOST_RIVALS, agree, look, moved, outside_balls
 
 Status = Literal["searching", "starting", "tracking", "coasting", "lost"]
@@ -44,8 +45,12 @@ class TrackParameters(ParameterGroup):
 
     ball: str = choice("flying", ("flying", "fixed"), "flying ball, or a ball spinner's ball that stays in place")
     tick_us: int = tunable(5000, 200, 100_000, 100, "us", "time between two steps of the pipeline (200 Hz)")
-    radius_min_px: float = tunable(5.0, 2.0, 500.0, 0.5, "px", "smallest radius looked for")
-    radius_max_px: float = tunable(40.0, 3.0, 500.0, 0.5, "px", "largest radius looked for")
+    radius_min_px: float | None = tunable(
+        None, 2.0, 500.0, 0.5, "px", "smallest radius looked for; none = a ball 6 m away"
+    )
+    radius_max_px: float | None = tunable(
+        None, 3.0, 500.0, 0.5, "px", "largest radius looked for; none = a ball 0.3 m away"
+    )
     speed_min_m_s: float = tunable(1.0, 0.0, 100.0, 0.1, "m/s", "slowest ball that counts as a shot")
     speed_max_m_s: float = tunable(25.0, 1.0, 200.0, 1.0, "m/s", "fastest ball looked for")
     latency_us: float = tunable(40.0, 0.0, 10_000.0, 5.0, "us", "how late the pixels report an edge")
@@ -222,23 +227,19 @@ class TrackState:
     first_us: int | None = None
     looked_us: int = 0
     shots: int = 0
+    excluded: str | None = None  # the setting that excluded a circle since the last ball, in words
 
 
 def start(parameters: TrackParameters, context: Context) -> TrackState:
     """Fresh state; raises ParameterError for a fixed ball without a place or radii the wrong way round."""
     if parameters.ball == "fixed":
         _fixed_ring(parameters)
-    if parameters.radius_min_px >= parameters.radius_max_px:
-        raise ParameterError(
-            f"track.radius_min_px = {parameters.radius_min_px:g} must be below "
-            f"track.radius_max_px = {parameters.radius_max_px:g}"
-        )
-    per_m = 1.0 / context.ball_radius_m
-    limits = Limits(
+    limits = Limits.of(
+        context,
         parameters.radius_min_px,
         parameters.radius_max_px,
-        parameters.speed_min_m_s * per_m,
-        parameters.speed_max_m_s * per_m,
+        parameters.speed_min_m_s,
+        parameters.speed_max_m_s,
     )
     measuring = Measuring(
         context.camera,
@@ -319,7 +320,8 @@ def _step_flying(
         status, reason = "starting", "no ball yet: a circle moves like a ball, but it must be seen once more"
     else:
         status = "searching"
-        reason = "no ball: no circle in the surface" if hough is None else "no ball: no circle moves like a ball"
+        circle = "no circle in the surface" if hough is None else "no circle moves like a ball"
+        reason = f"no ball: {state.excluded or circle}"
     candidate = state.measuring.circle(waiting) if status == "starting" and waiting else None
     t_us = packet.end_us - parameters.latency_us
     return TrackResult(status, reason, t_us, balls, hough, candidate, (*ended, *contacts))
@@ -398,7 +400,8 @@ def _search(
     measured = [ball.filter.mean for ball in state.balls if ball.measured is not None]
     events = outside_balls(state.contour, measured, packet.end_us)
     most = MOST_RIVALS if state.balls else MOST_CANDIDATES
-    hough, found = look(surface, events, packet.end_us, state.context.camera, state.limits, most)
+    hough, found, excluded = look(surface, events, packet.end_us, state.context.camera, state.limits, most)
+    state.excluded = None if state.balls else excluded or state.excluded
     pending, state.pending = state.pending, []
     for sighting, circle in found:
         if any(ball.covers(sighting) for ball in state.balls if ball.measured is not None):

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..events import EventBatch
 from ..kernels import hough as kernels
+from ..kernels.arrays import Integers
 from ..results import Circle
 from .surface import SurfaceResult
 
@@ -16,8 +17,9 @@ from .surface import SurfaceResult
 EDGE_LEVEL = 128
 # Votes reach this far around a predicted centre, at least.
 REACH_PX = 6
-# Cells of the coarse search: a ball of 5 px radius is then still a ring around an empty cell.
-CELL_PX = 4
+# Cells of the coarse search: a ball of 5 px radius is then still a ring around an empty cell. Beyond MOST_CELLS the
+# cells are twice as wide, and so on: each octave of radii costs less than the one before.
+CELL_PX, MOST_CELLS = 4, 10
 # More edge pixels than this are thinned: a ring of 40 px radius two pixels wide has 500.
 MOST_PIXELS = 250
 
@@ -44,9 +46,9 @@ def hough_near(
         return None
     window = surface.cleaned(x0, y0, x1, y1)
     corner = round(x_px) - reach_px, round(y_px) - reach_px
-    limits = first_radius, radii
     columns, rows = kernels.bright_pixels(window, EDGE_LEVEL, MOST_PIXELS)
-    return _circle(kernels.best_circle(columns + x0, rows + y0, *corner, 2 * reach_px + 1, *limits))
+    found = kernels.best_circle(columns + x0, rows + y0, *corner, 2 * reach_px + 1, first_radius, radii)
+    return Circle(*found) if found[3] > 0.0 else None
 
 
 def candidates(
@@ -56,7 +58,10 @@ def candidates(
     radius_max_px: float,
     most: int,
 ) -> Iterator[Circle]:
-    """Circles anywhere, best first: a coarse vote of the cells with fresh edges, refined pixel by pixel.
+    """Circles anywhere, best first: a coarse vote of the cells with fresh edges.
+
+    Those of the smallest cells are refined pixel by pixel. Those of wider ones are as near to a larger ball, in
+    proportion, as its fit needs.
 
     Nothing comes when fewer than five cells are active.
 
@@ -64,12 +69,37 @@ def candidates(
     ----------
     events : EventBatch
         The contour events that may belong to an edge (where the surface is bright).
+    most : int
+        Circles in the first octave of radii; half as many in the next ones, but one at least.
     """
-    columns, rows = kernels.active_cells(surface.values, events.x_px, events.y_px, EDGE_LEVEL, CELL_PX)
-    if columns.size < 5:
-        return
-    first_radius = max(1, math.floor(radius_min_px / CELL_PX))
-    radii = math.ceil(radius_max_px / CELL_PX) - first_radius + 1
+    cells = kernels.active_cells(surface.values, events.x_px, events.y_px, EDGE_LEVEL, CELL_PX)
+    coarse: list[tuple[float, int, Circle]] = []
+    cell_px, smallest_px = CELL_PX, radius_min_px
+    while smallest_px < radius_max_px and cells[0].size >= 5:
+        largest_px = min(MOST_CELLS * cell_px, radius_max_px)
+        if smallest_px < largest_px:
+            coarse += _coarse_circles(*cells, smallest_px, largest_px, most, cell_px)
+            smallest_px = largest_px
+            most = max(1, most // 2)
+        cell_px *= 2
+        cells = kernels.twice_as_wide(*cells)
+    for _, cell_px, circle in sorted(coarse, key=lambda one: one[0], reverse=True):
+        if cell_px == CELL_PX:
+            low = max(circle.radius_px - 1.5 * CELL_PX, radius_min_px)
+            high = min(circle.radius_px + 1.5 * CELL_PX, radius_max_px)
+            refined = hough_near(surface, circle.x_px, circle.y_px, low, high, 2 * CELL_PX)
+            if refined is not None:
+                yield refined
+        else:
+            yield circle
+
+
+def _coarse_circles(
+    columns: Integers, rows: Integers, radius_min_px: float, radius_max_px: float, most: int, cell_px: int
+) -> Iterator[tuple[float, int, Circle]]:
+    """Support in px of outline, cell and circle of those through these cells, best first."""
+    first_radius = max(1, math.floor(radius_min_px / cell_px))
+    radii = math.ceil(radius_max_px / cell_px) - first_radius + 1
     reach = first_radius + radii
     left, top = int(columns.min()) - reach, int(rows.min()) - reach
     shape = (int(rows.max()) + reach + 1 - top, int(columns.max()) + reach + 1 - left, radii)
@@ -79,21 +109,8 @@ def candidates(
         support, a, b, k = kernels.peak(votes, first_radius)
         if support < 1.0:
             return
-        x, y = ((left + a + 0.5) * CELL_PX - 0.5, (top + b + 0.5) * CELL_PX - 0.5)
-        radius = (first_radius + k) * CELL_PX
         near = max(1, (first_radius + k) // 2)
         votes[max(0, b - near) : b + near + 1, max(0, a - near) : a + near + 1] = 0
-        found = hough_near(
-            surface,
-            x,
-            y,
-            max(radius - 1.5 * CELL_PX, radius_min_px),
-            min(radius + 1.5 * CELL_PX, radius_max_px),
-            2 * CELL_PX,
-        )
-        if found is not None:
-            yield found
-
-
-def _circle(found: tuple[float, float, float, float]) -> Circle | None:
-    return Circle(*found) if found[3] > 0.0 else None
+        x, y = ((left + a + 0.5) * cell_px - 0.5, (top + b + 0.5) * cell_px - 0.5)
+        share = min(1.0, math.sqrt(support / (2.0 * math.pi * (first_radius + k))))
+        yield support * cell_px, cell_px, Circle(x, y, (first_radius + k) * cell_px, share)

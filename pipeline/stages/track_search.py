@@ -2,38 +2,117 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..camera import Camera
 from ..events import EventBatch
 from ..kernels import moving_circle as kernels
+from ..kernels import neighbour_support
 from ..kernels.take_events import take_events
 from ..results import Circle
-from .surface import SurfaceResult
+from .surface import ErosSurface, SurfaceParameters, SurfaceResult
 from .track_hough import candidates
-from .track_outline import Limits, Sighting, sight
+from .track_limits import Limits
+from .track_outline import Sighting, disc_share, sight
 
 # Circles of the full-frame vote looked at in one tick, without a track and beside one.
 MOST_CANDIDATES, MOST_RIVALS = 4, 2
+# Events of the second route: the latest of a busy scene's. An edge that moves on a pixel in SUPPORT_US (the slowest
+# ball of 20 px radius does) has its neighbour within that time.
+LEAST_EVENTS, MOST_EVENTS, SUPPORT_US = 40, 10_000, 2000
+# The velocity vote and the first fit take in circles that are off by 0.15 radii.
+SAME_SHARE = 0.15
+# Share of the events around a circle that its disc must explain. Marks and shading on the ball draw circles as well, of
+# which the ball's own outline lies outside.
+LEAST_SHARE = 0.7
 
 Found = list[tuple[Sighting, Circle]]
 
 
 def look(
     surface: SurfaceResult, events: EventBatch, end_us: int, camera: Camera, limits: Limits, most: int
-) -> tuple[Circle | None, Found]:
-    """The best Hough circle anywhere, and those that move like a ball: trusted ones first, then by speed."""
-    first: Circle | None = None
-    found: Found = []
-    for circle in candidates(surface, events, limits.radius_min_px, limits.radius_max_px, most):
-        first = first or circle
-        if any(np.hypot(circle.x_px - s.ring[0], circle.y_px - s.ring[1]) < s.ring[4] for s, _ in found):
-            continue
-        sighting = sight(events, end_us, camera, circle, limits)
-        if sighting is not None and (sighting.trusted or sighting.promising):
-            found.append((sighting, circle))
-    return first, sorted(found, key=lambda one: (one[0].trusted, one[0].speed_px_s), reverse=True)
+) -> tuple[Circle | None, Found, str | None]:
+    """The best Hough circle anywhere; those that move like a ball; which setting excludes one, if none is left.
+
+    Trusted ones come first, then the faster ones. The paper's surface is searched first. Where it shows no ball, the
+    contour events that a neighbour supports: in low contrast an outline gives one event a pixel, of which STC lets
+    nothing pass.
+    """
+    stated = limits.radius_min_px, limits.radius_max_px
+    searching = _Searching(end_us, camera, limits, most)
+    first, found, excluded = searching.circles(surface, events, stated, signed=True)
+    if found or len(events) < LEAST_EVENTS:
+        return first, found, excluded
+    supported = supported_events(events, camera)
+    if len(supported) < LEAST_EVENTS:
+        return first, found, excluded
+    drawing = ErosSurface(SurfaceParameters(), camera.width_px, camera.height_px)
+    drawn = SurfaceResult(drawing.drawn(supported), surface.cleaning)
+    second, found, excluded_there = searching.circles(drawn, supported, stated, signed=False)
+    excluded = excluded or excluded_there
+    if not found and excluded is None and stated != limits.possible_px:
+        # Only to tell which setting to change.
+        _, _, excluded = searching.circles(drawn, supported, limits.possible_px, signed=False)
+    return first or second, found, excluded
+
+
+@dataclass(frozen=True, slots=True)
+class _Searching:
+    """What one search looks for."""
+
+    end_us: int
+    camera: Camera
+    limits: Limits
+    most: int
+
+    def circles(
+        self, surface: SurfaceResult, events: EventBatch, radii_px: tuple[float, float], *, signed: bool
+    ) -> tuple[Circle | None, Found, str | None]:
+        """The best circle with such a radius, those that move like a ball, and why one that does is excluded."""
+        tried: list[Circle] = []
+        found: Found = []
+        excluded: str | None = None
+        for circle in candidates(surface, events, *radii_px, self.most):
+            if any(np.hypot(circle.x_px - s.ring[0], circle.y_px - s.ring[1]) < s.ring[4] for s, _ in found):
+                continue
+            if any(_is_same(circle, other) for other in tried):
+                continue
+            tried.append(circle)
+            sighting = sight(events, self.end_us, self.camera, circle, self.limits.speed_max_radii_s, signed=signed)
+            if sighting is None or not self._is_likely(sighting, events, signed=signed):
+                continue
+            reason = self.limits.excluding(sighting)
+            if reason is None:
+                found.append((sighting, circle))
+            elif sighting.trusted or sighting.explained:
+                excluded = excluded or reason
+        found.sort(key=lambda one: (one[0].trusted, one[0].speed_px_s), reverse=True)
+        return tried[0] if tried else None, found, excluded
+
+    def _is_likely(self, sighting: Sighting, events: EventBatch, *, signed: bool) -> bool:
+        """Whether an outline may be a ball's: trusted, or one that alone explains the events around it."""
+        if signed and sighting.trusted:
+            return True
+        likely = sighting.promising if signed else sighting.explained
+        return likely and disc_share(sighting.ring, events, self.end_us) >= LEAST_SHARE
+
+
+def _is_same(one: Circle, other: Circle) -> bool:
+    """Whether two Hough circles are within each other's error: a coarse cell, in proportion to the radius."""
+    error_px = SAME_SHARE * one.radius_px
+    apart_px = np.hypot(one.x_px - other.x_px, one.y_px - other.y_px)
+    return bool(apart_px < error_px and abs(one.radius_px - other.radius_px) < error_px)
+
+
+def supported_events(events: EventBatch, camera: Camera) -> EventBatch:
+    """The events, of many the latest MOST_EVENTS, that a neighbour supports."""
+    latest = events[-MOST_EVENTS:]
+    last_us = np.zeros((camera.height_px + 2, camera.width_px + 2), np.uint16)
+    rows = neighbour_support.supported_events(last_us, latest.columns, SUPPORT_US)
+    return EventBatch(*take_events(rows, latest.columns))
 
 
 def outside_balls(events: EventBatch, rings: list[NDArray[np.float64]], end_us: int) -> EventBatch:
