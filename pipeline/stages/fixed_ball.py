@@ -33,34 +33,56 @@ ON_LIMB_PX, PIXEL_STD_PX = 0.8, 0.5
 OPEN_SHORT, CLOSED_SHORT, CLOSED_SCORE = (0.0, 0.04), (0.05, 0.1), 0.8
 # A circle known no better than this is none.
 MOST_STD_SHARE = 0.15
+# A turning logo comes back to its pixels; a ball that flies, or a hand, passes most of them once. At least this share of
+# the recording lies between the first and the last event of half of the path's pixels: two turns of three.
+LEAST_SPAN = 1 / 3
+# Share of the directions in which the path must reach the circle: it does in 0.4 to 1 of them on spinners, and in 0.11 to
+# 0.14 where a bend of a swinging arm was taken for a limb (simulated, seeds 901, 902 and the samples).
+LEAST_SCORE = 0.25
+# Smallest path that could be told from a hot spot.
+LEAST_RADIUS_PX = 3.0
 REMEDY = "give the circle instead: --fixed-ball X_PX Y_PX RADIUS_PX"
 
 
 def find_fixed_ball(
-    events: EventBatch, camera: Camera, radius_min_px: float, radius_max_px: float
+    events: EventBatch, camera: Camera, radius_min_px: float | None = None, radius_max_px: float | None = None
 ) -> tuple[Circle, float]:
     """The ball's circle and its 1 sigma in px (the larger of centre and radius), best effort.
 
-    The score is the share of the directions from the centre in which the path reaches the circle.
+    Radii that are not stated may be whatever fits into the image: a spinner stands at any distance, and turning discs
+    of any size take a ball's place. The score is the share of the directions from the centre in which the path reaches the circle.
     Raises RecordingError when the events draw no path that could be a logo's, or one that fits many circles.
     """
+    low = LEAST_RADIUS_PX if radius_min_px is None else radius_min_px
+    high = min(camera.width_px, camera.height_px) / 2 if radius_max_px is None else radius_max_px
     pixel = events.y_px.astype(np.int64) * camera.width_px + events.x_px
     counts = np.bincount(pixel, minlength=camera.width_px * camera.height_px)
     counts = counts.reshape(camera.height_px, camera.width_px)
-    rows, columns = _path(counts, radius_max_px)
+    rows, columns = _path(counts, high)
     drawn = int(counts[rows, columns].sum())
     if drawn < LEAST_EVENTS:
         raise RecordingError(
             f"no ball found: the busiest spot has {drawn} events, fewer than the {LEAST_EVENTS} of a turning logo; "
             f"{REMEDY}"
         )
-    limb = _limb(columns.astype(np.float64), rows.astype(np.float64), radius_min_px, radius_max_px)
+    span = _span(events, pixel, rows * camera.width_px + columns)
+    if span < LEAST_SPAN:
+        raise RecordingError(
+            f"no ball found: what moves passes by once (half of its pixels have all their events within {span:.0%} of "
+            f"the time), it does not turn in place; {REMEDY}"
+        )
+    limb = _limb(columns.astype(np.float64), rows.astype(np.float64), low, high)
     if limb is None:
         raise RecordingError(
             f"no ball found: the busiest spot ({np.ptp(columns) + 1} x {np.ptp(rows) + 1} px) fits no circle with a "
-            f"radius from track.radius_min_px = {radius_min_px:g} to track.radius_max_px = {radius_max_px:g}; {REMEDY}"
+            f"radius of {low:g} to {high:g} px (track.radius_min_px, track.radius_max_px); {REMEDY}"
         )
     circle, std_px = limb
+    if circle.score < LEAST_SCORE:
+        raise RecordingError(
+            f"no ball found: what moves reaches its circle in {circle.score:.0%} of the directions only, as any bend "
+            f"does; {REMEDY}"
+        )
     if std_px > MOST_STD_SHARE * circle.radius_px:
         raise RecordingError(
             f"no ball found: the logo's path fits many circles, this one is uncertain by {std_px:.1f} px; {REMEDY}"
@@ -91,6 +113,17 @@ def _path(counts: NDArray[np.int64], radius_max_px: float) -> tuple[NDArray[np.i
             best, most = number, total
     rows, columns = np.nonzero(labels == best) if best else (np.empty(0, np.int64), np.empty(0, np.int64))
     return rows, columns
+
+
+def _span(events: EventBatch, pixel: NDArray[np.int64], path: NDArray[np.int64]) -> float:
+    """Median over the path's pixels of the time between first and last event, as a share of the recording's."""
+    on_path = np.isin(pixel, path)
+    where = np.searchsorted(path, pixel[on_path])  # the path rises by row, then column
+    t_us = events.t_us[on_path]
+    first, last = np.full(path.size, events.t_us[-1]), np.full(path.size, events.t_us[0])
+    np.minimum.at(first, where, t_us)
+    np.maximum.at(last, where, t_us)
+    return float(np.median(last - first) / max(events.t_us[-1] - events.t_us[0], 1))
 
 
 def _limb(x_px: Floats, y_px: Floats, radius_min_px: float, radius_max_px: float) -> tuple[Circle, float] | None:
