@@ -167,7 +167,9 @@ def after_track(
         else:
             if ball.shot != shot:
                 shot, states = ball.shot, [stage.start(groups[at], context) for stage, at in stages]
-            seen = logo.step(groups[0], states[0], packet, FilterResult(packet.events, packet.events, packet.events), ball)
+            seen = logo.step(
+                groups[0], states[0], packet, FilterResult(packet.events, packet.events, packet.events), ball
+            )
             rhythm = rate.step(groups[1], states[1], packet, seen)
             moved = flow.step(groups[2], states[2], packet, ball, seen, rhythm)
             spins = [

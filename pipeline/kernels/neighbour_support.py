@@ -7,7 +7,6 @@ from numba import njit
 
 from .arrays import Events, Integers, Pixels
 
-
 # Events that span more are all taken for simultaneous at the end.
 MOST_US = 65_535
 

@@ -33,11 +33,11 @@ ON_LIMB_PX, PIXEL_STD_PX = 0.8, 0.5
 OPEN_SHORT, CLOSED_SHORT, CLOSED_SCORE = (0.0, 0.04), (0.05, 0.1), 0.8
 # A circle known no better than this is none.
 MOST_STD_SHARE = 0.15
-# A turning logo comes back to its pixels; a ball that flies, or a hand, passes most of them once. At least this share of
-# the recording lies between the first and the last event of half of the path's pixels: two turns of three.
+# A turning logo comes back to its pixels; a ball that flies, or a hand, passes most of them once. At least this share
+# of the recording lies between the first and the last event of half of the path's pixels: two turns of three.
 LEAST_SPAN = 1 / 3
-# Share of the directions in which the path must reach the circle: it does in 0.4 to 1 of them on spinners, and in 0.11 to
-# 0.14 where a bend of a swinging arm was taken for a limb (simulated, seeds 901, 902 and the samples).
+# Share of the directions in which the path must reach the circle: it does in 0.4 to 1 of them on spinners, in 0.11
+# to 0.14 where a bend of a swinging arm was taken for a limb (simulated, seeds 901 and 902, and the samples).
 LEAST_SCORE = 0.25
 # Smallest path that could be told from a hot spot.
 LEAST_RADIUS_PX = 3.0
@@ -50,7 +50,8 @@ def find_fixed_ball(
     """The ball's circle and its 1 sigma in px (the larger of centre and radius), best effort.
 
     Radii that are not stated may be whatever fits into the image: a spinner stands at any distance, and turning discs
-    of any size take a ball's place. The score is the share of the directions from the centre in which the path reaches the circle.
+    of any size take a ball's place. The score is the share of the directions from the centre in which the path reaches
+    the circle.
     Raises RecordingError when the events draw no path that could be a logo's, or one that fits many circles.
     """
     low = LEAST_RADIUS_PX if radius_min_px is None else radius_min_px
@@ -78,14 +79,14 @@ def find_fixed_ball(
             f"radius of {low:g} to {high:g} px (track.radius_min_px, track.radius_max_px); {REMEDY}"
         )
     circle, std_px = limb
+    if std_px > MOST_STD_SHARE * circle.radius_px:
+        raise RecordingError(
+            f"no ball found: the logo's path fits many circles, this one is uncertain by {std_px:.1f} px; {REMEDY}"
+        )
     if circle.score < LEAST_SCORE:
         raise RecordingError(
             f"no ball found: what moves reaches its circle in {circle.score:.0%} of the directions only, as any bend "
             f"does; {REMEDY}"
-        )
-    if std_px > MOST_STD_SHARE * circle.radius_px:
-        raise RecordingError(
-            f"no ball found: the logo's path fits many circles, this one is uncertain by {std_px:.1f} px; {REMEDY}"
         )
     return circle, std_px
 

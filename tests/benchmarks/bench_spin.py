@@ -80,7 +80,10 @@ def ticks(name: str) -> list[Any]:
 def test_triplet_matching_of_a_slice(benchmark: Any) -> None:
     """The densest slices of a flight, 2 ms each."""
     group, state = logo.LogoParameters(), logo.start(logo.LogoParameters(), CONTEXT)
-    seen = [logo.step(group, state, p, FilterResult(p.events, p.events, p.events), k.ball) for p, k in ticks("flight_slow_top")]
+    seen = [
+        logo.step(group, state, p, FilterResult(p.events, p.events, p.events), k.ball)
+        for p, k in ticks("flight_slow_top")
+    ]
     t = np.concatenate([s.events.t_us for s in seen])
     x, y = (np.concatenate([getattr(s, name) for s in seen]) for name in ("x_px", "y_px"))
     on = np.concatenate([s.events.on for s in seen])
@@ -139,7 +142,9 @@ def test_a_flight_through_the_stages_after_the_track(benchmark: Any, name: str) 
         states = [s.start(g, CONTEXT) for s, g in zip(stages, groups, strict=True)]
         for packet, track in work:
             clock = [time.thread_time()]
-            seen = logo.step(groups[0], states[0], packet, FilterResult(packet.events, packet.events, packet.events), track.ball)
+            seen = logo.step(
+                groups[0], states[0], packet, FilterResult(packet.events, packet.events, packet.events), track.ball
+            )
             clock.append(time.thread_time())
             rhythm = rate.step(groups[1], states[1], packet, seen)
             clock.append(time.thread_time())

@@ -72,7 +72,7 @@ def test_fit_of_an_outline(benchmark: Any) -> None:
     rows = inputs(sample(NAME)[0])
     packet, filtered, _ = rows[TICK]
     ring = tracked(NAME)[TICK].mean.copy()
-    events = filtered.logo_events
+    events = filtered.contour_events
     chosen = moving_circle.near_outline(ring, events.columns, packet.end_us, 3.0, outline.MOST_EVENTS, True)
     columns = (
         (events.t_us[chosen] - packet.end_us) * 1e-6,

@@ -1,6 +1,19 @@
-"""The slow twin of the filters: one dictionary entry a pixel, the definitions word by word."""
+"""The slow twins of the filters: one dictionary entry a pixel, the definitions word by word."""
 
 from __future__ import annotations
+
+
+def supported_events(events: list[tuple[int, int, int]], within_us: int) -> list[int]:
+    """Rows of the events (t_us, x_px, y_px) with an earlier one in a pixel around, that one's last and recent."""
+    last: dict[tuple[int, int], int] = {}
+    rows = []
+    for row, (t_us, x, y) in enumerate(events):
+        around = [(x + i, y + j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
+        times = [last[pixel] for pixel in around if pixel in last]
+        if times and t_us - max(times) <= within_us:
+            rows.append(row)
+        last[x, y] = t_us
+    return rows
 
 
 class NaiveFilter:

@@ -51,6 +51,12 @@ def active_cells(values: NDArray[np.uint8], x_px: Ints, y_px: Ints, least: int, 
     return sorted(kept, key=lambda cell: (cell[1], cell[0]))
 
 
+def disc_events(circle: Floats, tau_s: Floats, x_px: Floats, y_px: Floats, on_outline_px: float) -> tuple[int, int]:
+    """How many events lie on the moving disc with its outline, and within twice its radius."""
+    distance = np.hypot(*from_centre(circle, tau_s, x_px, y_px))
+    return int(np.sum(distance <= circle[4] + on_outline_px)), int(np.sum(distance <= 2 * circle[4]))
+
+
 def from_centre(circle: Floats, tau_s: Floats, x_px: Floats, y_px: Floats) -> tuple[Floats, Floats]:
     """Each event relative to the centre at its time."""
     return x_px - circle[0] - circle[2] * tau_s, y_px - circle[1] - circle[3] * tau_s
@@ -118,8 +124,9 @@ def vote_velocity(
     on: NDArray[np.bool_],
     step_px_s: float,
     gate_px: float,
+    signed: bool,
 ) -> Floats:
-    """For every velocity of the grid: signed nearness of the events to the outline that moves so."""
+    """For every velocity of the grid: nearness of the events, signed or not, to the outline that moves so."""
     votes = np.zeros((2 * m + 1, 2 * m + 1))
     for j in range(-m, m + 1):
         for i in range(-m, m + 1):
@@ -128,7 +135,7 @@ def vote_velocity(
                 dx, dy = from_centre(trial, tau_s, x_px, y_px)
                 near = np.maximum(1 - np.abs(np.hypot(dx, dy) - circle[4]) / gate_px, 0.0)
                 sign = np.sign(dx * trial[2] + dy * trial[3]) * np.where(on, 1, -1)
-                votes[m + j, m + i] = np.sum(near * sign)
+                votes[m + j, m + i] = np.sum(near * sign) if signed else np.sum(near)
     return votes
 
 

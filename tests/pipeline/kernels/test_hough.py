@@ -100,3 +100,11 @@ def test_the_best_circle_is_the_peak_of_the_vote(seed: int) -> None:
     x, y, radius = hough.refined(votes, a, b, k)
     share = min(1.0, votes[b, a, k] / (2 * math.pi * (6 + k)))
     assert np.allclose(found, (15 + x, 16 + y, 6 + radius, share))
+
+
+@given(count=st.integers(0, 40), seed=st.integers(0, 2**32 - 1))
+def test_cells_of_twice_the_width_hold_the_cells(count: int, seed: int) -> None:
+    columns, rows = np.random.default_rng(seed).integers(0, 12, (2, count))
+    wide = hough.twice_as_wide(columns, rows)
+    expected = sorted({(b // 2, a // 2) for a, b in zip(columns.tolist(), rows.tolist(), strict=True)})
+    assert list(zip(wide[1].tolist(), wide[0].tolist(), strict=True)) == expected

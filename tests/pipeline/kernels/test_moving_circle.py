@@ -63,9 +63,15 @@ def test_measures_equal_the_twins(seed: int, oval: tuple[float, float]) -> None:
     )
     args = (ring, bent, tau, x, y, on, 60, 40)
     assert np.allclose(outline.support(*args), reference.support(*args, 1.2, 0.2 * ring[4], 32))
-    votes = np.zeros((9, 9))
-    outline.vote_velocity(votes, ring, tau, x, y, on, 700.0, 2.5)
-    assert np.allclose(votes, reference.vote_velocity(4, ring, tau, x, y, on, 700.0, 2.5))
+    for signed in (True, False):
+        votes = np.zeros((9, 9))
+        outline.vote_velocity(votes, ring, tau, x, y, on, 700.0, 2.5, signed)
+        assert np.allclose(votes, reference.vote_velocity(4, ring, tau, x, y, on, 700.0, 2.5, signed))
+    t_us = np.round(tau * 1e6).astype(np.int64)
+    whole = np.clip(np.round(x), 0, 999).astype(np.uint16), np.clip(np.round(y), 0, 999).astype(np.uint16)
+    assert outline.disc_events(ring, (t_us, *whole, on), 0) == reference.disc_events(
+        ring, t_us * 1e-6, *(column.astype(np.float64) for column in whole), 1.2
+    )
 
 
 @given(
@@ -145,7 +151,7 @@ def test_velocity_votes_peak_at_the_velocity(bright: bool, seed: int) -> None:
     tau, x, y, on = on_ring(ring, 200, rng)
     votes = np.zeros((2 * m + 1, 2 * m + 1))
     at_rest = ring * np.array([1, 1, 0, 0, 1])
-    outline.vote_velocity(votes, at_rest, tau, x, y, on if bright else ~on, step, 2.0)
+    outline.vote_velocity(votes, at_rest, tau, x, y, on if bright else ~on, step, 2.0, True)
     best = np.unravel_index(int(np.argmax(np.abs(votes))), votes.shape)
     assert best == (m + j, m + i)
     assert (votes[best] > 0) == bright
@@ -174,12 +180,24 @@ def test_a_moving_ring_is_measured_from_a_place_alone(bright: bool) -> None:
     columns = np.round(tau * 1e6).astype(np.int64), np.round(x).astype(np.uint16), np.round(y).astype(np.uint16)
     recent = tau > -1.5e-3
     events = read_only(*(column[recent] for column in columns), (on if bright else ~on)[recent])
-    start, gate = outline.find_moving_circle(60.8, 49.0, 15.5, events, 0, 1.5e-3, 12_000.0)
+    start, gate = outline.find_moving_circle(60.8, 49.0, 15.5, events, 0, 1.5e-3, 12_000.0, True)
     assert np.hypot(*(start - ring)[2:4]) < 1500
     fitted, covariance, scatter, found = outline.fit_outline(start, FREE, ROUND, events, 0, 1.5 * gate, 1280, 720)
     assert np.allclose(fitted[:2], ring[:2], atol=0.3) and abs(fitted[4] - 16) < 0.2
     assert np.hypot(*(fitted - ring)[2:4]) < 300 and scatter < 0.6 and np.all(np.diag(covariance) > 0)
     assert min(found[3], found[4]) > 0.8 and np.allclose(found[1:3], [bright, not bright], atol=0.03)
     nothing = tuple(column[:5] for column in events)
-    assert np.isnan(outline.find_moving_circle(60.8, 49.0, 15.5, nothing, 0, 1.5e-3, 12_000.0)[0][0])
+    assert np.isnan(outline.find_moving_circle(60.8, 49.0, 15.5, nothing, 0, 1.5e-3, 12_000.0, True)[0][0])
     assert np.isnan(outline.fit_outline(start, FREE, ROUND, nothing, 0, 3.0, 1280, 720)[0][0])
+
+
+def test_polarity_does_not_matter_to_an_unsigned_vote() -> None:
+    """Ground brighter than the ball on one side and darker on the other: signed votes cancel, unsigned ones do not."""
+    ring = np.array([60.0, 50.0, 4000.0, -2500.0, 16.0])
+    tau, x, y, on = on_ring(ring, 600, np.random.default_rng(4))
+    recent = tau > -1.5e-3
+    left = x - (ring[0] + ring[2] * tau) < 0.6 * (y - (ring[1] + ring[3] * tau))
+    columns = np.round(tau * 1e6).astype(np.int64), np.round(x).astype(np.uint16), np.round(y).astype(np.uint16)
+    events = read_only(*(column[recent] for column in columns), (on ^ left)[recent])
+    start, _ = outline.find_moving_circle(60.8, 49.0, 15.5, events, 0, 1.5e-3, 12_000.0, False)
+    assert np.hypot(*(start - ring)[2:4]) < 1500

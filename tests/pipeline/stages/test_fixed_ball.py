@@ -7,10 +7,69 @@ import math
 import numpy as np
 import pytest
 
+from spinscope.pipeline.api import estimate
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.stages.fixed_ball import CLOSED_SHORT, _limb, find_fixed_ball
 from tests.track_runs import HEIGHT, WIDTH, merged, sample, setting
+
+
+def turning_dot(path_px: float, dot_px: float, rps: float, duration_us: int = 200_000) -> EventBatch:
+    """A dark dot on a turning disc: each pixel answers when the dot reaches it, once a turn, and when it leaves."""
+    columns, rows = np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT))
+    dx, dy = columns - 640.3, rows - 350.6
+    away = np.hypot(dx, dy)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        half_rad = np.arccos((away**2 + path_px**2 - dot_px**2) / (2 * away * path_px))
+    touched = np.isfinite(half_rad)
+    parts = []
+    for sign, on in ((-1, False), (1, True)):
+        turn_rad = (np.arctan2(dy, dx)[touched] + sign * half_rad[touched]) % (2 * math.pi)
+        for turn in range(int(duration_us * 1e-6 * rps) + 1):
+            t_us = ((turn_rad / (2 * math.pi) + turn) / rps * 1e6).astype(np.int64)
+            seen = t_us < duration_us
+            parts.append((t_us[seen], columns[touched][seen], rows[touched][seen], np.full(np.count_nonzero(seen), on)))
+    t_us, x, y, on_column = (np.concatenate(column) for column in zip(*parts, strict=True))
+    order = np.argsort(t_us, kind="stable")
+    return EventBatch(t_us[order], x[order].astype(np.uint16), y[order].astype(np.uint16), on_column[order])
+
+
+@pytest.mark.parametrize(("path_px", "dot_px", "rps"), [(107.0, 10.0, 19.4), (131.0, 8.0, 25.0), (60.0, 12.0, -50.0)])
+def test_a_dot_on_a_turning_disc_is_a_ball(path_px: float, dot_px: float, rps: float) -> None:
+    """Larger than any ball in flight: found without a stated radius, its spin to 0.4 rps."""
+    events = turning_dot(path_px, dot_px, abs(rps))
+    if rps < 0:  # seen in a mirror it turns the other way
+        events = EventBatch(events.t_us, events.x_px, (HEIGHT - 1 - events.y_px).astype(np.uint16), events.on)
+    circle, std_px = find_fixed_ball(merged(events, noise(20_000, 4)), setting().camera)
+    assert math.hypot(circle.x_px - 640.3, circle.y_px - (350.6 if rps > 0 else HEIGHT - 1 - 350.6)) < 1
+    assert abs(circle.radius_px - (path_px + dot_px)) < std_px
+    result = estimate(events, sensor_px=(WIDTH, HEIGHT), fixed_ball="auto", method="contrast")
+    (shot,) = result.shots
+    assert shot.best == "contrast"
+    assert shot.estimates["contrast"].vector_rps == pytest.approx([0, 0, rps], abs=0.4)
+
+
+@pytest.mark.parametrize("name", ["flight_back", "flight_slow_top", "flight_two_balls", "flight_side"])
+def test_a_flight_is_no_fixed_ball(name: str) -> None:
+    with pytest.raises(RecordingError, match="passes by once"):
+        find_fixed_ball(sample(name)[0], setting().camera)
+
+
+def test_an_arc_is_no_fixed_ball() -> None:
+    """A band that bends as an arm does, and that swings to and fro."""
+    angle = np.linspace(0, 0.8, 2000)
+    x, y = 600 + 300 * np.cos(angle), 100 + 300 * np.sin(angle)
+    pixels = np.round(np.tile(np.concatenate([x, x[::-1]]), 4)), np.round(np.tile(np.concatenate([y, y[::-1]]), 4))
+    offset = np.random.default_rng(6).integers(-6, 7, (2, pixels[0].size))
+    count = pixels[0].size
+    events = EventBatch(
+        np.linspace(0, 200_000, count).astype(np.int64),
+        (pixels[0] + offset[0]).astype(np.uint16),
+        (pixels[1] + offset[1]).astype(np.uint16),
+        np.arange(count) % 2 == 0,
+    )
+    with pytest.raises(RecordingError, match="no ball found"):
+        find_fixed_ball(events, setting().camera)
 
 
 def noise(count: int, seed: int) -> EventBatch:

@@ -52,7 +52,9 @@ def run(parameters: SurfaceParameters) -> list[SurfaceResult]:
     results = []
     for packet in packets():
         filtered, unfiltered = packet.events, dataclasses.replace(packet, events=EventBatch.empty())
-        results.append(stage.step(parameters, state, unfiltered, FilterResult(filtered, EventBatch.empty(), EventBatch.empty())))
+        results.append(
+            stage.step(parameters, state, unfiltered, FilterResult(filtered, EventBatch.empty(), EventBatch.empty()))
+        )
     return results
 
 

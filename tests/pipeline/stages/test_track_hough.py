@@ -73,7 +73,7 @@ def test_the_surface_shows_the_ball_to_two_pixels() -> None:
     packet, filtered, surface = inputs(events.between(40_000, 80_000))[-1]
     x, y, radius = true_ball(truth, np.array([packet.end_us]))[0]
     near = hough_near(surface, x + 3, y - 3, radius - 2, radius + 2)
-    anywhere = next(candidates(surface, filtered.logo_events, 5.0, 40.0, 1))
+    anywhere = next(candidates(surface, filtered.contour_events, 5.0, 40.0, 1))
     for circle in (near, anywhere):
         assert circle is not None
         assert math.hypot(circle.x_px - x, circle.y_px - y) < 2
