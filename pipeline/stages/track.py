@@ -30,7 +30,7 @@ from .track_hough import hough_near
 from .track_kalman import load_filter
 from .track_limits import Limits
 from .track_outline import VOTE_US, Edge, Sighting
-from .track_search import MOST_CANDIDATES, MOST_RIVALS, agree, look, moved, outside_balls
+from .track_search import MOST_CANDIDATES, MOST_RIVALS, ROUTES, Route, agree, look, moved, outside_balls
 
 Status = Literal["searching", "starting", "tracking", "coasting", "lost"]
 # How a shot began: across the border, at a contact, with the recording, or first seen in the middle of the view.
@@ -201,9 +201,9 @@ class TrackResult:
         return self.balls[0].covariance if self.balls else NO_COVARIANCE
 
 
-# Beside a track that is seen, other balls are looked for this often, or in every tick that few events make cheap:
-# soon enough to find one within 15 ms.
-LOOK_US, FEW_EVENTS = 10_000, 5000
+# Beside a track that is seen, other balls are looked for this often, in the surface and in the contour events by turns,
+# or in both in every tick that few events make cheap: soon enough to find one within 15 ms.
+LOOK_US, FEW_EVENTS = 5000, 5000
 # Shots come in across the border, within so many radii of it when first seen. A slow ball that turns up in the
 # middle rather rolls about: it is watched for a while, in which a real shot may come.
 COMING_IN, SLOW_M_S, WATCH_US = 5.0, 3.5, 20_000
@@ -400,7 +400,10 @@ def _search(
     measured = [ball.filter.mean for ball in state.balls if ball.measured is not None]
     events = outside_balls(state.contour, measured, packet.end_us)
     most = MOST_RIVALS if state.balls else MOST_CANDIDATES
-    hough, found, excluded = look(surface, events, packet.end_us, state.context.camera, state.limits, most)
+    routes: tuple[Route, ...] = ROUTES
+    if state.balls and not state.pending and len(state.contour) >= FEW_EVENTS:
+        routes = (ROUTES[packet.end_us // LOOK_US % 2],)
+    hough, found, excluded = look(surface, events, packet.end_us, state.context.camera, state.limits, most, routes)
     state.excluded = None if state.balls else excluded or state.excluded
     pending, state.pending = state.pending, []
     for sighting, circle in found:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,10 +31,19 @@ SAME_SHARE = 0.15
 LEAST_SHARE = 0.7
 
 Found = list[tuple[Sighting, Circle]]
+# Where balls are looked for: the paper's surface, and the contour events (see `look`).
+Route = Literal["surface", "contour"]
+ROUTES: tuple[Route, Route] = ("surface", "contour")
 
 
 def look(
-    surface: SurfaceResult, events: EventBatch, end_us: int, camera: Camera, limits: Limits, most: int
+    surface: SurfaceResult,
+    events: EventBatch,
+    end_us: int,
+    camera: Camera,
+    limits: Limits,
+    most: int,
+    routes: tuple[Route, ...] = ROUTES,
 ) -> tuple[Circle | None, Found, str | None]:
     """The best Hough circle anywhere; those that move like a ball; which setting excludes one, if none is left.
 
@@ -43,8 +53,12 @@ def look(
     """
     stated = limits.radius_min_px, limits.radius_max_px
     searching = _Searching(end_us, camera, limits, most)
-    first, found, excluded = searching.circles(surface, events, stated, signed=True)
-    if found or len(events) < LEAST_EVENTS:
+    first: Circle | None = None
+    found: Found = []
+    excluded: str | None = None
+    if "surface" in routes:
+        first, found, excluded = searching.circles(surface, events, stated, signed=True)
+    if found or "contour" not in routes or len(events) < LEAST_EVENTS:
         return first, found, excluded
     supported = supported_events(events, camera)
     if len(supported) < LEAST_EVENTS:
