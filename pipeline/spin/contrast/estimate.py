@@ -18,8 +18,18 @@ from .events import (
     segmented_window,
     whole_window,
 )
-from .score import TURN, Objective, burst_mask, scores, scores_near, spin_axes
-from .search import NEAR, NO_OFFSETS, LocalModel, distinct, grid_search, maximise, maximise_each, spread_directions
+from .score import TURN, Objective, burst_mask, scores, scores_near
+from .search import (
+    NEAR,
+    NO_OFFSETS,
+    distinct,
+    grid_search,
+    local_model,
+    maximise,
+    maximise_each,
+    spread_directions,
+)
+from .uncertainty import RIM_COSINE, Stretch, spin_covariance, view_cosine
 
 # Magnitudes from 0.45 to 2.2 of a candidate's hold every confusion of n turns with n + 1 (or n - 1), down to half and
 # double; a step is never coarser than a tenth, and never finer than makes SCAN_MAGNITUDES of them.
@@ -27,6 +37,8 @@ SCAN_LOW, SCAN_HIGH, SCAN_STEP, SCAN_MAGNITUDES = 0.45, 2.2, 0.1, 300
 # 20 degrees apart: visits of the logo one turn apart fix the axis only within each visit, that is roughly.
 SCAN_DIRECTIONS = 100
 ALIASES = 6  # magnitudes at which all axes are looked at
+# A spin a little above the highest looked for is found from its neighbours, and must not lose to an alias below.
+BEYOND = 1.1
 GROW_FROM_TURNS, GROW_RATIO = 1.6, 2.5
 LEAST_PERMUTED = 300
 # A local maximum of the coarse scores below this part of the best one is no rival.
@@ -36,31 +48,18 @@ SAME = 0.03
 # The kernel blurs the logo's two sides differently as it comes and goes; the last refinement has a finer one. From
 # 0.04 to 0.025 rad the axis gained a quarter, less than that brought nothing but noise.
 FINE = 0.625
-# What the model lacks (the logo's blurred edges look different from each side) leaves errors that more events do not
-# lessen, as parts of the kernel: of the axis, and of the turn over the stretch's spread in time. From the errors of
-# two simulators' balls with exact tracks.
-AXIS_FLOOR, TURN_FLOOR = 0.3, 0.036
-# Where the camera looks at the surface at less than this cosine (60 degrees, 2.2 px inside a 16.5 px ball's outline) a
-# blurred edge is that much farther off on the ball. The refinement does without such events where so many of all are
-# left; else the axis is stated as less certain, at most by MOST_OBLIQUE.
-RIM_COSINE, OFF_RIM_SHARE, MOST_OBLIQUE = 0.5, 0.5, 5.0
-TRACK_MEMORY_S = 0.01  # over which a track's errors hang together: two steps of the Kalman filter
+# The refinement does without events nearer to the rim than `RIM_COSINE` where so many of all are left.
+OFF_RIM_SHARE = 0.5
+# Log odds of a candidate against one that it beats by one sigma: of 307 pairs of maxima, one of them the truth, on 95
+# simulated flights and spinners, as they grew, the likeliest are 1.65 (near maxima) and 2.45 (far ones).
+LOG_ODDS_PER_SIGMA = 1.7
+# A near rival with smaller odds lies outside any interval of two sigma, and does not widen it.
+NEGLIGIBLE = 0.01
 # Longer stretches may hold steady shading for the search to be rid of, and bursts to tell it by.
 BURSTS_FROM_S = 0.015
 # Below this part of a turn there are no other visits of the logo to be confused with; the grid search saw all of it.
 SCAN_FROM_TURNS = 0.7
-# Refining leaves so much of the offsets' error: 0.43, 0.37 and 0.52 of 0.5 px on 87 spinners, less where the spin
-# depends on it.
-REFINED = 0.65
 MAP_MAGNITUDES, MAP_DIRECTIONS = 41, 100
-
-
-class Stretch(NamedTuple):
-    """Number of events in a stretch of time, its middle and its length."""
-
-    events: int
-    reference_s: float
-    span_s: float
 
 
 def estimate_spin(
@@ -105,7 +104,8 @@ def estimate_spin(
     spins, margins = _ranked(events, spins, settings)
     some = _off_rim(events, settings).thinned(settings.refine_events)
     spins[0], _, _, _ = maximise(_objective(some, settings, settings.sigma_rad), spins[0], NO_OFFSETS, 1)
-    return _refined(some, spins, margins, ball, settings, stretch, np.zeros(3), 4)
+    answer = _refined(some, spins[0], ball, settings, stretch, np.zeros(3), 4)
+    return _with_alternatives(answer, some, spins, margins, ball, settings, stretch)
 
 
 def follow_spin(
@@ -115,9 +115,16 @@ def follow_spin(
     assert before.spin_rps is not None
     events, stretch = _centred(events)
     some = _off_rim(events, settings).thinned(settings.follow_events)
-    spins = np.concatenate([before.spin_rps[None], before.rivals_rps]) * TURN
-    margins = np.concatenate([[0.0], before.margins])
-    return _refined(some, spins, margins, ball, settings, stretch, before.offsets_px, 1)
+    answer = _refined(some, before.spin_rps * TURN, ball, settings, stretch, before.offsets_px, 1)
+    assert answer.covariance_rps2 is not None
+    return replace(
+        answer,
+        covariance_rps2=answer.covariance_rps2 + before.kept_rps2,
+        kept_rps2=before.kept_rps2,
+        rivals_rps=before.rivals_rps,
+        rival_covariances_rps2=before.rival_covariances_rps2,
+        margins=before.margins,
+    )
 
 
 def _centred(events: SphereEvents) -> tuple[SphereEvents, Stretch]:
@@ -128,14 +135,8 @@ def _centred(events: SphereEvents) -> tuple[SphereEvents, Stretch]:
 
 def _off_rim(events: SphereEvents, settings: ContrastSettings) -> SphereEvents:
     """The events away from the rim where these are enough; a pixel there is several on the ball."""
-    rows = np.flatnonzero(_view_cosine(events) > RIM_COSINE)
+    rows = np.flatnonzero(view_cosine(events) > RIM_COSINE)
     return events.at(rows) if rows.size >= max(OFF_RIM_SHARE * len(events), settings.min_events) else events
-
-
-def _view_cosine(events: SphereEvents) -> Floats:
-    """Cosine (n,) of the angle at which the camera looks at the surface: 1 in the middle of the disc, 0 at its rim."""
-    cosine: Floats = -np.sum(events.normals * events.facing, axis=0)
-    return cosine
 
 
 def _without_static_events(events: SphereEvents, span_s: float, settings: ContrastSettings) -> SphereEvents:
@@ -191,7 +192,7 @@ def alias_scan(events: SphereEvents, spins_rad_s: Floats, settings: ContrastSett
         near = math.log(factors[1] / factors[0])
         best = factors[local_maxima(along)[:2]]
         for one in np.linalg.norm(spin) * np.concatenate([[1.0, 0.5, 2.0], best]):
-            if one <= settings.fastest_rps * TURN and all(abs(math.log(one / other)) > near for other in magnitudes):
+            if one <= BEYOND * settings.fastest_rps * TURN and all(abs(math.log(one / other)) > near for other in magnitudes):
                 magnitudes.append(float(one))
     directions = spread_directions(SCAN_DIRECTIONS)
     candidates = np.concatenate([*(directions * one for one in magnitudes[:ALIASES]), spins_rad_s])
@@ -228,75 +229,99 @@ def _ranked(events: SphereEvents, spins_rad_s: Floats, settings: ContrastSetting
     return maxima[order], margins
 
 
+def _with_place(
+    events: SphereEvents, ball: BallUncertainty, settings: ContrastSettings
+) -> Objective:
+    """The score as a function of the spin and the ball's offsets, with the finest kernel."""
+    return _objective(events, settings, FINE * settings.sigma_rad)._replace(
+        slopes=offset_slopes(events.normals, events.facing, events.radius_px),
+        prior_px=np.array([ball.centre_std_px, ball.centre_std_px, ball.radius_std_px]),
+        weight=settings.score_weight,
+    )
+
+
 def _refined(
     events: SphereEvents,
-    spins_rad_s: Floats,
-    margins: Floats,
+    spin_rad_s: Floats,
     ball: BallUncertainty,
     settings: ContrastSettings,
     stretch: Stretch,
     offsets_px: Floats,
     iterations: int,
 ) -> ContrastEstimate:
-    """The estimate around spins_rad_s[0], with the ball's offsets; `events` are thinned from those of the stretch."""
-    objective = _objective(events, settings, FINE * settings.sigma_rad)._replace(
-        slopes=offset_slopes(events.normals, events.facing, events.radius_px),
-        prior_px=np.array([ball.centre_std_px, ball.centre_std_px, ball.radius_std_px]),
-        weight=settings.score_weight,
-    )
-    spin, offsets, sharp, model = maximise(objective, spins_rad_s[0], offsets_px, iterations)
-    covariance = _spin_covariance(objective, model, settings.repeats * len(events) / stretch.events)
-    covariance += _drift_covariance(events, ball, stretch.span_s)
-    along = np.outer(spin, spin) / (spin @ spin)
-    oblique = max(1.0, RIM_COSINE / max(float(_view_cosine(events).mean()), RIM_COSINE / MOST_OBLIQUE))
-    covariance += (AXIS_FLOOR * settings.sigma_rad * oblique) ** 2 * (spin @ spin) * (np.eye(3) - along)
-    covariance += (TURN_FLOOR * settings.sigma_rad / max(float(np.std(events.t_s)), 1e-5)) ** 2 * along
+    """The estimate around a spin, with the ball's offsets; `events` are thinned from those of the stretch."""
+    objective = _with_place(events, ball, settings)
+    spin, offsets, sharp, model = maximise(objective, spin_rad_s, offsets_px, iterations)
+    covariance = spin_covariance(objective, model, events, ball, settings, stretch)
     window = objective.window
     shuffled = window.events._replace(t_s=np.random.default_rng(0).permutation(events.t_s))
     chance = objective._replace(window=window._replace(events=shuffled))
     by_chance = scores_near(np.empty((1, len(events))), chance, spin, offsets, np.zeros((1, 6)))
     contrast = (sharp - float(by_chance[0])) / len(events)
-    rivals, margins = spins_rad_s[1:], margins[1:]
-    gaps = rivals - spins_rad_s[0]
-    near = np.linalg.norm(gaps, axis=1) < NEAR * np.linalg.norm(spins_rad_s[0])
-    for gap, margin in zip(gaps[near], margins[near], strict=True):
-        covariance += np.outer(gap, gap) / (1.0 + math.exp(min(float(margin), 50.0)))
-    spin_rps, rivals_rps = spin / TURN, rivals[~near] / TURN
     return ContrastEstimate(
-        spin_rps, covariance / TURN**2, *stretch, rivals_rps, margins[~near], offsets, contrast, events.patch_rad
+        spin / TURN, covariance / TURN**2, *stretch, offsets_px=offsets, contrast=contrast, patch_rad=events.patch_rad
     )
 
 
-def _spin_covariance(objective: Objective, model: LocalModel, repeats: float) -> Floats:
-    """Covariance (3, 3) of the spin, rad^2/s^2, at the maximum: sandwich estimator plus the ball's place.
+def _with_alternatives(
+    answer: ContrastEstimate,
+    events: SphereEvents,
+    spins_rad_s: Floats,
+    margins: Floats,
+    ball: BallUncertainty,
+    settings: ContrastSettings,
+    stretch: Stretch,
+) -> ContrastEstimate:
+    """The estimate with its rivals, each with its covariance, and with what near ones and the polarities add to its own.
 
-    An event's part of the gradient is twice the slope of its own share (it also is the neighbour of its neighbours):
-    M = 4 repeats sum d_i d_i', with `repeats` events of one edge that tell the same. With A the score's curvature the
-    events' noise gives A_ww^-1 M_ww A_ww^-1 (w: the spin). A ball that is d off its assumed place moves the maximum
-    by -A_ww^-1 A_wp d; d has nearly the prior's covariance (REFINED), although offsets were refined with the spin:
-    refining improves the spin, but the refined offsets are themselves hardly nearer to the truth.
+    A near rival adds its distance, by the odds that it is the right one, where these are not NEGLIGIBLE.
     """
-    inverse = np.linalg.inv(model.curvature[:3, :3])
-    by_place = inverse @ model.curvature[:3, 3:] * (REFINED * objective.prior_px / model.steps[3:])
-    whole = 4.0 * repeats * inverse @ model.scatter[:3, :3] @ inverse + by_place @ by_place.T
-    back = spin_axes(model.spin_rad_s).T * model.steps[:3]
-    covariance: Floats = back @ whole @ back.T
-    return covariance
+    assert answer.spin_rps is not None and answer.covariance_rps2 is not None
+    kept = _polarity_covariance(answer, events, ball, settings, stretch)
+    gaps = spins_rad_s[1:] / TURN - answer.spin_rps
+    near = np.linalg.norm(gaps, axis=1) < NEAR * np.linalg.norm(answer.spin_rps)
+    odds = np.exp(-LOG_ODDS_PER_SIGMA * margins[1:])
+    for gap, one in zip(gaps[near], odds[near], strict=True):
+        if one > NEGLIGIBLE:
+            kept += np.outer(gap, gap) * one / (1.0 + one)
+    rivals, some = spins_rad_s[1:][~near], events.thinned(settings.rival_events)
+    objective, covariances = _with_place(some, ball, settings), np.empty((len(rivals), 3, 3))
+    for k, rival in enumerate(rivals):
+        model = local_model(objective, rival, np.zeros(3), 1.0)
+        covariances[k] = spin_covariance(objective, model, some, ball, settings, stretch) / TURN**2
+    return replace(
+        answer,
+        covariance_rps2=answer.covariance_rps2 + kept,
+        kept_rps2=kept,
+        rivals_rps=rivals / TURN,
+        rival_covariances_rps2=covariances,
+        margins=margins[1:][~near],
+    )
 
 
-def _drift_covariance(events: SphereEvents, ball: BallUncertainty, span_s: float) -> Floats:
-    """Covariance (3, 3), rad^2/s^2: a centre that drifts over the ball looks like a turn about an axis in the image.
+def _polarity_covariance(
+    answer: ContrastEstimate, events: SphereEvents, ball: BallUncertainty, settings: ContrastSettings, stretch: Stretch
+) -> Floats:
+    """Covariance (3, 3), rps^2, that the polarities' own maxima show beyond the stated one; zero where one is missing.
 
-    A track that is off by its sigma, anew every TRACK_MEMORY_S, looks like a ramp of sqrt(12) sigma over the stretch,
-    less so the more often its errors change.
+    With shares a and b of the contrast and their distance d, a b d d' has the expectation of the covariance of their
+    weighted mean, whatever they do not have in common: latencies, and the edges that each of them sees. What exceeds
+    the expectation under the stated covariance C, a b d' C^-1 d = 3, is added (method of moments, as in DerSimonian
+    and Laird, "Meta-analysis in clinical trials", 1986).
     """
-    facing = events.facing.mean(axis=1)
-    facing /= np.linalg.norm(facing)
-    changes = max(span_s / TRACK_MEMORY_S, 1.0)
-    ramp_px_s = math.sqrt(12.0 / changes) * ball.track_std_px / max(span_s, 1e-6)
-    rate = min(ball.drift_std_px_s, ramp_px_s) / float(np.mean(events.radius_px))
-    spread: Floats = rate**2 * (np.eye(3) - np.outer(facing, facing))
-    return spread
+    assert answer.spin_rps is not None and answer.covariance_rps2 is not None
+    found, gains = [], []
+    for polarity in (0, 1):
+        own = events.at(events.polarity == polarity)
+        if len(own) < settings.min_events:
+            return np.zeros((3, 3))
+        alone = _refined(own, answer.spin_rps * TURN, ball, settings, stretch, answer.offsets_px, 2)
+        found.append(alone.spin_rps)
+        gains.append(max(alone.contrast, 0.0) * len(own))
+    shares = gains[0] * gains[1] / max(gains[0] + gains[1], 1e-9) ** 2
+    apart = found[0] - found[1]
+    excess = shares * float(apart @ np.linalg.solve(answer.covariance_rps2, apart))
+    return shares * max(1.0 - 3.0 / max(excess, 1e-9), 0.0) * np.outer(apart, apart)
 
 
 class ScoreMap(NamedTuple):

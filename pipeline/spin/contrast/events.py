@@ -25,8 +25,8 @@ class ContrastSettings:
         pixels report within about 0.1 ms, 0.03 rad at 50 rps.
     floor : float
         Density in coinciding events, see `score`.
-    refine_events, search_events, scan_events, follow_events : int
-        Events looked at by the refinement, the grid search, the alias scan and `follow_spin`.
+    refine_events, search_events, scan_events, follow_events, rival_events : int
+        Events looked at by the refinement, the grid search, the alias scan, `follow_spin` and the rivals' covariances.
     score_weight : float
         Weight of the score against the assumed place of the ball.
     repeats : float
@@ -41,6 +41,7 @@ class ContrastSettings:
     search_events: int = 800
     scan_events: int = 250
     follow_events: int = 1000
+    rival_events: int = 500
     score_weight: float = 0.1
     repeats: float = 8.0
 
@@ -129,12 +130,15 @@ class BallUncertainty:
         Of the centre (one axis) and the radius, as constant errors over the stretch.
     track_std_px, drift_std_px_s : float
         Of the centre's changes within the stretch, and the most it can drift.
+    speed_px_s : float
+        Speed of the centre itself (no uncertainty): what an edge moves with besides the spin.
     """
 
     centre_std_px: float
     radius_std_px: float
     track_std_px: float = 0.0
     drift_std_px_s: float = 0.0
+    speed_px_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,8 +153,10 @@ class ContrastEstimate:
         Number of events given.
     reference_s, span_s : float
         Middle of the stretch, to whose time the events are derotated, and its length.
-    rivals_rps, margins : (k, 3) and (k,) float64
-        Other local maxima of the score, and by how many sigmas they are lower.
+    rivals_rps, rival_covariances_rps2, margins : (k, 3), (k, 3, 3) and (k,) float64
+        Other local maxima of the score, their covariances, and by how many sigmas they are lower.
+    kept_rps2 : (3, 3) float64
+        Part of the covariance that only a full estimate finds: near rivals and the distance of the polarities' maxima.
     offsets_px : (3,) float64
         Refined centre x, y and radius less the assumed ones.
     contrast : float
@@ -165,7 +171,9 @@ class ContrastEstimate:
     reference_s: float = 0.0
     span_s: float = 0.0
     rivals_rps: Floats = field(default_factory=lambda: np.empty((0, 3)))
+    rival_covariances_rps2: Floats = field(default_factory=lambda: np.empty((0, 3, 3)))
     margins: Floats = field(default_factory=lambda: np.empty(0))
+    kept_rps2: Floats = field(default_factory=lambda: np.zeros((3, 3)))
     offsets_px: Floats = field(default_factory=lambda: np.zeros(3))
     contrast: float = 0.0
     patch_rad: float = 0.0
