@@ -41,6 +41,7 @@ ALIASES = 6  # magnitudes at which all axes are looked at
 BEYOND = 1.1
 GROW_FROM_TURNS, GROW_RATIO = 1.6, 2.5
 LEAST_PERMUTED = 300
+STARTS_KEPT = 2
 # A local maximum of the coarse scores below this part of the best one is no rival.
 RIVAL = 0.5
 # Newton's method ends within this of a maximum, relative to the spin; farther maxima are others.
@@ -100,7 +101,8 @@ def estimate_spin(
         spins = maximise_over_growing_segments(moving, np.concatenate([spins, found]), settings)
     seen_again = stretch.span_s * float(np.linalg.norm(spins[0])) > SCAN_FROM_TURNS * TURN
     if scanning and (not searching or seen_again):
-        spins = alias_scan(moving, spins, settings)
+        # The scan's few events may rank what is known already below its aliases.
+        spins = np.concatenate([alias_scan(moving, spins, settings), spins[:STARTS_KEPT]])
     spins, margins = _ranked(events, spins, settings)
     some = _off_rim(events, settings).thinned(settings.refine_events)
     spins[0], _, _, _ = maximise(_objective(some, settings, settings.sigma_rad), spins[0], NO_OFFSETS, 1)
