@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .arrays import Floats
+from .arrays import Flags, Floats, Integers
 
 
 @numba.njit(cache=True, nogil=True)
@@ -79,3 +79,65 @@ def shortest_period(correlation: Floats, shortest: int, share: float) -> int:
     if not peaks.size:
         return 0
     return int(peaks[correlation[peaks] >= share * correlation[peaks].max()][0])
+
+
+@numba.njit(cache=True, nogil=True)
+def add_to_pattern(pattern: Floats, bins: Integers, normals: Floats, on: Flags) -> None:
+    """Add events to `pattern` (2, n, c, c): bins of time, and linearly between c x c cells of the ball as it is seen.
+
+    Parameters
+    ----------
+    bins : (m,) int64
+        Bin of each event; those outside of 0 to n - 1 are left out.
+    normals : (m, 3) float64
+        Outward unit normals; x and y from -1 to 1 are spread over the cells.
+    on : (m,) bool
+        Polarity, the first index.
+    """
+    last = pattern.shape[2] - 1
+    for i in range(bins.size):
+        if bins[i] < 0 or bins[i] >= pattern.shape[1]:
+            continue
+        x, y = 0.5 * (normals[i, 0] + 1.0) * last, 0.5 * (normals[i, 1] + 1.0) * last
+        column, row = min(max(int(x), 0), last - 1), min(max(int(y), 0), last - 1)
+        right, down = x - column, y - row
+        cells = pattern[1 if on[i] else 0, bins[i]]
+        cells[row, column] += (1.0 - right) * (1.0 - down)
+        cells[row, column + 1] += right * (1.0 - down)
+        cells[row + 1, column] += (1.0 - right) * down
+        cells[row + 1, column + 1] += right * down
+
+
+@numba.njit(cache=True, nogil=True)
+def lag_sums(products: Floats) -> tuple[Floats, float]:
+    """Sums (n,) of a symmetric matrix (n, n) along each diagonal, and the mean square off the two nearest ones."""
+    n = products.shape[0]
+    sums, squares, count = np.zeros(n), 0.0, 0
+    for i in range(n):
+        for j in range(i, n):
+            sums[j - i] += products[i, j]
+            if j - i >= 2:
+                squares += products[i, j] ** 2
+                count += 1
+    return sums, squares / max(count, 1)
+
+
+@numba.njit(cache=True, nogil=True)
+def period_deviations(sums: Floats, mean_square: float, periods: Floats) -> Floats:
+    """Deviations (m,), in sigmas of chance, of the lag sums (n,) at all multiples of periods (m,) in samples.
+
+    By chance a product has mean 0 and `mean_square`, and a lag has n - lag of them. 0 where no multiple fits.
+    """
+    n = sums.size
+    deviations = np.zeros(periods.size)
+    for k in range(periods.size):
+        total, pairs, lag = 0.0, 0.0, periods[k]
+        while lag < n - 2:
+            at = int(lag)
+            part = lag - at
+            total += (1.0 - part) * sums[at] + part * sums[at + 1]
+            pairs += n - lag
+            lag += periods[k]
+        if pairs > 0.0 and mean_square > 0.0:
+            deviations[k] = total / np.sqrt(mean_square * pairs)
+    return deviations

@@ -13,6 +13,7 @@ from ..parameters import ParameterGroup, choice, tunable
 from ..results import Packet, ReadOnlyArrays
 from ..stage import Context, Stage
 from .logo import LogoResult
+from .rate_period import LogoPattern, PatternPeriod
 
 # Fewer logo events than this in the window have no period that could be told from chance.
 FEWEST_EVENTS = 100
@@ -20,6 +21,8 @@ FEWEST_EVENTS = 100
 REPEATS, SHARE_OF_BEST = 0.5, 0.8
 # Intervals between crossings that spread more than this (1 sigma / mean) belong to no steady spin.
 IRREGULAR = 0.15
+# A spin a little above the highest looked for must not be taken for an alias below.
+BEYOND = 1.1
 
 
 # The choices of low_pass_from: whether the cut-off follows the period found by autocorrelation.
@@ -59,6 +62,13 @@ class RateResult(ReadOnlyArrays):
         Its 1 sigma; None with spin_rps.
     reason : str, optional
         Why spin_rps is None.
+    period_spins_rps, period_log_likelihoods : (k,) float64
+        Not in the paper: magnitudes by which the logo's pattern on the ball comes back, best first, and their log
+        likelihoods less that of the first; also when refused.
+    period_std_rps : float
+        1 sigma of the first; NaN without one.
+    period_reason : str, optional
+        Why the first is not to be trusted; None if it is.
     """
 
     t_us: NDArray[np.int64]
@@ -70,15 +80,23 @@ class RateResult(ReadOnlyArrays):
     spin_rps: float | None
     spin_std_rps: float | None
     reason: str | None
+    period_spins_rps: NDArray[np.float64]
+    period_log_likelihoods: NDArray[np.float64]
+    period_std_rps: float
+    period_reason: str | None
 
 
 @dataclass(slots=True)
 class RateState:
-    """Counts of the shot, bin by bin, from bin number `first_bin` of the file's time on; None before the first tick."""
+    """Counts and patterns of the shot, bin by bin, from bin number `first_bin` of the file's time on.
+
+    `first_bin` is None before the first tick.
+    """
 
     max_spin_rps: float
     first_bin: int | None = None
     counts: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    pattern: LogoPattern = field(default_factory=LogoPattern)
 
 
 def start(parameters: RateParameters, context: Context) -> RateState:
@@ -88,7 +106,7 @@ def start(parameters: RateParameters, context: Context) -> RateState:
 
 def absent(parameters: RateParameters, reason: str) -> RateResult:
     """No rate, because there is no ball."""
-    return _without_period(parameters, np.empty(0, np.int64), np.empty(0), "no ball")
+    return _without_period(parameters, np.empty(0, np.int64), np.empty(0), "no ball", PatternPeriod.nothing("no ball"))
 
 
 def step(parameters: RateParameters, state: RateState, packet: Packet, logo: LogoResult) -> RateResult:
@@ -101,10 +119,12 @@ def step(parameters: RateParameters, state: RateState, packet: Packet, logo: Log
     ended = packet.end_us // parameters.bin_us - first_bin
     counts = state.counts[: max(ended, 0)]
     t_us = (first_bin + np.arange(counts.size)) * parameters.bin_us
-    rate_hz = counts / (parameters.bin_us * 1e-6)
+    bin_s = parameters.bin_us * 1e-6
+    rate_hz, period = counts / bin_s, state.pattern.period(counts.size, bin_s, BEYOND * state.max_spin_rps)
     if counts.sum() < FEWEST_EVENTS:
-        return _without_period(parameters, t_us, rate_hz, f"{counts.sum()} logo events, {FEWEST_EVENTS} are needed")
-    return _with_period(parameters, state.max_spin_rps, t_us, rate_hz)
+        reason = f"{counts.sum()} logo events, {FEWEST_EVENTS} are needed"
+        return _without_period(parameters, t_us, rate_hz, reason, period)
+    return _with_period(parameters, state.max_spin_rps, t_us, rate_hz, period)
 
 
 def _count(parameters: RateParameters, state: RateState, packet: Packet, logo: LogoResult) -> int:
@@ -115,20 +135,30 @@ def _count(parameters: RateParameters, state: RateState, packet: Packet, logo: L
     counts = np.bincount(bins[bins >= 0], minlength=length)
     counts[: state.counts.size] += state.counts
     forget = max(length - parameters.window_us // parameters.bin_us, 0)
+    state.pattern.add(logo.turning, first_bin, length, parameters.bin_us)
+    state.pattern.forget(forget)
     state.counts, state.first_bin = counts[forget:], first_bin + forget
     return state.first_bin
 
 
 def _without_period(
-    parameters: RateParameters, t_us: NDArray[np.int64], rate_hz: NDArray[np.float64], reason: str
+    parameters: RateParameters,
+    t_us: NDArray[np.int64],
+    rate_hz: NDArray[np.float64],
+    reason: str,
+    period: PatternPeriod,
 ) -> RateResult:
     """A result without a period, with the curves as far as they go."""
     ema_hz = moving_average(rate_hz, _ema_weight(parameters))
     nothing = np.zeros(rate_hz.size)
     return RateResult(
         t_us, rate_hz, ema_hz, nothing, parameters.low_pass_hz, np.empty(0), None,
-        None, reason,
+        None, reason, *_fields(period),
     )  # fmt: skip
+
+
+def _fields(period: PatternPeriod) -> tuple[NDArray[np.float64], NDArray[np.float64], float, str | None]:
+    return period.spins_rps, period.log_likelihoods, period.std_rps, period.reason
 
 
 def _ema_weight(parameters: RateParameters) -> float:
@@ -137,7 +167,11 @@ def _ema_weight(parameters: RateParameters) -> float:
 
 
 def _with_period(
-    parameters: RateParameters, max_spin_rps: float, t_us: NDArray[np.int64], rate_hz: NDArray[np.float64]
+    parameters: RateParameters,
+    max_spin_rps: float,
+    t_us: NDArray[np.int64],
+    rate_hz: NDArray[np.float64],
+    period: PatternPeriod,
 ) -> RateResult:
     """Moving average, mean removed, low-pass, falling zero crossings, mean interval.
 
@@ -149,17 +183,17 @@ def _with_period(
     ema_hz = moving_average(rate_hz, _ema_weight(parameters))
     varying = ema_hz - ema_hz.mean()
     correlation = autocorrelation(varying, varying.size * 3 // 4)
-    period = shortest_period(correlation, int(0.8 / (max_spin_rps * bin_s)), SHARE_OF_BEST)
-    repeats = period > 0 and correlation[period] >= REPEATS
+    lag = shortest_period(correlation, int(0.8 / (max_spin_rps * bin_s)), SHARE_OF_BEST)
+    repeats = lag > 0 and correlation[lag] >= REPEATS
     cutoff_hz = min(parameters.low_pass_hz, 0.45 / bin_s)  # below half the bins' rate, else there is nothing to pass
     if LOW_PASS_FOLLOWS[parameters.low_pass_from] and repeats:
-        cutoff_hz = min(cutoff_hz, 2.0 / (period * bin_s))
+        cutoff_hz = min(cutoff_hz, 2.0 / (lag * bin_s))
     smooth_hz = low_passed(varying, cutoff_hz * bin_s)
     crossings_us = t_us[0] + (falling_crossings(smooth_hz) + 0.5) * parameters.bin_us
     spin_rps, spin_std_rps, reason = _spin(crossings_us, repeats, parameters, max_spin_rps)
     return RateResult(
         t_us, rate_hz, ema_hz, smooth_hz, cutoff_hz, crossings_us, spin_rps,
-        spin_std_rps, reason,
+        spin_std_rps, reason, *_fields(period),
     )  # fmt: skip
 
 
