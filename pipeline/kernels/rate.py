@@ -108,18 +108,18 @@ def add_to_pattern(pattern: Floats, bins: Integers, normals: Floats, on: Flags) 
         cells[row + 1, column + 1] += right * down
 
 
-@numba.njit(cache=True, nogil=True)
-def lag_sums(products: Floats) -> tuple[Floats, float]:
-    """Sums (n,) of a symmetric matrix (n, n) along each diagonal, and the mean square off the two nearest ones."""
-    n = products.shape[0]
-    sums, squares, count = np.zeros(n), 0.0, 0
-    for i in range(n):
-        for j in range(i, n):
-            sums[j - i] += products[i, j]
-            if j - i >= 2:
-                squares += products[i, j] ** 2
-                count += 1
-    return sums, squares / max(count, 1)
+def lag_sums(rows: Floats) -> tuple[Floats, float]:
+    """Sums of the products of rows (n, c) a lag apart, (n,), and the mean square of the products two or more apart.
+
+    The sums by Fourier transform; the squares from sum_ij (r_i . r_j)^2 = |R^T R|^2: no n x n products are made.
+    """
+    n = rows.shape[0]
+    spectrum = np.fft.rfft(rows, 2 * n, axis=0)
+    sums = np.fft.irfft(np.sum(spectrum.real**2 + spectrum.imag**2, axis=1), 2 * n)[:n]
+    # einsum, for the matrix product's threads would take longer to start than to compute.
+    squares = float(np.sum(np.einsum("ni,nj->ij", rows, rows) ** 2))
+    near = np.sum(np.sum(rows**2, axis=1) ** 2) + 2.0 * np.sum(np.sum(rows[1:] * rows[:-1], axis=1) ** 2)
+    return sums, max(squares - float(near), 0.0) / max((n - 1) * (n - 2), 1)
 
 
 @numba.njit(cache=True, nogil=True)

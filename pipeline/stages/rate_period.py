@@ -15,8 +15,6 @@ Floats = NDArray[np.float64]
 
 # Cells across the ball: a third of its radius, which the surface of a ball of 50 rps crosses in a millisecond.
 CELLS = 6
-# The matching takes the square of the bins: 200 ms of 0.5 ms take 3 ms, and hold three turns of 15 rps.
-LONGEST_BINS = 400
 SLOWEST_RPS, FEWEST_TURNS = 3.0, 1.2
 # A magnitude is found where it exceeds chance by 5 sigma: 2,000 magnitudes are looked at.
 FEWEST_SIGMAS = 5.0
@@ -74,7 +72,7 @@ class LogoPattern:
         self.cells = self.cells[:, bins:]
 
     def period(self, bins: int, bin_s: float, max_spin_rps: float) -> PatternPeriod:
-        """Magnitudes behind the first `bins` bins, or the last LONGEST_BINS of them.
+        """Magnitudes behind the first `bins` bins.
 
         Each bin's pattern, less the mean pattern with as many events, is multiplied with that of every other bin; sums
         over bins a lag apart tell how much of the pattern has come back. That is the matching of EEPPR (Kolar et al.,
@@ -84,7 +82,7 @@ class LogoPattern:
         evidence out. Each polarity is judged by its own chance level, and their squares are added: one that shows
         nothing adds nothing.
         """
-        kept = self.cells[:, max(bins - LONGEST_BINS, 0) : bins].reshape(2, -1, CELLS * CELLS)
+        kept = self.cells[:, :bins].reshape(2, -1, CELLS * CELLS)
         span_s = kept.shape[1] * bin_s
         slowest_rps = max(FEWEST_TURNS / max(span_s, 1e-9), SLOWEST_RPS)
         if slowest_rps >= max_spin_rps:
@@ -96,7 +94,7 @@ class LogoPattern:
         for pattern in kept:
             events = pattern.sum(axis=1, keepdims=True)
             varying = pattern - events * (pattern.sum(axis=0) / max(float(pattern.sum()), 1.0))
-            squares += np.maximum(period_deviations(*lag_sums(varying @ varying.T), 1.0 / (spins_rps * bin_s)), 0.0) ** 2
+            squares += np.maximum(period_deviations(*lag_sums(varying), 1.0 / (spins_rps * bin_s)), 0.0) ** 2
         return _judged(spins_rps, np.sqrt(squares), RETURN_STD_S / span_s)
 
 
