@@ -20,6 +20,12 @@ Floats = NDArray[np.float64]
 # The full-rank solve needs logo seen from several sides: with all e_r within about 6 degrees of each other
 # (sin^2 = 0.01) the component along them is left to noise.
 FEWEST_DIRECTIONS = 0.01
+# Local flow is normal flow: its directions follow the logo's edges, and it is shorter than the flow. Beyond scatter and
+# lost components the axes of 163 simulated shots are off by 15 degrees (1 sigma, both directions together), and the
+# magnitudes from flow alone are 0.86 of the true ones in the median, 0.6 to 1.1 in 80 %.
+FLOW_BIAS, SHORTER = math.radians(15.0) / math.sqrt(2.0), 0.3
+# Directions in which less than so much of the spin is seen have no bound on what is lost: at most the spin itself.
+LEAST_SEEN = 1e-3
 
 
 class TripletSpin:
@@ -59,6 +65,7 @@ class TripletSpin:
         if solved is None:
             return SpinEstimate.refused("triplet", "the logo is seen from one side only", int(counts.sum()))
         spin, covariance = solved
+        covariance = covariance + FLOW_BIAS**2 * float(spin @ spin) * np.eye(3) + SHORTER**2 * np.outer(spin, spin)
         vector_rps, covariance_rps2 = spin / (2 * math.pi), covariance / (2 * math.pi) ** 2
         if TAKES_RATE[self.parameters.magnitude_from] and rate.spin_rps is not None:
             vector_rps, covariance_rps2 = _with_magnitude(vector_rps, covariance_rps2, rate)
@@ -86,12 +93,18 @@ class TripletSpin:
 
 
 def _mean_of_slices(counts: Floats, moments: Floats, squares: Floats) -> tuple[Floats, Floats]:
-    """Mean over the slices and its covariance from their spread; a single slice is as uncertain as it is long."""
+    """Mean over the slices and its covariance; a single slice is as uncertain as it is long.
+
+    The mean of omega - (e_r . omega) e_r lacks what all places of the logo have in common. How much that would be, were
+    the mean inverted, is part of the stated error, besides the slices' spread.
+    """
     spins = moments / counts[:, None]
     mean = spins.mean(axis=0)
     if len(spins) == 1:
         return mean, np.eye(3) * float(mean @ mean)
-    return mean, np.cov(spins.T) / len(spins)
+    seen = (squares / counts[:, None, None]).mean(axis=0)
+    lost = np.linalg.solve(seen + LEAST_SEEN * np.eye(3), mean) - mean
+    return mean, np.cov(spins.T) / len(spins) + np.outer(lost, lost)
 
 
 def _full_rank(counts: Floats, moments: Floats, squares: Floats) -> tuple[Floats, Floats] | None:

@@ -37,7 +37,9 @@ from tests.spinning_ball import (
 
 METHODS = ("triplet", "normal_flow")
 ROOT = Path(__file__).parents[3]
-SILENT = RateResult(*(np.empty(0),) * 4, 200.0, np.empty(0), None, None, "nothing yet")  # type: ignore[arg-type]
+SILENT = RateResult(  # type: ignore[arg-type]
+    *(np.empty(0),) * 4, 200.0, np.empty(0), None, None, "nothing yet", np.empty(0), np.empty(0), np.nan, "nothing yet"
+)
 STILL = {"centre_m": (0.0, 0.0, 2.0), "velocity_m_s": (0.0, 0.0, 0.0)}
 FLIGHT = {"centre_m": (0.05, -0.2, 1.75), "velocity_m_s": (1.0, 6.0, -0.3)}
 CASES = {
