@@ -108,36 +108,36 @@ def add_to_pattern(pattern: Floats, bins: Integers, normals: Floats, on: Flags) 
         cells[row + 1, column + 1] += right * down
 
 
-def lag_sums(rows: Floats) -> tuple[Floats, float]:
-    """Sums of the products of rows (n, c) a lag apart, (n,), and the mean square of the products two or more apart.
+def lag_sums(rows: Floats) -> tuple[Floats, Floats, float]:
+    """Sums of the products of rows (n, c) by their lag, the most they can be, and the mean square of a product.
 
-    The sums by Fourier transform; the squares from sum_ij (r_i . r_j)^2 = |R^T R|^2: no n x n products are made.
+    Sums (n,) and bounds (n,) by Schwarz's inequality, from the rows that a lag leaves at either end; the mean is over
+    products of rows two or more apart. The sums come by Fourier transform, the squares from sum_ij (r_i . r_j)^2 =
+    |R^T R|^2: no n x n products are made.
     """
     n = rows.shape[0]
     spectrum = np.fft.rfft(rows, 2 * n, axis=0)
     sums = np.fft.irfft(np.sum(spectrum.real**2 + spectrum.imag**2, axis=1), 2 * n)[:n]
+    energies = np.sum(rows**2, axis=1)
+    bounds = np.sqrt(np.cumsum(energies)[::-1] * np.cumsum(energies[::-1])[::-1])
     # einsum, for the matrix product's threads would take longer to start than to compute.
     squares = float(np.sum(np.einsum("ni,nj->ij", rows, rows) ** 2))
-    near = np.sum(np.sum(rows**2, axis=1) ** 2) + 2.0 * np.sum(np.sum(rows[1:] * rows[:-1], axis=1) ** 2)
-    return sums, max(squares - float(near), 0.0) / max((n - 1) * (n - 2), 1)
+    near = np.sum(energies**2) + 2.0 * np.sum(np.sum(rows[1:] * rows[:-1], axis=1) ** 2)
+    return sums, bounds, max(squares - float(near), 0.0) / max((n - 1) * (n - 2), 1)
 
 
 @numba.njit(cache=True, nogil=True)
-def period_deviations(sums: Floats, mean_square: float, periods: Floats) -> Floats:
-    """Deviations (m,), in sigmas of chance, of the lag sums (n,) at all multiples of periods (m,) in samples.
-
-    By chance a product has mean 0 and `mean_square`, and a lag has n - lag of them. 0 where no multiple fits.
-    """
+def over_multiples(sums: Floats, bounds: Floats, periods: Floats) -> Floats:
+    """Totals (3, m) of lag sums (n,), of their bounds and of n - lag, over all multiples of periods (m,) in samples."""
     n = sums.size
-    deviations = np.zeros(periods.size)
+    totals = np.zeros((3, periods.size))
     for k in range(periods.size):
-        total, pairs, lag = 0.0, 0.0, periods[k]
+        lag = periods[k]
         while lag < n - 2:
             at = int(lag)
             part = lag - at
-            total += (1.0 - part) * sums[at] + part * sums[at + 1]
-            pairs += n - lag
+            totals[0, k] += (1.0 - part) * sums[at] + part * sums[at + 1]
+            totals[1, k] += (1.0 - part) * bounds[at] + part * bounds[at + 1]
+            totals[2, k] += n - lag
             lag += periods[k]
-        if pairs > 0.0 and mean_square > 0.0:
-            deviations[k] = total / np.sqrt(mean_square * pairs)
-    return deviations
+    return totals

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.rate import add_to_pattern, lag_sums, period_deviations
+from ..kernels.rate import add_to_pattern, lag_sums, over_multiples
 from .logo import TurningEvents
 
 Floats = NDArray[np.float64]
@@ -90,16 +90,22 @@ class LogoPattern:
         # Neighbours differ by a quarter of a bin at the last return.
         count = math.ceil(math.log(max_spin_rps / slowest_rps) / (0.25 * bin_s / span_s))
         spins_rps = np.geomspace(slowest_rps, max_spin_rps, count + 1)
-        squares = np.zeros(count + 1)
+        squares, sums, bounds = np.zeros((3, count + 1))
         for pattern in kept:
             events = pattern.sum(axis=1, keepdims=True)
             varying = pattern - events * (pattern.sum(axis=0) / max(float(pattern.sum()), 1.0))
-            squares += np.maximum(period_deviations(*lag_sums(varying), 1.0 / (spins_rps * bin_s)), 0.0) ** 2
-        return _judged(spins_rps, np.sqrt(squares), RETURN_STD_S / span_s)
+            by_lag, bound_by_lag, mean_square = lag_sums(varying)
+            own, most, products = over_multiples(by_lag, bound_by_lag, 1.0 / (spins_rps * bin_s))
+            squares += np.maximum(own, 0.0) ** 2 / np.maximum(mean_square * products, 1e-9)
+            sums, bounds = sums + own, bounds + most
+        return _judged(spins_rps, np.sqrt(squares), sums / np.maximum(bounds, 1e-9), RETURN_STD_S / span_s)
 
 
-def _judged(spins_rps: Floats, sigmas: Floats, relative_std: float) -> PatternPeriod:
-    """The highest peaks of a curve of sigmas (m,) over magnitudes (m,), and whether the first is to be trusted."""
+def _judged(spins_rps: Floats, sigmas: Floats, correlations: Floats, relative_std: float) -> PatternPeriod:
+    """The highest peaks of a curve of sigmas (m,) over magnitudes (m,), and whether the first is to be trusted.
+
+    The sigmas grow with what overlaps, and so lean to short lags; the correlations (m,) say where a peak really is.
+    """
     inner = sigmas[1:-1]
     peaks = 1 + np.flatnonzero((inner >= sigmas[:-2]) & (inner > sigmas[2:]))
     chosen: list[int] = []
@@ -110,7 +116,8 @@ def _judged(spins_rps: Floats, sigmas: Floats, relative_std: float) -> PatternPe
             break
     if not chosen:
         return PatternPeriod.nothing("the logo's pattern does not come back")
-    found, best = spins_rps[chosen], float(sigmas[chosen[0]])
+    best, near = float(sigmas[chosen[0]]), [np.abs(np.log(spins_rps / spins_rps[peak])) < APART for peak in chosen]
+    found = np.array([spins_rps[np.argmax(np.where(rows, correlations, -np.inf))] for rows in near])
     likelihoods = -0.5 * ((1.0 - sigmas[chosen] / best) / SPREAD) ** 2
     reason = None
     if best < FEWEST_SIGMAS:

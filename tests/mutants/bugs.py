@@ -471,14 +471,14 @@ SIMULATOR = [
 CONTRAST = [
     Mutant(
         "pipeline/spin/contrast/stage.py",
-        "centre_std_px=max(math.hypot(position, flown), 0.01)",
+        "centre_std_px=max(math.hypot(position, speed * LATENCY_SPREAD_S), 0.01)",
         "centre_std_px=max(position, 0.01)",
         "tests/pipeline/stages/test_contrast_memory.py -k flies_on",
     ),
     Mutant(
         "pipeline/spin/contrast/stage.py",
-        "against = FLOW_METHOD if answer.contrast < parameters.min_gain else None",
-        "against = FLOW_METHOD",
+        "None if turns_seen else FLOW_METHOD",
+        "FLOW_METHOD",
         "tests/pipeline/stages/test_contrast_memory.py -k nothing_turns",
     ),
     Mutant(

@@ -194,7 +194,9 @@ def alias_scan(events: SphereEvents, spins_rad_s: Floats, settings: ContrastSett
         near = math.log(factors[1] / factors[0])
         best = factors[local_maxima(along)[:2]]
         for one in np.linalg.norm(spin) * np.concatenate([[1.0, 0.5, 2.0], best]):
-            if one <= BEYOND * settings.fastest_rps * TURN and all(abs(math.log(one / other)) > near for other in magnitudes):
+            if one <= BEYOND * settings.fastest_rps * TURN and all(
+                abs(math.log(one / other)) > near for other in magnitudes
+            ):
                 magnitudes.append(float(one))
     directions = spread_directions(SCAN_DIRECTIONS)
     candidates = np.concatenate([*(directions * one for one in magnitudes[:ALIASES]), spins_rad_s])
@@ -231,9 +233,7 @@ def _ranked(events: SphereEvents, spins_rad_s: Floats, settings: ContrastSetting
     return maxima[order], margins
 
 
-def _with_place(
-    events: SphereEvents, ball: BallUncertainty, settings: ContrastSettings
-) -> Objective:
+def _with_place(events: SphereEvents, ball: BallUncertainty, settings: ContrastSettings) -> Objective:
     """The score as a function of the spin and the ball's offsets, with the finest kernel."""
     return _objective(events, settings, FINE * settings.sigma_rad)._replace(
         slopes=offset_slopes(events.normals, events.facing, events.radius_px),
@@ -274,7 +274,7 @@ def _with_alternatives(
     settings: ContrastSettings,
     stretch: Stretch,
 ) -> ContrastEstimate:
-    """The estimate with its rivals, each with its covariance, and with what near ones and the polarities add to its own.
+    """The estimate with its rivals and their covariances, its own with what near ones and the polarities add.
 
     A near rival adds its distance, by the odds that it is the right one, where these are not NEGLIGIBLE.
     """

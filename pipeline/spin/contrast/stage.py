@@ -66,7 +66,12 @@ class ContrastParameters(ParameterGroup):
     rival_sigmas: float = tunable(1.2, 0.0, 20.0, 0.1, "sigma", "lead that the best spin must have over any other")
     # On 110 simulated flights that contrast answers rightly one in a hundred is farther away than 5.7.
     flow_sigmas: float = tunable(
-        6.0, 0.0, 100.0, 0.5, "sigma", "distance from the normal flow's spin beyond which it is in doubt, unless settled"
+        6.0,
+        0.0,
+        100.0,
+        0.5,
+        "sigma",
+        "distance from the normal flow's spin that puts it in doubt, unless it is settled",
     )
     smallest_patch_rad: float = tunable(
         0.18, 0.0, 1.5, 0.01, "rad", "spread of the logo's events over the ball (rms) below which it is not seen"
@@ -309,9 +314,7 @@ def _result(
     middle_us, half_us = answer.reference_s * 1e6, 0.5e6 * answer.span_s
     stretch_us = round(middle_us - half_us), round(middle_us + half_us), middle_us
     curves, offsets_px = (column.copy() for column in state.score_map), answer.offsets_px.copy()
-    return ContrastResult(
-        estimate, *best, *rivals, *stretch_us, offsets_px, answer.contrast, turns_seen, full, *curves
-    )
+    return ContrastResult(estimate, *best, *rivals, *stretch_us, offsets_px, answer.contrast, turns_seen, full, *curves)
 
 
 def is_trusted(estimates: Mapping[str, SpinEstimate]) -> bool:

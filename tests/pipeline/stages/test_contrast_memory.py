@@ -121,20 +121,24 @@ def test_only_where_nothing_turns_is_normal_flow_doubted_with_contrast() -> None
 
 
 @pytest.mark.parametrize(
-    ("changes", "settled"),
+    ("scanned_turns", "changes", "settled"),
     [
-        ({"span_s": 0.041}, True),  # two turns of 50 rps
-        ({"span_s": 0.039}, False),
-        ({"span_s": 0.041, "margins": np.array([9.0, 3.7])}, True),  # three times 1.2 sigma
-        ({"span_s": 0.041, "margins": np.array([9.0, 3.5])}, False),
+        (2.05, {}, True),
+        (1.95, {}, False),
+        (2.05, {"margins": np.array([9.0, 3.7])}, True),  # three times 1.2 sigma
+        (2.05, {"margins": np.array([9.0, 3.5])}, False),
+        (2.05, {"contrast": 0.86}, True),
+        (2.05, {"contrast": 0.84}, False),  # following has lost more than 15 %
     ],
 )
-def test_an_answer_is_settled_after_two_turns_with_a_clear_lead(changes: dict[str, Any], settled: bool) -> None:
+def test_an_answer_is_settled_by_a_scan_over_two_turns_with_a_clear_lead(
+    scanned_turns: float, changes: dict[str, Any], settled: bool
+) -> None:
     parameters = contrast.ContrastParameters()
     state = contrast.start(parameters, CONTEXT)
     assert not contrast._settled(parameters, state)
     rivals = {"rivals_rps": np.zeros((len(changes.get("margins", ())), 3))}
-    state.answer = answered(**changes, **rivals)
+    state.answer, state.scanned_turns, state.followed_contrast = answered(**changes, **rivals), scanned_turns, 1.0
     assert contrast._settled(parameters, state) == settled
     state.reason = "in doubt"
     assert not contrast._settled(parameters, state)

@@ -1,0 +1,120 @@
+"""What contrast states beyond its events' noise (polarities, near rivals, fast flight), and its likelihood."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spinscope.pipeline.results import SpinEstimate
+from spinscope.pipeline.spin.contrast import estimate as contrast
+from spinscope.pipeline.spin.contrast import uncertainty
+from spinscope.pipeline.spin.contrast.estimate import LOG_ODDS_PER_SIGMA, estimate_spin, follow_spin
+from spinscope.pipeline.spin.contrast.events import BallUncertainty, ContrastSettings
+from spinscope.pipeline.spin.contrast.result import UNEXPLAINED, ContrastResult
+from tests.reference.contrast import dotted_ball
+
+BALL = BallUncertainty(centre_std_px=0.2, radius_std_px=0.2)
+SPIN = np.array([40.0, -25.0, 20.0])
+
+
+def twist(speed_px_s: float, turns: float) -> np.ndarray:
+    spin = 2 * math.pi * SPIN
+    events = dotted_ball(SPIN)
+    ball = replace(BALL, speed_px_s=speed_px_s)
+    return uncertainty._twist(events, ball, spin, turns / float(np.linalg.norm(SPIN)))
+
+
+def test_a_fast_flight_leaves_the_turn_about_the_logos_middle_open() -> None:
+    events = dotted_ball(SPIN)
+    middle = events.normals.mean(axis=1)
+    middle /= np.linalg.norm(middle)
+    spun_px_s = 2 * math.pi * float(np.linalg.norm(SPIN)) * float(events.radius_px.mean())
+    off = 0.06 / 0.4 * 0.75 * 2 * math.pi * float(SPIN @ middle)  # three quarters of the edges' speed are the flight's
+    np.testing.assert_allclose(twist(3 * spun_px_s, 0.4), off**2 * np.outer(middle, middle), rtol=1e-9)
+    assert not twist(0.0, 0.4).any()
+
+
+def test_the_logo_that_has_come_back_has_told_the_magnitude() -> None:
+    axis = SPIN / np.linalg.norm(SPIN)
+    assert axis @ twist(10_000.0, 0.4) @ axis > axis @ twist(10_000.0, 0.8) @ axis > 0.0
+    once = twist(10_000.0, 1.0)
+    assert axis @ once @ axis == pytest.approx(0.0, abs=1e-9) and np.trace(once) > 0.0
+
+
+def test_polarities_that_disagree_are_stated() -> None:
+    """ON events that drift over the disc, OFF events that do not."""
+    events = dotted_ball(SPIN, duration_s=0.01, events=600)
+    shift = events.t_s - events.t_s.mean()
+    rising = events.polarity == 1
+    drifting = events.normals.copy()
+    drifting[0] += np.where(rising, 20.0 * shift, 0.0)  # 20 radii a second across the image
+    drifting /= np.linalg.norm(drifting, axis=0)
+    agree = estimate_spin(events, BALL, ContrastSettings(), starts_rps=SPIN[None])
+    disagree = estimate_spin(replace(events, normals=drifting), BALL, ContrastSettings(), starts_rps=SPIN[None])
+    assert np.trace(disagree.kept_rps2) > 4.0 * np.trace(agree.kept_rps2)
+
+
+def test_following_keeps_what_only_a_full_estimate_finds() -> None:
+    events = dotted_ball(SPIN, duration_s=0.04, events=900)
+    first = estimate_spin(events.at(events.t_s < 0.012), BALL, ContrastSettings())
+    known = replace(first, kept_rps2=9.0 * np.eye(3))
+    plain, kept = (
+        follow_spin(events, BALL, ContrastSettings(), before)
+        for before in (replace(first, kept_rps2=np.zeros((3, 3))), known)
+    )
+    np.testing.assert_allclose(kept.covariance_rps2 - plain.covariance_rps2, 9.0 * np.eye(3), atol=1e-9)
+    np.testing.assert_array_equal(kept.rivals_rps, first.rivals_rps)
+
+
+def test_each_rival_has_a_covariance() -> None:
+    events = dotted_ball(SPIN, duration_s=0.012, events=300)
+    answer = estimate_spin(events, BALL, ContrastSettings(), starts_rps=np.stack([SPIN, -SPIN]))
+    assert len(answer.rivals_rps) == len(answer.rival_covariances_rps2) == len(answer.margins) > 0
+    assert all(np.linalg.eigvalsh(covariance).min() > 0 for covariance in answer.rival_covariances_rps2)
+
+
+@pytest.mark.parametrize(("margin", "widened"), [(2.6, True), (2.8, False)])
+def test_a_near_rival_widens_the_error_unless_its_odds_are_negligible(margin: float, widened: bool) -> None:
+    events = dotted_ball(SPIN, duration_s=0.012, events=300)
+    plain = estimate_spin(events, BALL, ContrastSettings(), starts_rps=SPIN[None])
+    some, stretch = contrast._centred(events)
+    spins = 2 * math.pi * np.stack([SPIN, 1.1 * SPIN])
+    given, margins = replace(plain, kept_rps2=np.zeros((3, 3))), np.array([0.0, margin])
+    answer, alone = (
+        contrast._with_alternatives(
+            given, some, spins[:count], np.array([0.0, margin])[:count], BALL, settings, stretch
+        )
+        for k in (2, 1)
+    )
+    odds = math.exp(-LOG_ODDS_PER_SIGMA * margin)
+    gap = 1.1 * SPIN - plain.spin_rps
+    expected = np.outer(gap, gap) * odds / (1.0 + odds) if widened else np.zeros((3, 3))
+    np.testing.assert_allclose(answer.kept_rps2 - alone.kept_rps2, expected, atol=1e-9)
+
+
+def result(**changes: object) -> ContrastResult:
+    nothing = ContrastResult.nothing(SpinEstimate.refused("contrast", "in doubt"))
+    known = {
+        "best_rps": SPIN,
+        "covariance_rps2": np.eye(3),
+        "rivals_rps": -SPIN[None],
+        "rival_covariances_rps2": 4.0 * np.eye(3)[None],
+        "rival_sigmas": np.array([1.5]),
+        "turns_seen": True,
+    }
+    return replace(nothing, **(known | changes))
+
+
+def test_the_likelihood_of_a_spin_is_that_of_its_nearest_candidate() -> None:
+    spins = np.stack([SPIN, SPIN + np.eye(3)[0], -SPIN, -SPIN + 2.0 * np.eye(3)[1], [0, 0, 90.0]])
+    rival = -1.5 * LOG_ODDS_PER_SIGMA
+    np.testing.assert_allclose(result().log_likelihood(spins), [0.0, -0.5, rival, rival - 0.5, UNEXPLAINED])
+
+
+def test_where_nothing_turns_no_spin_is_likelier() -> None:
+    assert not result(turns_seen=False).log_likelihood(np.stack([SPIN, -SPIN])).any()
+    nothing = ContrastResult.nothing(SpinEstimate.refused("contrast", "no ball"))
+    assert nothing.log_likelihood(SPIN).tolist() == [0.0]
