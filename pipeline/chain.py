@@ -29,7 +29,7 @@ from .stage import Context, Stage
 from .track_evidence import NO_EVIDENCE, TrackEvidence
 
 if TYPE_CHECKING:
-    from .spin.contrast.stage import ContrastResult
+    from .spin.contrast.result import ContrastResult
     from .spin.trajectory.stage import TrajectoryResult
     from .stages.filter import FilterResult
     from .stages.flow import FlowResult

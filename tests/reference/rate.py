@@ -21,7 +21,7 @@ def naive_pattern(bins: Integers, normals: Floats, on: Flags, length: int, cells
 
 
 def naive_lag_sums(rows: Floats) -> tuple[Floats, Floats, float]:
-    """Sums of the products of all pairs of rows by lag, their bounds, and the mean square of those two or more apart."""
+    """Sums of the products of all pairs of rows by lag, their bounds, and the mean square from the second lag on."""
     n = len(rows)
     sums, bounds = np.zeros(n), np.zeros(n)
     squares = []

@@ -312,12 +312,14 @@ def _polarity_covariance(
     and Laird, "Meta-analysis in clinical trials", 1986).
     """
     assert answer.spin_rps is not None and answer.covariance_rps2 is not None
-    found, gains = [], []
+    found: list[Floats] = []
+    gains: list[float] = []
     for polarity in (0, 1):
         own = events.at(events.polarity == polarity)
         if len(own) < settings.min_events:
             return np.zeros((3, 3))
         alone = _refined(own, answer.spin_rps * TURN, ball, settings, stretch, answer.offsets_px, 2)
+        assert alone.spin_rps is not None
         found.append(alone.spin_rps)
         gains.append(max(alone.contrast, 0.0) * len(own))
     shares = gains[0] * gains[1] / max(gains[0] + gains[1], 1e-9) ** 2

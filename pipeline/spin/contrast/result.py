@@ -67,9 +67,22 @@ class ContrastResult(ReadOnlyArrays):
     @classmethod
     def nothing(cls, estimate: SpinEstimate) -> ContrastResult:
         """Nothing to see of a shot."""
-        best, rivals = (np.full(3, np.nan), np.full((3, 3), np.nan)), (np.empty((0, 3)), np.empty((0, 3, 3)))
-        sigmas, nowhere = np.empty(0), (0, 0, math.nan)
-        return cls(estimate, *best, *rivals, sigmas, *nowhere, np.zeros(3), 0.0, False, False, *ScoreMap.empty())
+        return cls(
+            estimate=estimate,
+            best_rps=np.full(3, np.nan),
+            covariance_rps2=np.full((3, 3), np.nan),
+            rivals_rps=np.empty((0, 3)),
+            rival_covariances_rps2=np.empty((0, 3, 3)),
+            rival_sigmas=np.empty(0),
+            start_us=0,
+            end_us=0,
+            reference_us=math.nan,
+            offsets_px=np.zeros(3),
+            contrast=0.0,
+            turns_seen=False,
+            full=False,
+            **ScoreMap.empty()._asdict(),
+        )
 
     def log_likelihood(self, spins_rps: Floats) -> Floats:
         """Log likelihood of spins, less that of the best one.

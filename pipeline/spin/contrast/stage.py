@@ -301,7 +301,6 @@ def _result(
     answer = state.answer
     if answer is None or answer.spin_rps is None or answer.covariance_rps2 is None:
         return ContrastResult.nothing(SpinEstimate.refused(METHOD, state.reason or "no estimate yet", count))
-    best = answer.spin_rps.copy(), answer.covariance_rps2.copy()
     estimate = SpinEstimate(METHOD, answer.spin_rps.copy(), answer.covariance_rps2.copy(), None, count)
     turns_seen = answer.contrast >= parameters.min_gain
     if state.reason is not None:
@@ -310,11 +309,23 @@ def _result(
     elif (sigmas := _apart(estimate, flow)) > parameters.flow_sigmas and not _settled(parameters, state):
         reason = f"the normal flow says {_words(flow.vector_rps)}, {sigmas:.0f} sigma from {_words(answer.spin_rps)}"
         estimate = SpinEstimate.refused(METHOD, reason, count, against=FLOW_METHOD)
-    rivals = answer.rivals_rps.copy(), answer.rival_covariances_rps2.copy(), answer.margins.copy()
     middle_us, half_us = answer.reference_s * 1e6, 0.5e6 * answer.span_s
-    stretch_us = round(middle_us - half_us), round(middle_us + half_us), middle_us
-    curves, offsets_px = (column.copy() for column in state.score_map), answer.offsets_px.copy()
-    return ContrastResult(estimate, *best, *rivals, *stretch_us, offsets_px, answer.contrast, turns_seen, full, *curves)
+    return ContrastResult(
+        estimate=estimate,
+        best_rps=answer.spin_rps.copy(),
+        covariance_rps2=answer.covariance_rps2.copy(),
+        rivals_rps=answer.rivals_rps.copy(),
+        rival_covariances_rps2=answer.rival_covariances_rps2.copy(),
+        rival_sigmas=answer.margins.copy(),
+        start_us=round(middle_us - half_us),
+        end_us=round(middle_us + half_us),
+        reference_us=middle_us,
+        offsets_px=answer.offsets_px.copy(),
+        contrast=answer.contrast,
+        turns_seen=turns_seen,
+        full=full,
+        **{name: column.copy() for name, column in state.score_map._asdict().items()},
+    )
 
 
 def is_trusted(estimates: Mapping[str, SpinEstimate]) -> bool:

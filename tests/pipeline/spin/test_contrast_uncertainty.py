@@ -84,9 +84,7 @@ def test_a_near_rival_widens_the_error_unless_its_odds_are_negligible(margin: fl
     spins = 2 * math.pi * np.stack([SPIN, 1.1 * SPIN])
     given, margins = replace(plain, kept_rps2=np.zeros((3, 3))), np.array([0.0, margin])
     answer, alone = (
-        contrast._with_alternatives(
-            given, some, spins[:count], np.array([0.0, margin])[:count], BALL, settings, stretch
-        )
+        contrast._with_alternatives(given, some, spins[:k], margins[:k], BALL, ContrastSettings(), stretch)
         for k in (2, 1)
     )
     odds = math.exp(-LOG_ODDS_PER_SIGMA * margin)
