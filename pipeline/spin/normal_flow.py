@@ -55,9 +55,8 @@ SEED = 1
 # The weakest direction of the spin must weigh this much against the strongest, or it is open; and an axis that is not
 # known to OPEN_DEG (1 sigma) is no answer: the paper's errors are as large.
 OPEN, OPEN_DEG = 1e-4, 25.0
-# The event rate's magnitude is not better than one percent: its crossings wander with the view of the logo. Nearer to
-# the axis than 30 degrees the line of sight's turning about it says nothing of when the logo reappears.
-RATE_FLOOR, STEADY_SIGHT = 0.01, 0.5
+# Nearer to the axis than 30 degrees the line of sight's turning about it says nothing of when the logo reappears.
+STEADY_SIGHT = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -302,7 +301,7 @@ class NormalFlowSpin:
             turned = math.atan2(float(axis @ np.cross(seen[0], seen[1])), float(seen[0] @ seen[1]))
             turned_rps = turned / TAU / max((self.seen.t_us[-1] - self.seen.t_us[0]) * 1e-6, 1e-6)
         off_rps = rate.spin_rps + turned_rps - float(np.linalg.norm(spin_rps))
-        variance = float(axis @ covariance_rps2 @ axis) + rate.spin_std_rps**2 + (RATE_FLOOR * rate.spin_rps) ** 2
+        variance = float(axis @ covariance_rps2 @ axis) + rate.spin_std_rps**2
         if off_rps**2 > 9.0 * variance:
             return spin_rps, covariance_rps2
         gain = covariance_rps2 @ axis / variance

@@ -43,6 +43,8 @@ SETTLED_TURNS, SETTLED = 2.0, 3.0
 # A spin that is off by one turn between the logo's visits fits those seen, not the next one: where following loses so
 # much of the contrast that it had, a full estimate is due at once, with a scan.
 LOST = 0.85
+# So it is when the logo has come back for the first time: before, the magnitude rested on how far it moved.
+RETURNED_TURNS = 1.2
 # ON and OFF, bright and dark pixels report 25 us sooner or later than the mean latency: what the ball flies meanwhile
 # is an error of its place that the tracker, which sees the outline, does not know of.
 LATENCY_SPREAD_S = 25e-6
@@ -152,6 +154,7 @@ def step(
         state.answer = follow_spin(events, _uncertainty(state), settings, state.answer)
         state.reason = _doubt(parameters, state.answer)
         full = state.answer.contrast < LOST * state.followed_contrast
+        full = full or state.scanned_turns < RETURNED_TURNS <= _turns(state.answer)
         state.followed_contrast = max(state.followed_contrast, state.answer.contrast)
     if full:
         _estimate(parameters, state, events, settings, normal_flow.estimate)
@@ -228,9 +231,14 @@ def _estimate(
     if answer is None or (worth_it and not _convinces(parameters, answer, normal_flow)):
         state.searched, scanning = len(events), True
         answer = estimate_spin(events, ball, settings, starts_rps=starts_rps)
-    if scanning and answer.spin_rps is not None:
-        state.scanned_turns = answer.span_s * float(np.linalg.norm(answer.spin_rps))
+    if scanning:
+        state.scanned_turns = _turns(answer)
     state.answer, state.reason = answer, _doubt(parameters, answer)
+
+
+def _turns(answer: ContrastEstimate) -> float:
+    """Number of turns that an answer's events saw; 0 without one."""
+    return 0.0 if answer.spin_rps is None else answer.span_s * float(np.linalg.norm(answer.spin_rps))
 
 
 def _settled(parameters: ContrastParameters, state: ContrastState) -> bool:
