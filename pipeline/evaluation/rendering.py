@@ -6,18 +6,30 @@ from contextlib import suppress
 from dataclasses import asdict
 
 from ..biases import PAPER, BiasParameters
+from ..camera import Camera
 from ..errors import RecordingError
 from ..recordings import open_recording
 from ..simulated_recordings import description_in, write_simulation
-from ..simulator import Scene, SensorModel, SimulatedRecording, simulate_scene
+from ..simulator import Lens, Scene, SensorModel, SimulatedRecording, default_camera, simulate_scene
 from .tasks import TaskContext, digest, make_folder, text_digest
 
 
-def render(context: TaskContext, scene: Scene, *, seed: int, biases: BiasParameters = PAPER) -> SimulatedRecording:
-    """The scene before the paper's camera at these biases, from the cache where it is there."""
+def render(
+    context: TaskContext,
+    scene: Scene,
+    *,
+    seed: int,
+    sensor: SensorModel | BiasParameters = PAPER,
+    camera: Camera | None = None,
+    lens: Lens | None = None,
+) -> SimulatedRecording:
+    """The scene before a camera (the paper's by default), from the cache where it is there."""
+    camera, lens = camera or default_camera(), lens or Lens()
     if context.cache is None:
-        return simulate_scene(scene, sensor=biases, seed=seed)
-    identity = digest([scene.to_dict(), asdict(SensorModel.of(biases)), seed, text_digest("simulator")])
+        return simulate_scene(scene, camera=camera, sensor=sensor, lens=lens, seed=seed)
+    array = SensorModel.of(sensor) if isinstance(sensor, BiasParameters) else sensor
+    parts = [scene.to_dict(), asdict(camera), asdict(array), asdict(lens)]
+    identity = digest([*parts, seed, text_digest("simulator")])
     place = context.cache / "recordings" / f"{identity}.h5"
     if place.exists():
         with suppress(RecordingError):  # damaged: rendered anew below
@@ -25,7 +37,7 @@ def render(context: TaskContext, scene: Scene, *, seed: int, biases: BiasParamet
             events, truth, description = kept.read(), kept.truth, description_in(kept.attributes)
             if truth is not None and description is not None and truth.label.size == len(events):
                 return SimulatedRecording(events, truth, kept.width_px, kept.height_px, scene, description)
-    made = simulate_scene(scene, sensor=biases, seed=seed)
+    made = simulate_scene(scene, camera=camera, sensor=sensor, lens=lens, seed=seed)
     make_folder(place.parent)
     write_simulation(made, place)
     return made
