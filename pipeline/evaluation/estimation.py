@@ -19,7 +19,7 @@ from ..shots import Shot
 from ..simulator import SimulatedRecording
 from ..simulator.sensor import LOGO
 from .tables import Cell, Row, distinct, share, summary, where
-from .uncertainty_calibration import ERRORS, STATED, is_answer
+from .uncertainty_calibration import ERRORS, STATED, is_answer, is_right
 
 Floats = NDArray[np.float64]
 
@@ -79,15 +79,15 @@ def spin_errors(found_rps: Floats, true_rps: Floats) -> tuple[float, float]:
     return abs(size - true_size), math.degrees(math.acos(min(max(cosine, -1.0), 1.0)))
 
 
-COLUMNS = ("method", "n", "success", "of those with logo", "magnitude error [rps]", "axis error [deg]")
+COLUMNS = ("method", "n", "success", "right", "of those with logo", "magnitude error [rps]", "axis error [deg]")
 
 
 def method_lines(rows: Sequence[Row], *labels: Cell) -> list[tuple[Cell, ...]]:
-    """One line a method under these labels and COLUMNS."""
+    """One line a method under these labels and COLUMNS; right: near the truth, see `is_right`."""
     lines: list[tuple[Cell, ...]] = []
     for method in distinct(rows, "method"):
         part = where(rows, method=method)
         magnitude, axis = (summary(part, name) for name in ERRORS)
         seen = share(where(part, visible=True), is_answer)
-        lines.append((*labels, method, len(part), axis.success, seen, magnitude, axis))
+        lines.append((*labels, method, len(part), axis.success, share(part, is_right), seen, magnitude, axis))
     return lines

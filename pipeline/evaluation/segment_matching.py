@@ -14,9 +14,8 @@ from ..simulator.segments import Segment
 from ..simulator.simulation import truth_of
 from .estimation import BEST, spin_errors
 from .tables import Row
-from .uncertainty_calibration import ERRORS, STATED
+from .uncertainty_calibration import ERRORS, STATED, is_right
 
-RIGHT_SHARE, RIGHT_DEG = 0.1, 20.0  # an answer within 10 % of the magnitude and 20 degrees of the axis is right
 SHORTEST_US = 20_000  # of flights that are asked for: four ticks
 BOTH_US = 7_500  # a shot has part in two flights from this much of each: a tick, and the 2 ms that a contact may be off
 RIGHT, WRONG, MIXED, REFUSED, MISSED = OUTCOMES = ("right", "wrong", "two spins for one", "refused", "missed")
@@ -72,8 +71,8 @@ def segment_rows(recording: SimulatedRecording, result: Result, about: Row) -> l
     """One row a free flight and method, and one for each trusted answer to what is no flight.
 
     Columns beside `about`, errors and stated errors: `ball`, `rps`, `logo_events`, `outcome` (of OUTCOMES), `reason`,
-    `pieces` (shots of this flight), `found_ms` (from where the flight begins to the shot's first tick), `begin_ms` and
-    `end_ms` (errors of the shot's ends where the flight has a contact there, None elsewhere).
+    `by` (method of the answer), `pieces` (shots of this flight), `found_ms` (from where the flight begins to the shot's
+    first tick), `begin_ms` and `end_ms` (errors of the shot's ends where the flight has a contact there, else None).
     """
     rows: list[Row] = []
     found, nobody = matches(recording, result.shots)
@@ -88,7 +87,7 @@ def segment_rows(recording: SimulatedRecording, result: Result, about: Row) -> l
         shot = match.shots[0] if match.shots else None
         common: Row = {**about, "ball": segment.ball, "rps": float(np.linalg.norm(segment.spin_rps))}
         common |= {"logo_events": segment.logo_events, "pieces": len(match.shots)}
-        common |= dict.fromkeys(("found_ms", "begin_ms", "end_ms", *ERRORS, *STATED, "reason"))
+        common |= dict.fromkeys(("by", "found_ms", "begin_ms", "end_ms", *ERRORS, *STATED, "reason"))
         if shot is None:
             common |= {"outcome": MISSED, "reason": result.no_shot_reason or "no shot of this flight"}
         else:
@@ -103,7 +102,7 @@ def segment_rows(recording: SimulatedRecording, result: Result, about: Row) -> l
     for shot in nobody:
         if shot.best is not None:
             row: Row = {**about, "ball": None, "rps": None, "logo_events": shot.logo_events, "pieces": 1}
-            row |= dict.fromkeys(("found_ms", "begin_ms", "end_ms", *ERRORS, *STATED, "reason"))
+            row |= dict.fromkeys(("by", "found_ms", "begin_ms", "end_ms", *ERRORS, *STATED, "reason"))
             rows.append(row | {"method": BEST, "outcome": INVENTED})
     return rows
 
@@ -116,10 +115,7 @@ def _answer(shot: Shot, method: str, segment: Segment, mixed: bool) -> Row:
     estimate = shot.estimates[name]
     if estimate.vector_rps is None:
         return {"outcome": REFUSED, "reason": estimate.reason}
-    errors = spin_errors(estimate.vector_rps, np.array(segment.spin_rps))
-    size = float(np.linalg.norm(segment.spin_rps))
-    outcome = RIGHT if errors[0] <= RIGHT_SHARE * size and errors[1] <= RIGHT_DEG else WRONG
-    row: Row = {"outcome": MIXED if mixed else outcome}
-    row |= zip(ERRORS, errors, strict=True)
+    row: Row = {"by": name, "rps": float(np.linalg.norm(segment.spin_rps))}
+    row |= zip(ERRORS, spin_errors(estimate.vector_rps, np.array(segment.spin_rps)), strict=True)
     row |= zip(STATED, (estimate.magnitude_std_rps, estimate.axis_std_deg), strict=True)
-    return row
+    return row | {"outcome": MIXED if mixed else RIGHT if is_right(row) else WRONG}

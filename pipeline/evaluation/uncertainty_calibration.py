@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from .tables import Cell, ResultTable, Row, share, where
 
 GROSS_RPS, GROSS_DEG = 10.0, 20.0  # an error beyond one of these is gross
+RIGHT_SHARE, RIGHT_DEG = 0.1, 20.0  # largest errors of an answer that counts as right
+RIGHT_NOTE = f"Right: within {RIGHT_SHARE:.0%} of the magnitude and {RIGHT_DEG:g} degrees of the axis."
 ERRORS = ("magnitude_error_rps", "axis_error_deg")  # columns of the rows
 STATED = ("magnitude_std_rps", "axis_std_deg")
 
@@ -26,6 +28,14 @@ def is_gross(row: Row) -> bool:
     """Whether an answer is far off."""
     magnitude, axis = row["magnitude_error_rps"], row["axis_error_deg"]
     return isinstance(magnitude, float) and isinstance(axis, float) and (magnitude > GROSS_RPS or axis > GROSS_DEG)
+
+
+def is_right(row: Row) -> bool:
+    """Whether there is an answer near the truth, of `rps`."""
+    magnitude, axis, rps = row["magnitude_error_rps"], row["axis_error_deg"], row["rps"]
+    if not (isinstance(magnitude, float) and isinstance(axis, float) and isinstance(rps, float)):
+        return False
+    return magnitude <= RIGHT_SHARE * rps and axis <= RIGHT_DEG
 
 
 def calibration_table(groups: Sequence[tuple[str, Sequence[Row]]], methods: Sequence[str]) -> ResultTable:

@@ -266,15 +266,15 @@ def sensed(draw: SceneSampler, **sensor: Any) -> RealScene:
     return draw.scene(Ball((draw.flight(),)), sensor=replace(SensorModel.of(), **sensor))
 
 
-def weak(draw: SceneSampler) -> RealScene:
-    """A sensor with high and uneven thresholds, slow pixels and more noise."""
+def weak_sensor(random: np.random.Generator) -> SensorModel:
+    """A sensor with high and uneven thresholds, above all for OFF events, slow pixels and more noise."""
     usual = SensorModel.of()
-    return sensed(
-        draw,
-        threshold_on=usual.threshold_on * draw.between(1.0, 1.2),
-        threshold_off=usual.threshold_off * draw.between(1.8, 2.6),
+    return replace(
+        usual,
+        threshold_on=usual.threshold_on * float(random.uniform(1.0, 1.3)),
+        threshold_off=usual.threshold_off * float(random.uniform(1.6, 2.4)),
         mismatch=0.1,
-        cutoff_hz=usual.cutoff_hz * draw.between(0.15, 0.3),
+        cutoff_hz=usual.cutoff_hz * float(random.uniform(0.05, 0.15)),
         noise_hz=4 * usual.noise_hz,
     )
 
@@ -392,7 +392,7 @@ def _kinds() -> dict[str, SceneKind]:
             "jitter": lambda d: sensed(d, jitter_us=50.0),
             "noise": lambda d: sensed(d, noise_hz=10 * SensorModel.of().noise_hz, hot_share=0.03),
             "dead_time": lambda d: sensed(d, refractory_us=d.between(800.0, 1500.0)),
-            "weak": weak,
+            "weak": lambda d: d.scene(Ball((d.flight(),)), sensor=weak_sensor(d.random)),
         },
         "edges and several balls": {
             "edge": edge,

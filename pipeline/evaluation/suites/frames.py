@@ -11,6 +11,7 @@ from ..frame_matching import spin_from_frames
 from ..plots import flight_figure
 from ..tables import Cell, ResultTable, Row
 from ..tasks import Task, TaskContext
+from ..uncertainty_calibration import RIGHT_NOTE
 from . import thrower
 
 LABEL = "Frame camera against event camera: the paper's table 2"
@@ -60,7 +61,7 @@ NOTE = (
     "Every third of the thrower's flights. Frame: 380 frames a second, 1.5 times the resolution, 0.5 ms of exposure. "
     "The rival is stronger than the paper's (Tebbe 2020): it knows the logo that is printed on the ball, is told "
     "roughly where the ball is, so it never takes anything else for it, and fits all frames of the flight at once, "
-    "where Tebbe's matches the logo of neighbouring frames."
+    "where Tebbe's matches the logo of neighbouring frames. " + RIGHT_NOTE
 )
 
 figures = flight_figure

@@ -15,7 +15,7 @@ from ..plots import LABELS, Figures, coverage_figure, curve, label_axes, method_
 from ..rendering import render
 from ..tables import Cell, ResultTable, Row, distinct, summary, where
 from ..tasks import Task, TaskContext
-from ..uncertainty_calibration import ERRORS, Goal, calibration_table, goals, refusals
+from ..uncertainty_calibration import ERRORS, RIGHT_NOTE, Goal, calibration_table, goals, refusals
 
 LABEL = "Ball spinner: the paper's table 1"
 HELP = "Spin of a mounted ball: 7 logos, 10 to 100 rps, windows of 10 and 100 ms (table 1)."
@@ -81,7 +81,7 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
             ("window", "spin", *COLUMNS),
             [line for ms, group, part in _groups(rows) for line in method_lines(part, f"{ms} ms", group)],
             "Success counts answers over recordings; 'of those with logo' leaves out windows with fewer than 1,000 "
-            "(100 ms) or 100 (10 ms) logo events.",
+            "(100 ms) or 100 (10 ms) logo events. " + RIGHT_NOTE,
         ),
         calibration_table(windows, methods),
         _goals(rows),

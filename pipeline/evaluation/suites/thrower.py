@@ -19,7 +19,7 @@ from ..plots import Figures, coverage_figure, flight_figure
 from ..rendering import render
 from ..tables import ResultTable, Row, distinct, where
 from ..tasks import Task, TaskContext
-from ..uncertainty_calibration import Goal, calibration_table, goals, refusals
+from ..uncertainty_calibration import RIGHT_NOTE, Goal, calibration_table, goals, refusals
 
 LABEL = "Ball thrower: the paper's table 2"
 HELP = "Spin of flying balls: the thrower's settings and shots as people play them (table 2)."
@@ -129,7 +129,7 @@ def _goals(own: Sequence[Row]) -> ResultTable:
 
 NOTE = (
     f"'of those with logo': flights with at least {VISIBLE} logo events. Without a ball, or where a method refuses, "
-    "an answer counts as failed."
+    "an answer counts as failed. " + RIGHT_NOTE
 )
 
 

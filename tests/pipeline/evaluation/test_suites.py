@@ -146,3 +146,21 @@ def test_runtime(cache: Path) -> None:
     for _, _, _, _, spin, contrast, everything in report.tables[0].rows[1:]:
         assert spin.mean > 0 and contrast.mean > 0  # type: ignore[union-attr]
         assert everything.mean > spin.mean + contrast.mean  # type: ignore[union-attr]
+
+
+def test_scenes(cache: Path) -> None:
+    report = run("scenes", cache)
+    best = where(report.rows, method="best")
+    assert {row["kind"] for row in best} == {"davis346", "bounce", "crossing"}
+    assert len(best) >= 5  # one flight, two with a bounce between them, two that cross
+    (small,) = where(best, kind="davis346")
+    assert small["outcome"] == "right" and float(str(small["found_ms"])) < 10
+
+
+def test_flights(cache: Path) -> None:
+    rows = run("flights", cache).rows
+    best = where(rows, method="best")
+    assert [row["class"] for row in best] == ["visible", "hidden", "weak sensor"]
+    assert [row["visible"] for row in best] == [True, False, True]
+    assert best[0]["outcome"] == "right" and best[0]["by"] == "contrast"
+    assert best[1]["outcome"] in ("right", "refused")  # a hidden logo is never answered wrongly
