@@ -75,6 +75,8 @@ ON: Colour = (239, 83, 80)
 OFF: Colour = (66, 145, 245)
 ON_REMOVED: Colour = (122, 62, 60)
 OFF_REMOVED: Colour = (44, 77, 122)
+OFF_FLICKER: Colour = (112, 96, 24)
+ON_FLICKER: Colour = (168, 148, 44)
 HOUGH_COLOUR: Colour = (255, 213, 79)
 MEASURED_COLOUR: Colour = (255, 138, 50)
 KALMAN_COLOUR: Colour = (76, 217, 100)
@@ -101,12 +103,14 @@ SHOT_COLOURS: dict[str, Colour] = {
     BEGAN_WORDS["bounce"]: (236, 112, 99),
     BEGAN_WORDS["hit"]: (255, 167, 38),
 }
-# Classes of the raw events: 2 x (kept by the surface's filter) + (ON).
+# Classes of the raw events: 4 x (lamp flicker) + 2 x (kept by the surface's filter) + (ON).
 EVENT_CLASSES: tuple[tuple[str, Colour], ...] = (
     ("OFF, filtered out", OFF_REMOVED),
     ("ON, filtered out", ON_REMOVED),
     ("OFF", OFF),
     ("ON", ON),
+    ("OFF, lamp flicker", OFF_FLICKER),
+    ("ON, lamp flicker", ON_FLICKER),
 )
 HUES_DEG = {"red": 0, "orange": 33, "yellow": 50, "yellow-green": 90, "green": 125, "cyan": 187, "blue": 215}
 HUES_DEG |= {"violet": 282, "pink": 335}

@@ -34,7 +34,7 @@ BESIDE_PX, TRACK_TICKS = 4.0, 100
 
 
 def filter_chunks(run: ViewedRun) -> list[Chunk]:
-    """Raw events in the colours of their polarity, dimmed where the surface's filter took them out."""
+    """Raw events in the colours of their polarity, dimmed where the surface's filter took them out; lamps' flicker."""
     total = sum(len(tick.packet.events) for tick in run.ticks)
     chosen = slice(None, None, max(1, -(-total // EVENTS_SHOWN)))
     positions, classes = [], []
@@ -42,7 +42,8 @@ def filter_chunks(run: ViewedRun) -> list[Chunk]:
         events, kept, start_us = tick.packet.events, tick.filter.surface_events, tick.packet.start_us
         is_kept = np.isin(_keys(events, start_us)[chosen], _keys(kept, start_us))
         positions.append(np.stack([events.x_px[chosen], events.y_px[chosen]], axis=1))
-        classes.append(2 * is_kept.astype(np.uint16) + events.on[chosen])
+        is_flicker = np.isin(_keys(events, start_us)[chosen], _keys(tick.filter.flicker_events, start_us))
+        classes.append(4 * is_flicker.astype(np.uint16) + 2 * is_kept + events.on[chosen])
     width, height = run.camera.width_px, run.camera.height_px
     frame = rr.Boxes2D(mins=[[-0.5, -0.5]], sizes=[[width, height]], colors=[at.MASK_COLOUR], radii=[-0.5])
     return [once(at.FRAME, frame), *_events(run, at.EVENTS, positions, classes, radius_ui=1.0)]

@@ -1,4 +1,4 @@
-"""EROS, the exponential reduced ordinal surface (section 3.1; Gava 2022), exactly, with one byte a pixel.
+"""EROS, the exponential reduced ordinal surface (section 3.1; Gava 2022), exactly, with one byte a pixel; and TOS.
 
 The reference multiplies the k x k block (k odd) around each event by d = 0.3^(1/k) and sets the event's pixel
 to 255, in float64, and rounds when the surface is read. After n such fades a pixel holds 255 d^n, which reads
@@ -7,8 +7,18 @@ fade takes one off, never below 0, and a table turns levels into values. Equal t
 the benchmark compares the speed with the reference and with the naive loop in float32 (16 x slower at k =
 21).
 
+TOS, the threshold-ordinal surface (Glover 2022), takes 1 off the block around each event and sets to 0 what falls
+below 255 - 2 k: the same count with another table.
+
 Levels are kept flat, the rows MARGIN_PX apart and so many rows above and below them: a block needs no check
 for the image's border. The margins' levels are always 0, for no event sets them.
+
+References
+----------
+L. Gava, M. Monforte, M. Iacono, C. Bartolozzi, A. Glover, "PUCK: parallel surface and convolution-kernel tracking for
+event-based cameras", 2022.
+A. Glover, A. Dinale, L. De Souza Rosa, S. Bamford, C. Bartolozzi, "luvHarris: a practical corner detector for
+event-cameras", IEEE Transactions on Pattern Analysis and Machine Intelligence 44(12), 2022.
 """
 
 from __future__ import annotations
@@ -43,6 +53,12 @@ def value_table(k_px: int) -> Bytes:
     while np.rint(falling[-1]) > 0:
         falling.append(falling[-1] * decay)
     return np.rint(falling[::-1]).astype(np.uint8)
+
+
+def threshold_table(k_px: int) -> Bytes:
+    """Value of each level of TOS: (levels + 1,) uint8; 0, then from 255 - 2 k to 255 (k = 7: 241, as published)."""
+    lowest = 255 - 2 * odd_px(k_px)
+    return np.array([0, *range(lowest, 256)], np.uint8)
 
 
 @njit(cache=True, nogil=True)

@@ -16,7 +16,7 @@ from ..results import Packet, ReadOnlyArrays
 from ..stage import Context, Stage
 from .filter import FilterResult
 
-KINDS = ("eros", "accumulated", "linear")
+KINDS = ("eros", "tos", "accumulated", "linear")
 # The rules of removal, and whether each is the printed kernel.
 CLEANINGS = {"off": None, "isolated": False, "printed": True}
 
@@ -25,9 +25,9 @@ CLEANINGS = {"off": None, "isolated": False, "printed": True}
 class SurfaceParameters(ParameterGroup):
     """Kind of surface, and its cleaning."""
 
-    kind: str = choice("eros", KINDS, "EROS, accumulated frame or linear time surface")
+    kind: str = choice("eros", KINDS, "EROS, threshold-ordinal surface (TOS), accumulated frame or linear time surface")
     k_px: int = tunable(
-        10, 1, eros.K_MAX_PX, 1, "px", "EROS: width of the block that an event fades (forced odd, 10 -> 11)"
+        10, 1, eros.K_MAX_PX, 1, "px", "EROS, TOS: width of the block that an event fades (forced odd, 10 -> 11)"
     )
     span_us: int = tunable(2000, 100, 100_000, 100, "us", "accumulated, linear: how far back in time it shows")
     cleaning: str = choice("isolated", tuple(CLEANINGS), "removal of isolated pixels before the search")
@@ -66,14 +66,27 @@ class SurfaceResult(ReadOnlyArrays):
         return window
 
 
-class ErosSurface:
-    """EROS: an event sets its pixel to 255 and fades the block around it (section 3.1; see kernels.eros)."""
+class OrdinalSurface:
+    """EROS or TOS: an event sets its pixel to 255 and fades the block around it (section 3.1; see kernels.eros).
 
-    def __init__(self, parameters: SurfaceParameters, width_px: int, height_px: int) -> None:
+    Parameters
+    ----------
+    table : callable
+        Values of the levels for a width of the block, px.
+    """
+
+    def __init__(
+        self,
+        parameters: SurfaceParameters,
+        width_px: int,
+        height_px: int,
+        *,
+        table: Callable[[int], NDArray[np.uint8]],
+    ) -> None:
         self._width_px, self._height_px = width_px, height_px
         self._k_px = eros.odd_px(parameters.k_px)
         self._levels = eros.empty_levels(width_px, height_px)  # flat uint8, see the kernel
-        self._table = eros.value_table(parameters.k_px)
+        self._table = table(parameters.k_px)
 
     def update(self, packet: Packet, events: EventBatch) -> NDArray[np.uint8]:
         """Draw the tick's events and return the (height, width) uint8 surface at its end."""
@@ -108,10 +121,11 @@ class LastEventSurface:
         return values
 
 
-Surface = ErosSurface | LastEventSurface
+Surface = OrdinalSurface | LastEventSurface
 # The choices of surface.kind, each with what draws it.
 _SURFACES: dict[str, Callable[[SurfaceParameters, int, int], Surface]] = {
-    "eros": ErosSurface,
+    "eros": partial(OrdinalSurface, table=eros.value_table),
+    "tos": partial(OrdinalSurface, table=eros.threshold_table),
     "accumulated": partial(LastEventSurface, is_linear=False),
     "linear": partial(LastEventSurface, is_linear=True),
 }

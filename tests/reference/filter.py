@@ -47,3 +47,19 @@ class NaiveFilter:
         if self.mode == "stc":
             return same and pause_us <= self.threshold_us
         return same and pause_us <= self.threshold_us and pixel not in self.passed_since_change
+
+
+class NaiveFlicker:
+    """Every pixel remembers all bins of its events of each polarity."""
+
+    def __init__(self, flicker_hz: int) -> None:
+        self.flicker_hz = flicker_hz
+        self.bins: dict[tuple[int, int, bool], set[int]] = {}
+
+    def is_flicker(self, t_us: int, x_px: int, y_px: int, on: bool) -> bool:
+        """Whether this event, the next one, came one and two periods before, to within a bin of a sixteenth."""
+        here = t_us * 16 * self.flicker_hz // 1_000_000
+        seen = self.bins.setdefault((x_px, y_px, on), set())
+        found = all(any(here - lag + off in seen for off in (-1, 0, 1)) for lag in (16, 32))
+        seen.add(here)
+        return found

@@ -24,6 +24,26 @@ class NaiveEros:
         return np.rint(self.surface).astype(np.uint8)
 
 
+class NaiveTos:
+    """TOS as luvHarris has it: an event takes 1 off the block around it and what falls below the threshold is 0."""
+
+    def __init__(self, width_px: int, height_px: int, k_px: int) -> None:
+        k_px = k_px if k_px % 2 else k_px + 1
+        self.half, self.threshold = k_px // 2, 255 - 2 * k_px
+        self.surface = np.zeros((height_px, width_px), np.int64)
+
+    def draw(self, x_px: NDArray[np.uint16], y_px: NDArray[np.uint16]) -> None:
+        half = self.half
+        for x, y in zip(x_px.tolist(), y_px.tolist(), strict=True):
+            block = self.surface[max(y - half, 0) : y + half + 1, max(x - half, 0) : x + half + 1]
+            block -= 1
+            block[block < self.threshold] = 0
+            self.surface[y, x] = 255
+
+    def read(self) -> NDArray[np.uint8]:
+        return self.surface.astype(np.uint8)
+
+
 def eros_float32_loop(
     surface: NDArray[np.float32],
     x_px: NDArray[np.uint16],

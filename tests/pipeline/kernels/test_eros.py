@@ -1,4 +1,4 @@
-"""Life counters equal the reference's float64 EROS, to the last of the rounded bits."""
+"""Life counters equal the reference's float64 EROS, to the last of the rounded bits, and TOS."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from spinscope.pipeline.kernels import eros
 from tests.columns import read_only
-from tests.reference.surface import NaiveEros
+from tests.reference.surface import NaiveEros, NaiveTos
 
 SAMPLES = sorted((Path(__file__).parents[3] / "sample_recordings").glob("*.h5"))
 
@@ -34,14 +34,23 @@ class Fast:
         return values
 
 
+class FastTos(Fast):
+    """The same with the table of TOS."""
+
+    def __init__(self, width_px: int, height_px: int, k_px: int) -> None:
+        super().__init__(width_px, height_px, k_px)
+        self.table = eros.threshold_table(k_px)
+
+
 def assert_equal_streams(
     width_px: int, height_px: int, k_px: int, packets: list[tuple[NDArray[np.uint16], NDArray[np.uint16]]]
 ) -> None:
-    fast, slow = Fast(width_px, height_px, k_px), NaiveEros(width_px, height_px, k_px)
-    for x_px, y_px in packets:
-        fast.draw(x_px, y_px)
-        slow.draw(x_px, y_px)
-        assert np.array_equal(fast.read(), slow.read())
+    for kind, twin in ((Fast, NaiveEros), (FastTos, NaiveTos)):
+        fast, slow = kind(width_px, height_px, k_px), twin(width_px, height_px, k_px)
+        for x_px, y_px in packets:
+            fast.draw(x_px, y_px)
+            slow.draw(x_px, y_px)
+            assert np.array_equal(fast.read(), slow.read())
 
 
 @given(
@@ -84,6 +93,10 @@ def test_whole_recordings_equal_the_reference(path: Path) -> None:
         width, height = int(file.attrs["width"]), int(file.attrs["height"])
     cuts = range(0, x.size, max(1, x.size // 4))
     assert_equal_streams(width, height, 10, [(x[i : i + cuts.step], y[i : i + cuts.step]) for i in cuts])
+
+
+def test_the_threshold_is_the_published_one() -> None:
+    assert eros.threshold_table(7)[:2].tolist() == [0, 241]
 
 
 def test_the_margins_stay_empty() -> None:

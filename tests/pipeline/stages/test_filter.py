@@ -84,3 +84,32 @@ def test_equal_settings_are_filtered_once_and_off_copies_nothing() -> None:
     all_off = FilterParameters(mode="off", contour_mode="off", logo_mode="off", threshold_us=1)
     result = stage.step(all_off, stage.start(all_off, CONTEXT), packet)
     assert result.surface_events is result.contour_events is result.logo_events is packet.events
+
+
+@pytest.mark.parametrize("lamps", ["mains_50hz", "mains_60hz"])
+def test_flicker_is_taken_out_before_the_filters_and_handed_on(lamps: str) -> None:
+    beat_us = {"mains_50hz": 10_000, "mains_60hz": 8_333}[lamps]
+    parameters = FilterParameters(lamps=lamps, mode="trail", threshold_us=200, contour_mode="off", logo_mode="off")
+    state = stage.start(parameters, CONTEXT)
+    shown: list[tuple[int, int, int, bool]] = []
+    removed: list[tuple[int, int, int, bool]] = []
+    first_us = START_US // TICK_US * TICK_US
+    for index in range(60):
+        start_us = first_us + index * TICK_US
+        (noise, *_) = packets(seed=index, ticks=1, events_a_tick=3)
+        t = noise.events.t_us - START_US + start_us
+        beats = np.array([b for b in range(first_us, first_us + 60_000, beat_us) if start_us <= b < start_us + TICK_US])
+        lamp = EventBatch(
+            beats.astype(np.int64), np.full(beats.size, 4, np.uint16), np.full(beats.size, 3, np.uint16), beats > 0
+        )
+        both = EventBatch.concatenate([EventBatch(t, noise.events.x_px, noise.events.y_px, noise.events.on), lamp])
+        order = np.argsort(both.t_us, kind="stable")
+        packet = Packet(index, start_us, start_us + TICK_US, EventBatch(*(c[order] for c in both.columns)))
+        result = stage.step(parameters, state, packet)
+        assert sorted(rows(result.logo_events) + rows(result.flicker_events)) == sorted(rows(packet.events))
+        shown += rows(result.surface_events)
+        removed += rows(result.flicker_events)
+    assert {event[1:3] for event in removed if event[0] % beat_us == first_us % beat_us} == {(4, 3)}
+    assert len([event for event in removed if event[1:3] == (4, 3)]) >= 4
+    assert len(removed) < 12  # 180 of noise: hardly any comes again twice
+    assert not set(removed) & set(shown)

@@ -23,7 +23,7 @@ from spinscope.pipeline.stages import filter as filter_stage
 from spinscope.pipeline.stages import surface as stage
 from spinscope.pipeline.stages.filter import FilterParameters, FilterResult
 from spinscope.pipeline.stages.surface import SurfaceParameters, SurfaceResult
-from tests.reference.surface import NaiveEros, cleaned, recent_events
+from tests.reference.surface import NaiveEros, NaiveTos, cleaned, recent_events
 
 WIDTH, HEIGHT, TICK_US = 45, 31, 1000  # neither is a multiple of a word
 CONTEXT = Context(Camera.of(CameraParameters(), WIDTH, HEIGHT), 0.02, {"spin.max_spin_rps": 150.0})
@@ -66,6 +66,14 @@ def test_eros_equals_the_reference_at_every_tick(k_px: int) -> None:
         assert np.array_equal(result.values, twin.read())
 
 
+@pytest.mark.parametrize("k_px", [1, 7, 10, 32, 49])
+def test_tos_equals_its_twin_at_every_tick(k_px: int) -> None:
+    twin = NaiveTos(WIDTH, HEIGHT, k_px)
+    for packet, result in zip(packets(), run(SurfaceParameters(kind="tos", k_px=k_px)), strict=True):
+        twin.draw(packet.events.x_px, packet.events.y_px)
+        assert np.array_equal(result.values, twin.read())
+
+
 @pytest.mark.parametrize("kind", ["accumulated", "linear"])
 @pytest.mark.parametrize("span_us", [300, 1000, 2500])
 def test_the_other_kinds_look_back_across_ticks(kind: str, span_us: int) -> None:
@@ -76,7 +84,7 @@ def test_the_other_kinds_look_back_across_ticks(kind: str, span_us: int) -> None
         assert np.array_equal(result.values, expected)
 
 
-@pytest.mark.parametrize("kind", ["eros", "accumulated", "linear"])
+@pytest.mark.parametrize("kind", stage.KINDS)
 def test_results_are_fresh_and_read_only(kind: str) -> None:
     results = run(SurfaceParameters(kind=kind))
     for one, other in itertools.combinations(results, 2):
