@@ -1,7 +1,7 @@
 """Make Spinscope's own sample recordings anew: `uv run python sample_recordings/make.py [FOLDER]`.
 
 The same versions of Spinscope and its libraries give the same events, bit for bit. Each of them is what
-`spinscope simulate KIND` writes with these options.
+`spinscope simulate KIND` writes with these options, or a scene of `real_scenes.KINDS`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from typing import Any
 
 from spinscope.app.terminal import ProgressBar, note
 from spinscope.pipeline.biases import read_biases
-from spinscope.pipeline.simulated_recordings import WrittenSimulation, simulate_to_file
+from spinscope.pipeline.simulated_recordings import WrittenSimulation, simulate_to_file, write_simulation
+from spinscope.pipeline.simulator.real_scenes import KINDS, real_scene
 
 FOLDER = Path(__file__).parent / "own"
 
@@ -35,6 +36,12 @@ SAMPLES: dict[str, tuple[str, dict[str, Any]]] = {
     ),
     "shot_paper_biases": ("flight", {**TWICE, "biases": read_biases(FOLDER / "paper.bias")}),
     "shot_factory_biases": ("flight", {**TWICE, "biases": read_biases(FOLDER / "factory.bias")}),
+    "bounce": ("bounce", {"seed": 1111}),
+    "two_balls": ("relay", {"seed": 1112}),
+    "shot_hidden_side": (
+        "flight",
+        {"spin": "left", "magnitude_rps": 35.0, "speed_m_s": 6.0, "heading_deg": 80.0, "seed": 1113},
+    ),
     "rally": ("rally", {**HALF, "shots": 6, "duration_ms": 20_000.0, "seed": 1109}),
 }
 
@@ -43,6 +50,8 @@ def make(name: str, folder: Path) -> WrittenSimulation:
     """Simulate one sample into a folder; raises SpinscopeError."""
     kind, options = SAMPLES[name]
     with ProgressBar() as bar:
+        if kind in KINDS:
+            return write_simulation(real_scene(kind, options["seed"]).simulate(bar), folder / f"{name}.h5")
         return simulate_to_file(kind, folder / f"{name}.h5", on_progress=bar, **options)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from spinscope.pipeline.biases import FACTORY, PAPER
 from spinscope.pipeline.recordings import open_recording
 from spinscope.pipeline.simulated_recordings import BIASES, DESCRIPTION
 from spinscope.pipeline.simulator import Scene, SensorModel
+from spinscope.pipeline.simulator.segments import Segment
 
 FOREIGN = sorted(FOLDER.parent.glob("*.h5"))
 OWN = [FOLDER / f"{name}.h5" for name in SAMPLES]
@@ -59,8 +61,12 @@ def test_our_own_hold_scene_seed_and_biases(path: Path) -> None:
     for motion in scene.balls[0].motions:
         row = np.searchsorted(truth.t_us, motion.start_s * 1e6)
         np.testing.assert_allclose(truth.spin_rps[row], motion.spin_rps)
-    pauses = np.count_nonzero(np.diff(truth.t_us) > 500)
-    assert pauses == len(scene.balls[0].motions) - 1 == (options.get("shots", 1) - 1)
+    motions = scene.balls[0].motions
+    pauses = sum(after.start_s > before.end_s for before, after in itertools.pairwise(motions))
+    assert np.count_nonzero(np.diff(truth.t_us) > 500) == pauses == (options.get("shots", 1) - 1)
+    found = [Segment(**segment) for segment in description["segments"]]
+    assert {segment.ball for segment in found} == set(range(len(scene.balls)))
+    assert len(found) >= len(motions)
 
 
 def test_the_smallest_is_made_again_bit_for_bit(tmp_path: Path) -> None:

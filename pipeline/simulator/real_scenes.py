@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..biases import PAPER, BiasParameters
 from ..camera import Camera, CameraParameters
 from ..errors import ParameterError
 from ..kernels.rotation import rotations
@@ -43,7 +44,7 @@ class RealScene:
     seed: int
     scene: Scene
     camera: Camera
-    sensor: SensorModel
+    sensor: SensorModel | BiasParameters
     lens: Lens
 
     @property
@@ -158,8 +159,7 @@ class SceneSampler:
         background = self.parts.get("background", Background(height_m=self.distance_m + self.between(0.12, 0.3)))
         parts = self.parts | {"background": background, "air": self.air, "up": self.up}
         scene = Scene(duration_s, balls, **parts, description=f"{self.kind}, seed {self.seed}")
-        array = sensor or SensorModel.of()
-        return RealScene(self.kind, self.seed, scene, self.camera, array, Lens(focus_m=self.distance_m))
+        return RealScene(self.kind, self.seed, scene, self.camera, sensor or PAPER, Lens(focus_m=self.distance_m))
 
     def among(self, **parts: Any) -> SceneSampler:
         """The same sampler with these parts of the scene."""
