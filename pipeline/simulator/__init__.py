@@ -1,7 +1,9 @@
 """A physically reasoned event camera in front of spinning table tennis balls, with exact truth."""
 
-from .scene import Air, Arm, Background, Ball, Fixed, Flight, Light, Scene
+from .real_scenes import RealScene, real_scene
+from .scene import Air, Arm, Background, Ball, Fixed, Flight, Light, Net, Rolling, Scene, Shake
 from .scenes import flight, rally, spinner
+from .segments import Segment
 from .sensor import Lens, SensorModel
 from .simulation import SimulatedRecording, default_camera, simulate_again, simulate_scene
 from .thrower import human_shot, thrown
@@ -15,13 +17,19 @@ __all__ = [
     "Flight",
     "Lens",
     "Light",
+    "Net",
+    "RealScene",
+    "Rolling",
     "Scene",
+    "Segment",
     "SensorModel",
+    "Shake",
     "SimulatedRecording",
     "default_camera",
     "flight",
     "human_shot",
     "rally",
+    "real_scene",
     "simulate_again",
     "simulate_scene",
     "spinner",
