@@ -111,7 +111,7 @@ def _answer(shot: Shot, method: str, segment: Segment, mixed: bool) -> Row:
     """Outcome and errors of one method's answer."""
     name = shot.best if method == BEST else method
     if name is None:
-        return {"outcome": REFUSED, "reason": "no method is trusted"}
+        return {"outcome": REFUSED, "reason": shot.best_reason}
     estimate = shot.estimates[name]
     if estimate.vector_rps is None:
         return {"outcome": REFUSED, "reason": estimate.reason}

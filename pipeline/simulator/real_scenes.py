@@ -18,10 +18,10 @@ from ..biases import PAPER, BiasParameters
 from ..camera import Camera, CameraParameters
 from ..errors import ParameterError
 from ..kernels.rotation import rotations
-from .flights import mounted, spin_direction
+from .flights import drawn_set_up, mounted, spin_direction
 from .logos import Logo
 from .motion import bounced, quaternion_of, trajectory, triple
-from .scene import Air, Arm, Background, Ball, Flight, Light, Motion, Net, Rolling, Scene, Shake
+from .scene import Air, Arm, Background, Ball, Flight, Light, Motion, Net, Rolling, Scene, Shake, Vector3
 from .sensor import Lens, SensorModel
 from .simulation import Progress, SimulatedRecording, simulate_scene
 
@@ -73,7 +73,7 @@ class SceneSampler:
         self.kind, self.seed = kind, seed
         self.random = np.random.default_rng([seed, *kind.encode()])
         self.optics, self.size_px = PAPER_CAMERA, (1280, 720)
-        self.up, self.distance_m, self.air = DOWN, 1.8, Air()
+        self.up, self.distance_m = DOWN, 1.8  # what the camera is believed to see
         self.parts: dict[str, Any] = {}
 
     def between(self, low: float, high: float) -> float:
@@ -91,6 +91,16 @@ class SceneSampler:
     def camera(self) -> Camera:
         """The camera."""
         return Camera.of(replace(self.optics, up=tuple(self.up)), *self.size_px)
+
+    @property
+    def set_up(self) -> tuple[Air, Vector3]:
+        """Air and plumb line, drawn from the seed."""
+        return drawn_set_up(self.camera, self.seed)
+
+    @property
+    def plumb(self) -> Floats:
+        """(3,) true up direction: that of gravity and the table."""
+        return np.array(self.set_up[1])
 
     def place(self, x_share: float, y_share: float, nearer_m: float = 0.0) -> Floats:
         """A place seen at this share of half the image from its middle."""
@@ -125,10 +135,11 @@ class SceneSampler:
     ) -> Flight:
         """The flight during span_s that is at a place with this velocity at a time of it."""
         turn = rotations(2 * np.pi * (span_s[0] - at_s) * spin)[0] @ self.seat(spin, -place)
+        air, up = self.set_up
         start, its_velocity = place - (at_s - span_s[0]) * velocity, velocity
         for _ in range(6):  # converges by a factor of ten a round
             here = Flight(*span_s, triple(start), triple(its_velocity), triple(spin), quaternion_of(turn))
-            there = trajectory(here, Ball((here,)), Scene(1.0, (), air=self.air, up=self.up)).at([at_s])
+            there = trajectory(here, Ball((here,)), Scene(1.0, (), air=air, up=up)).at([at_s])
             missed = velocity - there.velocity_m_s[0]
             its_velocity = its_velocity + missed
             start = start + place - there.position_m[0] - (at_s - span_s[0]) * missed
@@ -146,7 +157,8 @@ class SceneSampler:
 
     def after(self, before: Flight, velocity: Floats, spin: Floats, duration_s: float) -> Flight:
         """The flight that goes on from the end of another with this velocity and spin."""
-        end = trajectory(before, Ball((before,)), Scene(1.0, (), air=self.air, up=self.up))
+        air, up = self.set_up
+        end = trajectory(before, Ball((before,)), Scene(1.0, (), air=air, up=up))
         turn = quaternion_of(end.rotation[-1])
         return Flight(before.end_s, duration_s, triple(end.position_m[-1]), triple(velocity), triple(spin), turn)
 
@@ -157,7 +169,8 @@ class SceneSampler:
     def scene(self, *balls: Ball, duration_s: float = DURATION_S, sensor: SensorModel | None = None) -> RealScene:
         """The scene of these balls among the sampler's `parts`."""
         background = self.parts.get("background", Background(height_m=self.distance_m + self.between(0.12, 0.3)))
-        parts = self.parts | {"background": background, "air": self.air, "up": self.up}
+        air, up = self.set_up
+        parts = self.parts | {"background": background, "air": air, "up": up}
         scene = Scene(duration_s, balls, **parts, description=f"{self.kind}, seed {self.seed}")
         return RealScene(self.kind, self.seed, scene, self.camera, sensor or PAPER, Lens(focus_m=self.distance_m))
 
@@ -224,7 +237,7 @@ def bounce(draw: SceneSampler) -> RealScene:
     velocity = draw.course(draw.heading_deg(), draw.between(4.0, 8.0), -draw.between(0.2, 0.5))
     spin = draw.spin(velocity, 20.0, 70.0)
     before = replace(draw.flight(at_s, at_s, place=place, velocity=velocity, spin=spin), end_s=at_s)
-    up = np.array(draw.up)
+    up = draw.plumb
     leaving = bounced(velocity, spin, up, Ball.radius_m, draw.between(0.85, 0.93), draw.between(0.2, 0.3))
     height_m = -float(place @ up) + Ball.radius_m
     background = draw.parts.get("background", Background())
@@ -322,13 +335,14 @@ def relay(draw: SceneSampler) -> RealScene:
 
 def rolling(draw: SceneSampler) -> RealScene:
     """A flight above a ball that rolls on the table."""
-    up, below = np.array(draw.up), draw.between(0.12, 0.25)
+    up, below = draw.plumb, draw.between(0.12, 0.25)
     velocity = draw.course(draw.between(0.0, 360.0), draw.between(0.5, 1.5))
+    velocity = velocity - (velocity @ up) * up
     spin = np.cross(up, velocity) / (2 * math.pi * Ball.radius_m)
     place = draw.place(draw.between(-0.5, 0.5), draw.between(-0.4, 0.4), -below)
     turn = quaternion_of(draw.seat(spin, -place))
     rolls = Rolling(0.0, DURATION_S, triple(place - MIDDLE_S * velocity), triple(velocity), triple(spin), turn)
-    draw.among(background=Background(height_m=draw.distance_m + below + Ball.radius_m))
+    draw.among(background=Background(height_m=Ball.radius_m - float(place @ up)))
     return draw.scene(Ball((draw.flight(),)), Ball((rolls,)))
 
 
