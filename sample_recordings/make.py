@@ -36,11 +36,11 @@ SAMPLES: dict[str, tuple[str, dict[str, Any]]] = {
     ),
     "shot_paper_biases": ("flight", {**TWICE, "biases": read_biases(FOLDER / "paper.bias")}),
     "shot_factory_biases": ("flight", {**TWICE, "biases": read_biases(FOLDER / "factory.bias")}),
-    "bounce": ("bounce", {"seed": 1111}),
+    "bounce": ("bounce", {"seed": 1122}),
     "two_balls": ("relay", {"seed": 1112}),
     "shot_hidden_side": (
         "flight",
-        {"spin": "left", "magnitude_rps": 35.0, "speed_m_s": 6.0, "heading_deg": 80.0, "seed": 1113},
+        {"spin": "left", "magnitude_rps": 35.0, "speed_m_s": 6.0, "heading_deg": 80.0, "seed": 1137},
     ),
     "rally": ("rally", {**HALF, "shots": 6, "duration_ms": 20_000.0, "seed": 1109}),
 }
