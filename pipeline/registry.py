@@ -13,7 +13,7 @@ from .camera import BallParameters, CameraParameters
 from .extensions import Registry
 from .parameters import ParameterGroup, ParameterSet
 from .results import SpinEstimate
-from .spin import contrast, normal_flow, trajectory, triplet
+from .spin import combined, contrast, normal_flow, trajectory, triplet
 from .stage import SpinMethod, Stage
 from .stages import filter, flow, logo, rate, surface, track
 
@@ -34,6 +34,7 @@ for _stage in (
     normal_flow.STAGE,
     contrast.STAGE,
     trajectory.STAGE,
+    combined.STAGE,
 ):
     STAGES.register(_stage)
 

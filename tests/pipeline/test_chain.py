@@ -32,10 +32,11 @@ INPUTS = {
     "normal_flow": ("packet", "logo", "flow", "rate"),
     "contrast": ("packet", "ball", "logo", "normal_flow"),
     "trajectory": ("packet", "ball"),
+    "combined": ("packet", "rate", "normal_flow", "contrast", "trajectory"),
 }
 OF_RECORDING = ("filter", "surface", "track")
-BELOW_LOGO = {"logo", "rate", "flow", "triplet", "normal_flow", "contrast"}
-ALL_BUT_CONTRAST = tuple(name for name in INPUTS if name != "contrast")
+BELOW_LOGO = {"logo", "rate", "flow", "triplet", "normal_flow", "contrast", "combined"}
+ALL_BUT_CONTRAST = tuple(name for name in INPUTS if name not in ("contrast", "combined"))
 
 
 @dataclass(frozen=True)
@@ -141,10 +142,10 @@ def test_an_unchanged_run_computes_nothing_again(calls: dict[str, int]) -> None:
     [
         ("logo.pad_px=3", BELOW_LOGO),
         ("surface.k_px=5", set(INPUTS) - {"filter"}),
-        ("spin.triplet_solve=least_squares", {"triplet", "normal_flow", "contrast"}),
+        ("spin.triplet_solve=least_squares", {"triplet", "normal_flow", "contrast", "combined"}),
         ("spin.max_spin_rps=90", BELOW_LOGO - {"logo"} | {"trajectory"}),
         ("rate.bin_us=1000", BELOW_LOGO - {"logo"}),
-        ("contrast.kernel_rad=0.05", {"contrast"}),
+        ("contrast.kernel_rad=0.05", {"contrast", "combined"}),
         ("filter.mode=off", set(INPUTS)),
     ],
 )
@@ -222,7 +223,7 @@ def test_what_is_not_wanted_is_not_run_and_what_was_known_of_it_stays(calls: dic
     calls.update(dict.fromkeys(calls, 0))
     assert len(list(chain.run(DEFAULT, ticks=7))) == 7
     assert all(tick.get("contrast") is None for tick in chain.run(DEFAULT, ALL_BUT_CONTRAST))
-    assert calls == {**dict.fromkeys(INPUTS, 20), "contrast": 7}
+    assert calls == {**dict.fromkeys(INPUTS, 20), "contrast": 7, "combined": 7}
     assert [tick.contrast for tick in chain.run(DEFAULT)] == whole
     assert calls == dict.fromkeys(INPUTS, 20)
 
@@ -415,12 +416,15 @@ def test_a_stage_that_raises_leaves_no_half_column(toys: Toys) -> None:
     assert [tick.contrast for tick in chain.run(DEFAULT)] == [tick.contrast for tick in Chain(source()).run(DEFAULT)]
 
 
-@pytest.mark.parametrize("limit", [{"budget_bytes": 10 * 20 * 1000 + 6 * 20 * 1000}, {"max_columns": 10 + 6}])
+COLUMNS = len(INPUTS) + len(BELOW_LOGO)  # of one whole run and one from logo on
+
+
+@pytest.mark.parametrize("limit", [{"budget_bytes": COLUMNS * 20 * 1000}, {"max_columns": COLUMNS}])
 def test_the_budget_drops_what_was_not_used_for_longest(
     calls: dict[str, int], monkeypatch: pytest.MonkeyPatch, limit: dict[str, int]
 ) -> None:
     monkeypatch.setattr(chain_module, "nbytes", lambda result: 1000)
-    chain = Chain(source(), **limit)  # one whole run and one from logo on
+    chain = Chain(source(), **limit)
     for pad in (1, 2, 3):
         list(chain.run(DEFAULT.with_assignments([f"logo.pad_px={pad}"])))
     before = dict(calls)
