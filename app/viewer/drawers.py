@@ -16,6 +16,7 @@ from .run import ViewedRun
 from .score import score_chunks
 from .shot_marks import shot_mark_chunks
 from .summary import summary_chunks
+from .witnesses import witness_chunks
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +56,7 @@ for _drawer in (
     Drawer(name="rate", stage="rate", plots=(plots.RATE_PLOT, plots.CROSSING_PLOT)),
     Drawer(name="flow", stage="flow", draw=image.flow_chunks),
     Drawer(name="score", draw=score_chunks),
+    Drawer(name="witnesses", stage="combined", draw=witness_chunks),
     Drawer(name="spin", plots=(plots.MAGNITUDE_PLOT, plots.COMPONENT_PLOT, plots.AXIS_ERROR_PLOT)),
     Drawer(name="ball", draw=ball_chunks),
     Drawer(name="derotated_logo", draw=derotated_logo_chunks),

@@ -37,6 +37,7 @@ GRATICULE = "/unrolled/graticule"
 # The score of contrast, over magnitudes and over directions of the axis.
 SCORE_MAGNITUDE = "/score"
 SCORE_AXES = "/score_axes"
+WITNESSES = "/witnesses"
 
 # Over time.
 TRACKER = "/tracker"

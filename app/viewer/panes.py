@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from . import entities as at
 from .ball import EYE, path_bounds_m
 from .run import ViewedRun
+from .witnesses import bounds as witness_bounds
 
 Floats = NDArray[np.float64]
 
@@ -71,6 +72,11 @@ def score_over_magnitude() -> rrb.View:
     """Score of contrast over magnitudes along the best axis."""
     corner = rrb.PlotLegend(corner="LeftTop")  # the maximum is in the middle
     return rrb.BarChartView(origin=at.SCORE_MAGNITUDE, name="Contrast over spin [rps]", plot_legend=corner)
+
+
+def witnesses() -> rrb.View:
+    """Axis and magnitude that each witness tells."""
+    return picture(at.WITNESSES, "Witnesses: axis and magnitude, 2 sigma", bounds=witness_bounds())
 
 
 def status() -> rrb.View:

@@ -141,7 +141,7 @@ def _spin(run: ViewedRun) -> rrb.Container:
     score = panes.picture(at.SCORE_AXES, "Contrast over axes: towards camera, away")
     return rrb.Horizontal(
         rrb.Vertical(panes.ball(run), unrolled, row_shares=[3, 2]),
-        rrb.Vertical(panes.score_over_magnitude(), score, row_shares=[4, 3]),
+        rrb.Vertical(panes.score_over_magnitude(), score, panes.witnesses(), row_shares=[4, 3, 5]),
         rrb.Vertical(*(plot.view(run) for plot in shown)),
         rrb.Vertical(panes.text(at.SUMMARY, "Summary"), panes.contacts(), row_shares=[4, 1]),
         column_shares=[4, 4, 3, 4],

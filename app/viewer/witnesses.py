@@ -1,0 +1,156 @@
+"""Drawing of the witnesses of a spin: the axis that each tells, with its 2 sigma ellipse, and its magnitudes."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from spinscope.pipeline.registry import STAGES
+from spinscope.pipeline.spin import combined
+from spinscope.pipeline.spin.combined import CombinedResult, Witness
+from spinscope.pipeline.stage import SpinMethod
+
+from . import entities as at
+from .rerun_api import Chunk, columns_at, once, styled
+from .run import ViewedRun
+
+Floats = NDArray[np.float64]
+
+# Two discs of axes, those towards the camera and those away from it, and below them bars over magnitude.
+DISC_RADIUS_PX, GAP_PX = 100.0, 20.0
+WIDTH_PX = 4 * DISC_RADIUS_PX + GAP_PX
+BARS_TOP_PX, ROW_PX = 2 * DISC_RADIUS_PX + 24.0, 16.0
+MAX_RPS, GRID_RPS = 150.0, 50.0
+SIGMAS = 2.0
+ELLIPSE_POINTS = 49
+# Every witness that there may be, in the order of the chain, the combined answer last; the truth below all.
+NAMES = ("rate", "normal_flow", "contrast", "trajectory", combined.METHOD)
+TRUTH = "truth"
+Strips = list[Floats]
+
+
+def witness_chunks(run: ViewedRun) -> list[Chunk]:
+    """Ellipses and bars at every tick; empty where a witness tells nothing."""
+    results = run.results(combined.METHOD)
+    if not results:
+        return []
+    chunks = [*_frame()]
+    for row, name in enumerate(NAMES):
+        chunks += _drawn(run, name, _colour(name), [_strips(_said(result, name), row) for result in results])
+    if run.true_spins_rps is not None:
+        truth = [
+            _strips(Witness(TRUTH, spin, np.zeros((3, 3)), float(np.linalg.norm(spin)), 0.5), len(NAMES))
+            if np.isfinite(spin).all() and spin.any()
+            else []
+            for spin in run.true_spins_rps
+        ]
+        chunks += _drawn(run, TRUTH, at.TRUTH_COLOUR, truth)
+    return chunks
+
+
+def _said(result: CombinedResult, name: str) -> Witness | None:
+    """What a witness says by itself, or the combined answer; None where it says nothing."""
+    estimate = result.estimate
+    if name != combined.METHOD:
+        return next((one for one in result.witnesses if one.name == name), None)
+    if estimate.vector_rps is None:
+        return None
+    spin = estimate.vector_rps, estimate.covariance_rps2
+    return Witness(name, *spin, estimate.magnitude_rps, estimate.magnitude_std_rps)
+
+
+def _colour(name: str) -> at.Colour:
+    stage = STAGES[name]
+    return stage.colour if isinstance(stage, SpinMethod) else at.RATE_COLOUR
+
+
+def _drawn(run: ViewedRun, name: str, colour: at.Colour, ticks: list[Strips]) -> list[Chunk]:
+    entity = f"{at.WITNESSES}/{name}"
+    columns = rr.LineStrips2D.columns(strips=[strip for strips in ticks for strip in strips])
+    return [
+        styled(entity, rr.LineStrips2D, colors=colour, radii=-1.8),
+        columns_at(entity, run.times_us, columns, [0, *map(len, ticks)]),
+    ]
+
+
+def _strips(witness: Witness | None, row: int) -> Strips:
+    """Lines of one witness: its ellipse with a cross at its axis, and its bar with a tick at its magnitude."""
+    if witness is None:
+        return []
+    strips: Strips = []
+    if witness.spin_rps is not None and witness.covariance_rps2 is not None:
+        strips += _ellipse(witness.spin_rps, witness.covariance_rps2)
+    if witness.magnitude_rps is not None and witness.magnitude_std_rps is not None:
+        y, middle = BARS_TOP_PX + ROW_PX * (row + 0.5), witness.magnitude_rps
+        reach = SIGMAS * witness.magnitude_std_rps
+        strips.append(np.column_stack([_bar_x(np.array([middle - reach, middle + reach])), [y, y]]))
+        strips.append(np.column_stack([_bar_x(np.array([middle, middle])), [y - 4, y + 4]]))
+    return strips
+
+
+def _bar_x(magnitudes_rps: Floats) -> Floats:
+    """Columns of magnitudes, px; those beyond the scale stand at its end."""
+    x: Floats = np.clip(magnitudes_rps, 0.0, MAX_RPS) * (WIDTH_PX / MAX_RPS)
+    return x
+
+
+def _ellipse(spin_rps: Floats, covariance_rps2: Floats) -> Strips:
+    """The ellipse of the axis on the two discs, in pieces where it leaves one of them, and a cross at the axis."""
+    magnitude = float(np.linalg.norm(spin_rps))
+    if magnitude == 0.0:
+        return []
+    axis = spin_rps / magnitude
+    across = np.eye(3) - np.outer(axis, axis)
+    values, vectors = np.linalg.eigh(across @ covariance_rps2 @ across)
+    reaches = vectors[:, 1:] * (SIGMAS * np.sqrt(np.maximum(values[1:], 0.0)) / magnitude)
+    angle = np.linspace(0.0, 2 * np.pi, ELLIPSE_POINTS)
+    points = axis + np.outer(np.cos(angle), reaches[:, 0]) + np.outer(np.sin(angle), reaches[:, 1])
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    pieces = np.split(points, np.flatnonzero(np.diff(points[:, 2] < 0)) + 1)
+    place = _on_discs(axis[None])[0]
+    arms = 3.0 * np.array([[[-1.0, 0.0], [1.0, 0.0]], [[0.0, -1.0], [0.0, 1.0]]])
+    return [*(_on_discs(piece) for piece in pieces if len(piece) > 1), *(place + arms)]
+
+
+def _on_discs(axes: Floats) -> Floats:
+    """Places (n, 2) of unit vectors (n, 3), px: towards the camera on the left, away from it on the right."""
+    right = np.where(axes[:, 2] < 0, 0.0, 2 * DISC_RADIUS_PX + GAP_PX)
+    return np.stack([DISC_RADIUS_PX * (1 + axes[:, 0]) + right, DISC_RADIUS_PX * (1 + axes[:, 1])], axis=1)
+
+
+@cache
+def _frame() -> list[Chunk]:
+    """Rims of the discs, the bars' scale, and the names."""
+    angle = np.linspace(0.0, 2 * np.pi, 91)
+    rim = DISC_RADIUS_PX * (1 + np.column_stack([np.cos(angle), np.sin(angle)]))
+    bottom = BARS_TOP_PX + ROW_PX * (len(NAMES) + 1)
+    marks = np.arange(0.0, MAX_RPS + 1.0, GRID_RPS)
+    scale = [np.array([[x, BARS_TOP_PX], [x, bottom]]) for x in _bar_x(marks)]
+    rims = [rim, rim + np.array([2 * DISC_RADIUS_PX + GAP_PX, 0.0])]
+    labels = [(f"{mark:.0f} rps", (x, bottom + 8)) for mark, x in zip(marks, _bar_x(marks), strict=True)]
+    labels += [("towards the camera", (DISC_RADIUS_PX, -8.0)), ("away from it", (3 * DISC_RADIUS_PX + GAP_PX, -8.0))]
+    names = [*(STAGES[name].label for name in NAMES), "Truth"]
+    colours = [*map(_colour, NAMES), at.TRUTH_COLOUR]
+    places = [(-6.0, BARS_TOP_PX + ROW_PX * (row + 0.5)) for row in range(len(names))]
+    return [
+        once(f"{at.WITNESSES}/frame", rr.LineStrips2D([*rims, *scale], colors=[at.MASK_COLOUR], radii=[-0.7])),
+        once(
+            f"{at.WITNESSES}/labels",
+            rr.Points2D(
+                [*(place for _, place in labels), *places],
+                labels=[*(text for text, _ in labels), *names],
+                colors=[*[at.MASK_COLOUR] * len(labels), *colours],
+                radii=[-0.1] * len(labels) + [-3.0] * len(names),
+                show_labels=True,
+            ),
+        ),
+    ]
+
+
+def bounds() -> Floats:
+    """What is seen of the picture, (2, 2), px: x and y, from and to."""
+    bottom = BARS_TOP_PX + ROW_PX * (len(NAMES) + 1) + 24.0
+    return np.array([[-90.0, WIDTH_PX + 20.0], [-24.0, bottom]])
