@@ -233,12 +233,14 @@ def _by_flight(trajectory: TrajectoryResult, spins_rps: Floats) -> Floats:
 
 def _fallible(logs: Floats, highest: float, blunder: float) -> Floats:
     """Logarithmic likelihoods, highest at `highest`, of a witness that is wrong altogether with this probability."""
-    return np.logaddexp(math.log(1.0 - blunder) + logs - highest, math.log(blunder))
+    mixed: Floats = np.logaddexp(math.log(1.0 - blunder) + logs - highest, math.log(blunder))
+    return mixed
 
 
 def _log_mean(logs: Floats) -> Floats:
     """Logarithm of the mean over samples (candidates,)."""
-    return np.logaddexp.reduce(logs, axis=1) - math.log(logs.shape[1])
+    mean: Floats = np.logaddexp.reduce(logs, axis=1) - math.log(logs.shape[1])
+    return mean
 
 
 def _root(covariance: Floats) -> Floats:
@@ -339,9 +341,12 @@ def _summary(by_logo: bool, witnesses: tuple[Witness, ...]) -> str:
 
 
 def is_trusted(estimates: Mapping[str, SpinEstimate]) -> bool:
-    """Whether the witnesses answer together, and contrast does not do so alone with the same spin."""
-    estimate = estimates[METHOD]
-    return estimate.status == "ok"
+    """Whether the witnesses answer together where the pattern alone is not enough, or tells another spin."""
+    estimate, alone = estimates[METHOD], estimates["contrast"]
+    if estimate.vector_rps is None or alone.vector_rps is None:
+        return estimate.vector_rps is not None
+    apart = estimate.vector_rps - alone.vector_rps
+    return bool(apart @ apart > (NEAR * np.linalg.norm(alone.vector_rps)) ** 2)
 
 
 STAGE = SpinMethod(

@@ -93,7 +93,8 @@ def step(parameters: FilterParameters, state: FilterState, packet: Packet) -> Fi
         chosen = kernels.filter_events(last, state.width_px, events.columns, *pair[0], *pair[1])
         for setting, rows in dict(zip(pair, chosen, strict=True)).items():
             passed[setting] = EventBatch(*take_events(rows, events.columns))
-    return FilterResult(*(passed.get(setting, events) for setting in _settings(parameters)), removed)
+    surface_events, contour_events, logo_events = (passed.get(setting, events) for setting in _settings(parameters))
+    return FilterResult(surface_events, contour_events, logo_events, removed)
 
 
 def _settings(parameters: FilterParameters) -> tuple[Setting, Setting, Setting]:

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from ..camera import Camera
 from ..events import EventBatch
+from ..kernels import eros, neighbour_support
 from ..kernels import moving_circle as kernels
-from ..kernels import neighbour_support
 from ..kernels.take_events import take_events
 from ..results import Circle
-from .surface import ErosSurface, SurfaceParameters, SurfaceResult
+from .surface import OrdinalSurface, SurfaceParameters, SurfaceResult
 from .track_hough import candidates
 from .track_limits import Limits
 from .track_outline import Sighting, disc_share, sight
@@ -63,7 +63,7 @@ def look(
     supported = supported_events(events, camera)
     if len(supported) < LEAST_EVENTS:
         return first, found, excluded
-    drawing = ErosSurface(SurfaceParameters(), camera.width_px, camera.height_px)
+    drawing = OrdinalSurface(SurfaceParameters(), camera.width_px, camera.height_px, table=eros.value_table)
     drawn = SurfaceResult(drawing.drawn(supported), surface.cleaning)
     second, found, excluded_there = searching.circles(drawn, supported, stated, signed=False)
     excluded = excluded or excluded_there
