@@ -46,8 +46,8 @@ JUMP_M_S = 30.0
 MOST_FRICTION = 0.6
 # And its push at most turns round a fall from 3 m.
 MOST_PUSH_M_S = 15.0
-# Balls faster than this do not roll.
-ROLLING_M_S = 3.5
+# Balls faster than this do not roll, and no shorter path could show it: gravity bends it by a tenth of a pixel.
+ROLLING_M_S, ROLLED_US = 3.5, 100_000
 Kind = Literal["bounce", "hit"]
 
 
@@ -291,7 +291,7 @@ def rolls(path: list[PathPoint], camera: Camera, ball_radius_m: float) -> bool:
     Judged by the size of the acceleration, whatever its direction: camera.up may be unknown.
     """
     points = [point for point in path if point.circle is not None]
-    if len(points) < 4:
+    if len(points) < 4 or points[-1].end_us - points[0].end_us < ROLLED_US:
         return False
     circles = np.array([[c.x_px, c.y_px, c.radius_px] for point in points if (c := point.circle)])
     s = np.array([(point.end_us - points[0].end_us) * 1e-6 for point in points])
