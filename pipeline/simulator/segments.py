@@ -1,4 +1,4 @@
-"""Truth of free flights: what each ball does between two contacts, as far as it is in the image."""
+"""Truth of free flights: motions of balls between two contacts, as far as they are in the image."""
 
 from __future__ import annotations
 

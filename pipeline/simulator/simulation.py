@@ -69,7 +69,7 @@ class SimulatedRecording:
 
     @property
     def segments(self) -> list[Segment]:
-        """What each ball did between two contacts, as far as it was in the image."""
+        """Segments of all balls: their motions between two contacts, as far as they were in the image."""
         return [built(Segment, plain) for plain in self.description["segments"]]
 
     @property

@@ -160,7 +160,7 @@ def _answers(part: Sequence[Row]) -> tuple[Cell, ...]:
 
 
 def _flight_alone(classes: Sequence[tuple[str, Sequence[Row]]]) -> ResultTable:
-    """What the shape of the flight tells, beside the goals for hidden logos."""
+    """Answers of the shape of the flight alone, beside the goals for hidden logos."""
     lines: list[tuple[Cell, ...]] = []
     for name, part in classes:
         answers = [row for row in where(part, method="trajectory") if is_answer(row)]

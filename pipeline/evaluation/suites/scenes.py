@@ -113,7 +113,7 @@ def outcomes(part: Sequence[Row]) -> tuple[Cell, ...]:
 
 
 def _contacts(best: Sequence[Row]) -> ResultTable:
-    """How near to a contact the shots before and after it end and begin."""
+    """Distances from contacts to the ends of the shots before and after them."""
     lines: list[tuple[Cell, ...]] = []
     for kind in distinct(best, "kind"):
         for name, column in (("ends before", "end_ms"), ("begins after", "begin_ms")):
