@@ -91,7 +91,7 @@ class BallTick(StageResults):
 
     @property
     def best_reason(self) -> str | None:
-        """Why no estimate is trusted, in words for people; None where one is."""
+        """Reason for trusting no estimate, in words for people; None where one is."""
         return distrust_reason(self.estimates, self.evidence.doubt)
 
 
@@ -217,7 +217,7 @@ class _Column:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _BallInputs:
-    """What the stages of one ball take in tick number `index`: by name, their own results so far among them."""
+    """Inputs of the stages of one ball tick number `index`: by name, their own results so far among them."""
 
     index: int
     evidence: TrackEvidence

@@ -105,7 +105,7 @@ def trusted_method(estimates: Mapping[str, SpinEstimate], doubt: str | None = No
 
 
 def distrust_reason(estimates: Mapping[str, SpinEstimate], doubt: str | None = None) -> str | None:
-    """Why no estimate is trusted, in words for people; None where one is. See `trusted_method`.
+    """Reason for trusting no estimate, in words for people; None where one is. See `trusted_method`.
 
     Without doubt about the track the reasons are the methods' own refusals: that of the most accurate one, and
     those of a last resort.

@@ -52,7 +52,7 @@ def witness_chunks(run: ViewedRun) -> list[Chunk]:
 
 
 def _said(result: CombinedResult, name: str) -> Witness | None:
-    """What a witness says by itself, or the combined answer; None where it says nothing."""
+    """Evidence of one witness by itself, or the combined answer; None where it says nothing."""
     estimate = result.estimate
     if name != combined.METHOD:
         return next((one for one in result.witnesses if one.name == name), None)
@@ -151,6 +151,6 @@ def _frame() -> list[Chunk]:
 
 
 def bounds() -> Floats:
-    """What is seen of the picture, (2, 2), px: x and y, from and to."""
+    """Visible part of the picture, (2, 2), px: x and y, from and to."""
     bottom = BARS_TOP_PX + ROW_PX * (len(NAMES) + 1) + 24.0
     return np.array([[-90.0, WIDTH_PX + 20.0], [-24.0, bottom]])

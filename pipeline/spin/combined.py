@@ -44,7 +44,7 @@ SAMPLES: Floats = np.random.default_rng(0).standard_normal((256, 3))
 
 @dataclass(frozen=True, kw_only=True)
 class CombinedParameters(ParameterGroup):
-    """What is asked of the combined answer."""
+    """Limits of the combined answer."""
 
     odds: float = tunable(
         100.0, 1.0, 1e6, 1.0, "", "how many times more likely the spin must be than all others together"
@@ -311,7 +311,7 @@ def _words(spin_rps: Floats | None) -> str:
 def _witnesses(
     rate: RateResult, flow: SpinEstimate, contrast: ContrastResult, trajectory: TrajectoryResult
 ) -> tuple[Witness, ...]:
-    """What each witness says by itself, of those that say something."""
+    """Evidence of each witness by itself, of those that have any."""
     said = []
     for magnitude, std, _ in _rhythms(rate)[:1]:
         said.append(Witness("rate", None, None, magnitude, std))
@@ -327,7 +327,7 @@ def _witnesses(
 
 
 def _summary(by_logo: bool, witnesses: tuple[Witness, ...]) -> str:
-    """Who told what, in words."""
+    """Contributions of the witnesses, in words."""
     if not by_logo:
         return "magnitude from the rhythm of the logo's visits, axis from the flight"
     words = ["magnitude and axis from the logo's pattern"]

@@ -54,7 +54,7 @@ BeganBy = Literal["entered", "bounce", "hit", "start", "found"]
 
 @dataclass(frozen=True, slots=True)
 class Measuring:
-    """What measuring a ball needs beside the ball.
+    """Inputs of measuring a ball beside the ball.
 
     Attributes
     ----------

@@ -272,7 +272,7 @@ def _located(circles: Floats, camera: Camera, ball_radius_m: float) -> tuple[Flo
 
 
 def _kind(before_m_s: Floats, after_m_s: Floats, unsure_m_s: Floats, up: Floats) -> Kind:
-    """What the ball met: a table pushes up a ball that falls, and rubs it along by no more than its friction.
+    """Kind of the contact: a table pushes up a ball that falls, and rubs it along by no more than its friction.
 
     unsure_m_s (3,) is 2 sigma of the jump along its least known direction, that of the view; the rest is known well.
     """

@@ -75,7 +75,7 @@ def look(
 
 @dataclass(frozen=True, slots=True)
 class _Searching:
-    """What one search looks for."""
+    """Settings of one search."""
 
     end_us: int
     camera: Camera

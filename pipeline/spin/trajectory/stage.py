@@ -184,8 +184,8 @@ def _estimate(parameters: TrajectoryParameters, across: SpinAcross, count: int) 
 
 
 # Trusted where the axis is known to 20 degrees (1 sigma), the error up to which the paper's tables count an answer as
-# right, and the magnitude to 5 rps or 15 %, so that 2 sigma tell a slow spin from a fast one.
-TRUSTED_AXIS_DEG, TRUSTED_RPS, TRUSTED_SHARE = 20.0, 5.0, 0.15
+# right, and the magnitude to 5 rps or a tenth: where lift saturates, 150 rps at the most would else look known to 15 %.
+TRUSTED_AXIS_DEG, TRUSTED_RPS, TRUSTED_SHARE = 20.0, 5.0, 0.1
 
 
 def is_trusted(estimates: Mapping[str, SpinEstimate]) -> bool:
