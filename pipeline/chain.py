@@ -217,7 +217,7 @@ class _Column:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _BallInputs:
-    """Inputs of the stages of one ball tick number `index`: by name, their own results so far among them."""
+    """Inputs of the stages of one ball in tick number `index`: by name, their own results so far among them."""
 
     index: int
     evidence: TrackEvidence

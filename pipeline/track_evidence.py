@@ -89,7 +89,7 @@ class TrackEvidence:
 
     @property
     def doubt(self) -> str | None:
-        """Reason for trusting no spin of this ball, in words for people; None where the track gives no reason to doubt."""
+        """Reason for trusting no spin of this ball, in words for people; None where the track gives none."""
         if self.is_fixed:
             return None
         if self.first is None or self.most_in_row < FEWEST_IN_ROW or self.longest_row_us < SHORTEST_US:
