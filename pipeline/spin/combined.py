@@ -31,6 +31,8 @@ BLUNDER = {"normal_flow": 0.2, "rate": 0.1, "trajectory": 0.03}
 # The line of sight's own turn while the ball passes (0.7 rps at 9 m/s and 2 m), and the share to which the visits'
 # rhythm follows the spin: both are in the difference between the rhythm and the spin.
 SIGHT_RPS, RHYTHM_SHARE = 0.7, 0.01
+# A spin less likely than this is excluded by the flight (3 sigma).
+EXCLUDED = -4.5
 # Candidates this near to each other, as a part of the spin, are one spin.
 NEAR = 0.1
 # Beyond this spread (1 sigma) the flight names no axis; axes are drawn so many times as widely as it states.
@@ -139,15 +141,18 @@ def step(
         reason = contrast.estimate.reason or "the logo is not seen"
         return CombinedResult(SpinEstimate.refused(METHOD, reason), witnesses)
     spins_rps = np.stack([candidate.spins_rps for candidate in candidates])
-    logs = {"trajectory": _by_flight(trajectory, spins_rps)}
+    by_flight = _by_flight(trajectory, spins_rps)
+    logs = {"trajectory": by_flight}
     if by_logo:
+        logs = {"trajectory": _fallible(by_flight, BLUNDER["trajectory"])}
         logs |= {"normal_flow": _by_flow(normal_flow.estimate, spins_rps), "rate": _by_rate(rate, spins_rps)}
     own = np.array([candidate.log_likelihood for candidate in candidates])
     drawn = np.stack([candidate.log_weights for candidate in candidates])
     evidence = own + _log_mean(sum(logs.values(), drawn))
     best = int(np.argmax(evidence))
     # Flow and rhythm are of the same events as the pattern: they choose among its spins, but make none more certain.
-    weights = drawn + logs["trajectory"]
+    # Neither does a flight that excludes them all.
+    weights = drawn + np.where(by_flight.max(axis=1) > EXCLUDED, by_flight.T, 0.0).T
     estimate, rivals = _estimate(parameters, spins_rps, weights, evidence, best, by_logo, contrast.estimate.events)
     by_witness = {name: _log_mean(values) for name, values in logs.items()}
     by_witness["contrast" if by_logo else "rate"] = own
@@ -209,7 +214,7 @@ def _by_rate(rate: RateResult, spins_rps: Floats) -> Floats:
         return np.zeros(spins_rps.shape[:2])
     magnitudes = np.linalg.norm(spins_rps, axis=2)
     parts = [log - 0.5 * ((magnitudes - magnitude) / std) ** 2 for magnitude, std, log in rhythms]
-    return _fallible(np.logaddexp.reduce(parts), 0.0, BLUNDER["rate"])
+    return _fallible(np.logaddexp.reduce(parts), BLUNDER["rate"])
 
 
 def _by_flow(estimate: SpinEstimate, spins_rps: Floats) -> Floats:
@@ -218,22 +223,23 @@ def _by_flow(estimate: SpinEstimate, spins_rps: Floats) -> Floats:
         return np.zeros(spins_rps.shape[:2])
     off = spins_rps - estimate.vector_rps
     squares = np.einsum("ksi,ij,ksj->ks", off, np.linalg.inv(estimate.covariance_rps2), off)
-    return _fallible(-0.5 * squares, 0.0, BLUNDER["normal_flow"])
+    return _fallible(-0.5 * squares, BLUNDER["normal_flow"])
 
 
 def _by_flight(trajectory: TrajectoryResult, spins_rps: Floats) -> Floats:
-    """(candidates, samples) logarithmic likelihood of the flight's bend; zeros where there is no flight."""
+    """(candidates, samples) logarithmic likelihood of the flight's bend, less that of the likeliest spin; or zeros."""
     across = trajectory.across
     if across is None:
         return np.zeros(spins_rps.shape[:2])
     logs = trajectory.log_likelihood(spins_rps.reshape(-1, 3)).reshape(spins_rps.shape[:2])
     highest = float(trajectory.log_likelihood(across.magnitude_rps * across.axis)[0])
-    return _fallible(logs, max(highest, float(logs.max())), BLUNDER["trajectory"])
+    relative: Floats = logs - max(highest, float(logs.max()))
+    return relative
 
 
-def _fallible(logs: Floats, highest: float, blunder: float) -> Floats:
-    """Logarithmic likelihoods, highest at `highest`, of a witness that is wrong altogether with this probability."""
-    mixed: Floats = np.logaddexp(math.log(1.0 - blunder) + logs - highest, math.log(blunder))
+def _fallible(logs: Floats, blunder: float) -> Floats:
+    """Logarithmic likelihoods, 0 at most, of a witness that is wrong altogether with this probability."""
+    mixed: Floats = np.logaddexp(math.log(1.0 - blunder) + logs, math.log(blunder))
     return mixed
 
 
@@ -268,6 +274,8 @@ def _estimate(
     probabilities = np.exp(evidence - np.logaddexp.reduce(evidence))
     share = probabilities[near, None] * shares[near] / probabilities[near].sum()
     mean = np.einsum("ks,ksi->i", share, spins_rps[near])
+    # Spins about scattered axes have a mean that is shorter than they are.
+    mean *= np.sum(share * np.linalg.norm(spins_rps[near], axis=2)) / np.linalg.norm(mean)
     off = spins_rps[near] - mean
     covariance = np.einsum("ks,ksi,ksj->ij", share, off, off)
     # Few samples that count make the spread look too small.

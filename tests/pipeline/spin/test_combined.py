@@ -1,0 +1,160 @@
+"""The combined answer: witnesses choose among the pattern's spins, narrow its axis, and answer where it is hidden."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spinscope.pipeline.registry import Parameters, trusted_method
+from spinscope.pipeline.results import MethodResult, SpinEstimate
+from spinscope.pipeline.spin import combined
+from spinscope.pipeline.spin.combined import CombinedResult
+from spinscope.pipeline.spin.contrast.result import ContrastResult
+from spinscope.pipeline.spin.trajectory.stage import TrajectoryResult
+from spinscope.pipeline.stages import rate
+
+TOP, SLOW, OTHER = np.array([60.0, 5.0, 0.0]), np.array([1.0, 0.0, 1.0]), np.array([0.0, 45.0, 40.0])
+PARAMETERS = Parameters().group("combined")
+READS = {"trajectory.gyro_std_deg": 11.0}
+REFUSED = SpinEstimate.refused("contrast", "another spin explains the logo about as well")
+
+
+def pattern(
+    best: np.ndarray, rivals: list[np.ndarray], sigmas: list[float], axis_std_deg: float = 2.0
+) -> ContrastResult:
+    """Contrast that was refused, with its candidates."""
+    nothing = ContrastResult.nothing(REFUSED)
+    covariances = np.array([covariance(spin, axis_std_deg) for spin in (best, *rivals)])
+    return replace(
+        nothing,
+        best_rps=best,
+        covariance_rps2=covariances[0],
+        rivals_rps=np.array(rivals).reshape(-1, 3),
+        rival_covariances_rps2=covariances[1:],
+        rival_sigmas=np.array(sigmas),
+        turns_seen=True,
+        contrast=0.5,
+    )
+
+
+def covariance(spin: np.ndarray, axis_std_deg: float, magnitude_std: float = 0.1) -> np.ndarray:
+    squared = float(spin @ spin)
+    along = np.outer(spin, spin) / squared
+    return magnitude_std**2 * along + (math.radians(axis_std_deg)) ** 2 * squared * (np.eye(3) - along)
+
+
+class _Flight:
+    """Flight that tells the axis of `spin` to some degrees and nothing of its magnitude."""
+
+    def __init__(self, spin: np.ndarray, std_deg: float) -> None:
+        self.axis, self.std = spin / np.linalg.norm(spin), math.radians(std_deg)
+        self.along = np.array([0.0, 0.0, 1.0])
+        self.magnitude_rps, self.axis_std_rad = 60.0, self.std
+
+    def log_likelihood(self, spins: np.ndarray) -> np.ndarray:
+        spins = np.asarray(spins, float).reshape(-1, 3)
+        cosine = spins @ self.axis / np.maximum(np.linalg.norm(spins, axis=1), 1e-9)
+        return -0.5 * (np.arccos(np.clip(cosine, -1, 1)) / self.std) ** 2
+
+
+def flight(spin: np.ndarray | None, std_deg: float = 8.0) -> TrajectoryResult:
+    refused = TrajectoryResult(SpinEstimate.refused("trajectory", "too short"))
+    if spin is None:
+        return refused
+    made = _Flight(spin, std_deg)
+    estimate = SpinEstimate("trajectory", spin, covariance(spin, std_deg, 30.0), None)
+    return replace(refused, estimate=estimate, likelihood=made, across=made)  # type: ignore[arg-type]
+
+
+def rhythm(spins: list[float], logs: list[float] | None = None, reason: str | None = None) -> rate.RateResult:
+    result = rate.absent(Parameters().rate, "no ball")
+    logs = [0.0] * len(spins) if logs is None else logs
+    return replace(
+        result,
+        period_spins_rps=np.array(spins),
+        period_log_likelihoods=np.array(logs),
+        period_std_rps=0.2 if spins else math.nan,
+        period_reason=None if spins and reason is None else reason or "no period",
+    )
+
+
+def flow(spin: np.ndarray | None) -> MethodResult:
+    if spin is None:
+        return MethodResult(SpinEstimate.refused("normal_flow", "hardly seen"))
+    return MethodResult(SpinEstimate("normal_flow", spin, covariance(spin, 4.0, 2.0), None))
+
+
+def answered(
+    contrast: ContrastResult,
+    trajectory: TrajectoryResult | None = None,
+    period: rate.RateResult | None = None,
+    normal_flow: MethodResult | None = None,
+) -> CombinedResult:
+    return combined.step(
+        PARAMETERS, READS, period or rhythm([]), normal_flow or flow(None), contrast, trajectory or flight(None)
+    )  # type: ignore[arg-type]
+
+
+def angle_deg(one: np.ndarray, other: np.ndarray) -> float:
+    cosine = one @ other / np.linalg.norm(one) / np.linalg.norm(other)
+    return math.degrees(math.acos(min(max(float(cosine), -1.0), 1.0)))
+
+
+def test_two_spins_that_explain_the_logo_are_left_open_by_the_pattern_alone() -> None:
+    result = answered(pattern(SLOW, [TOP], [0.5]))
+    assert result.estimate.status == "refused"
+    assert "two spins open" in (result.estimate.reason or "")
+
+
+def test_one_witness_that_may_be_wrong_is_not_enough_and_two_choose_the_rival() -> None:
+    two = pattern(SLOW, [TOP], [0.5])
+    by_flight = answered(two, flight(TOP))
+    assert by_flight.estimate.status == "refused", "a flight may be another ball's"
+    result = answered(two, flight(TOP), rhythm([60.2]))
+    assert result.estimate.vector_rps is not None
+    assert np.linalg.norm(result.estimate.vector_rps - TOP) < 3.0
+    assert "the flight" in result.summary and "the rhythm" in result.summary
+    assert {one.name for one in result.witnesses if one.log_odds > 1.0} == {"rate", "trajectory"}
+
+
+def test_witnesses_against_a_clear_pattern_do_not_turn_it_over() -> None:
+    result = answered(pattern(TOP, [OTHER], [6.0]), flight(OTHER), rhythm([60.2]), flow(OTHER))
+    assert result.estimate.vector_rps is not None
+    assert np.linalg.norm(result.estimate.vector_rps - TOP) < 3.0
+    assert "against" in result.summary
+
+
+def test_the_flight_narrows_an_axis_and_flow_of_the_same_events_does_not() -> None:
+    wide = pattern(TOP, [], [], axis_std_deg=14.0)
+    alone, with_flow = answered(wide), answered(wide, None, None, flow(TOP))
+    assert "axis is too uncertain" in (alone.estimate.reason or "")
+    assert "axis is too uncertain" in (with_flow.estimate.reason or "")
+    truth = TOP + np.array([0.0, 8.0, 0.0])
+    narrowed = answered(wide, flight(truth, 6.0)).estimate
+    assert narrowed.axis_std_deg is not None and narrowed.axis_std_deg < 10.0
+    assert narrowed.vector_rps is not None and angle_deg(narrowed.vector_rps, truth) < angle_deg(TOP, truth)
+
+
+def test_a_hidden_logo_is_answered_by_rhythm_and_flight_together_only() -> None:
+    hidden = ContrastResult.nothing(SpinEstimate.refused("contrast", "the logo was not seen"))
+    assert answered(hidden, flight(TOP)).estimate.status == "refused"
+    assert answered(hidden, None, rhythm([60.2])).estimate.status == "refused"
+    result = answered(hidden, flight(TOP), rhythm([60.2]))
+    assert result.estimate.vector_rps is not None and result.estimate.axis_std_deg is not None
+    assert result.estimate.magnitude_rps == pytest.approx(60.2, abs=1.0)
+    assert angle_deg(result.estimate.vector_rps, TOP) < 3.0
+    assert 8.0 < result.estimate.axis_std_deg < 20.0
+    assert result.summary == "magnitude from the rhythm of the logo's visits, axis from the flight"
+    halves = answered(hidden, flight(TOP), rhythm([60.2, 30.1], [0.0, -2.0]))
+    assert halves.estimate.status == "refused", "half the rate is not excluded"
+
+
+def test_it_is_trusted_where_contrast_alone_is_not_or_tells_another_spin() -> None:
+    together = SpinEstimate("combined", TOP, np.eye(3), None)
+    alone = SpinEstimate("contrast", TOP + 0.5, np.eye(3), None)
+    assert trusted_method({"combined": together, "contrast": alone}) == "contrast"
+    assert trusted_method({"combined": together, "contrast": REFUSED}) == "combined"
+    assert trusted_method({"combined": together, "contrast": replace(alone, vector_rps=OTHER)}) == "combined"
