@@ -15,6 +15,7 @@ from .chain import BallTick, Tick
 from .errors import ParameterError
 from .registry import distrust_reason, trusted_method
 from .results import SpinEstimate, Truth
+from .spin.combined import CombinedResult
 from .spin.trajectory.motion import FittedMotion
 from .stages.track import BallTrack, BeganBy, EndedBy, ShotEnd
 from .track_evidence import TrackEvidence
@@ -70,6 +71,8 @@ class Shot:
         The tracker's number of the shot (`BallTrack.shot`).
     motion : FittedMotion, optional
         The flight as fitted by the trajectory method; None where that was not run or found none.
+    combined : CombinedResult, optional
+        Evidence of each witness for the combined answer; None where that was not run.
     """
 
     start_us: int
@@ -86,6 +89,7 @@ class Shot:
     ended_by: EndedBy = "lost"
     number: int = 0
     motion: FittedMotion | None = None
+    combined: CombinedResult | None = None
 
     def positions_m(self, camera: Camera, ball_radius_m: float) -> Floats:
         """(n, 3) float64 centres of the ball in the camera frame, from silhouettes, metres."""
@@ -125,6 +129,7 @@ class Shot:
             "speed_m_s": None if velocity is None else math.sqrt(float(velocity @ velocity)),
             "logo_events": self.logo_events,
             "spin": {name: estimate.to_dict() for name, estimate in self.estimates.items()},
+            "witnesses": [] if self.combined is None else [one.to_dict() for one in self.combined.witnesses],
             "best": self.best,
             "best_reason": self.best_reason,
         }
@@ -212,6 +217,7 @@ class _Row:
     logo_events: int | None
     estimates: dict[str, SpinEstimate]
     motion: FittedMotion | None
+    combined: CombinedResult | None
 
 
 def _row(ball: BallTick) -> _Row:
@@ -223,6 +229,7 @@ def _row(ball: BallTick) -> _Row:
         logo_events=None if logo is None else len(logo.events),
         estimates=ball.estimates,
         motion=None if trajectory is None else trajectory.motion,
+        combined=ball.results.get("combined"),
     )
 
 
@@ -244,4 +251,5 @@ def _shot(rows: list[_Row], end: ShotEnd) -> Shot:
         ended_by=end.ended_by,
         number=end.shot,
         motion=rows[-1].motion,
+        combined=rows[-1].combined,
     )

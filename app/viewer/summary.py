@@ -109,8 +109,10 @@ class _TickState:
             estimate = self.tick.estimates[method.name]
             name = f"**{method.label} ✔**" if self.tick.best == method.name else method.label
             lines.append(f"| {name} | {_magnitude(estimate)} | {axis_words(estimate)} |")
-        reason = self.tick.balls[0].best_reason
-        return [*lines, *self._truth_rows(), "", *([] if reason is None else [f"No spin is trusted: {reason}.", ""])]
+        reason, combined = self.tick.balls[0].best_reason, self.tick.get("combined")
+        notes = [] if combined is None or not combined.summary else [f"Combined: {combined.summary}.", ""]
+        notes += [] if reason is None else [f"No spin is trusted: {reason}.", ""]
+        return [*lines, *self._truth_rows(), "", *notes]
 
     def _truth_rows(self) -> list[str]:
         """Last row of the table with the truth, and below it the errors of every answer."""

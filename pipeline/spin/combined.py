@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -82,6 +83,19 @@ class Witness(ReadOnlyArrays):
     magnitude_rps: float | None
     magnitude_std_rps: float | None
     log_odds: float = 0.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """The witness as `spinscope analyze` writes it, ready for JSON."""
+        axis = None
+        if self.spin_rps is not None and self.magnitude_rps:
+            axis = (self.spin_rps / self.magnitude_rps).tolist()
+        return {
+            "witness": self.name,
+            "magnitude_rps": self.magnitude_rps,
+            "magnitude_std_rps": self.magnitude_std_rps,
+            "axis": axis,
+            "log_odds": self.log_odds,
+        }
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -322,7 +336,7 @@ def _witnesses(
     """Evidence of each witness by itself, of those that have any."""
     said = []
     for magnitude, std, _ in _rhythms(rate)[:1]:
-        said.append(Witness("rate", None, None, magnitude, std))
+        said.append(Witness("rate", None, None, float(magnitude), std))
     spins = {"normal_flow": (flow.vector_rps, flow.covariance_rps2)}
     if not math.isnan(contrast.best_rps[0]):
         spins["contrast"] = contrast.best_rps, contrast.covariance_rps2
