@@ -22,7 +22,8 @@ Floats = NDArray[np.float64]
 # Two discs of axes, those towards the camera and those away from it, and below them bars over magnitude.
 DISC_RADIUS_PX, GAP_PX = 100.0, 20.0
 WIDTH_PX = 4 * DISC_RADIUS_PX + GAP_PX
-BARS_TOP_PX, ROW_PX = 2 * DISC_RADIUS_PX + 24.0, 16.0
+BARS_TOP_PX, ROW_PX = 2 * DISC_RADIUS_PX + 30.0, 30.0
+NAMES_X_PX, MARGIN_PX = -118.0, 240.0
 MAX_RPS, GRID_RPS = 150.0, 50.0
 SIGMAS = 2.0
 ELLIPSE_POINTS = 49
@@ -130,11 +131,11 @@ def _frame() -> list[Chunk]:
     marks = np.arange(0.0, MAX_RPS + 1.0, GRID_RPS)
     scale = [np.array([[x, BARS_TOP_PX], [x, bottom]]) for x in _bar_x(marks)]
     rims = [rim, rim + np.array([2 * DISC_RADIUS_PX + GAP_PX, 0.0])]
-    labels = [(f"{mark:.0f} rps", (x, bottom + 8)) for mark, x in zip(marks, _bar_x(marks), strict=True)]
-    labels += [("towards the camera", (DISC_RADIUS_PX, -8.0)), ("away from it", (3 * DISC_RADIUS_PX + GAP_PX, -8.0))]
+    labels = [(f"{mark:.0f} rps", (x, bottom + 16)) for mark, x in zip(marks, _bar_x(marks), strict=True)]
+    labels += [("towards the camera", (DISC_RADIUS_PX, -16.0)), ("away from it", (3 * DISC_RADIUS_PX + GAP_PX, -16.0))]
     names = [*(STAGES[name].label for name in NAMES), "Truth"]
     colours = [*map(_colour, NAMES), at.TRUTH_COLOUR]
-    places = [(-6.0, BARS_TOP_PX + ROW_PX * (row + 0.5)) for row in range(len(names))]
+    places = [(NAMES_X_PX, BARS_TOP_PX + ROW_PX * (row + 0.2)) for row in range(len(names))]
     return [
         once(f"{at.WITNESSES}/frame", rr.LineStrips2D([*rims, *scale], colors=[at.MASK_COLOUR], radii=[-0.7])),
         once(
@@ -152,5 +153,5 @@ def _frame() -> list[Chunk]:
 
 def bounds() -> Floats:
     """Visible part of the picture, (2, 2), px: x and y, from and to."""
-    bottom = BARS_TOP_PX + ROW_PX * (len(NAMES) + 1) + 24.0
-    return np.array([[-90.0, WIDTH_PX + 20.0], [-24.0, bottom]])
+    bottom = BARS_TOP_PX + ROW_PX * (len(NAMES) + 1) + 36.0
+    return np.array([[-MARGIN_PX, WIDTH_PX + 30.0], [-36.0, bottom]])
