@@ -92,7 +92,7 @@ def test_contrast_is_best_where_the_logo_is_seen(reports: dict[str, dict[str, An
     """To a degree or so: 5 is what the README promises of the mean."""
     for name in set(FLIGHTS) - {"flight_side"}:
         shot = reports[name]["shots"][0]
-        assert list(shot["spin"]) == ["triplet", "normal_flow", "contrast", "trajectory"]
+        assert list(shot["spin"]) == ["triplet", "normal_flow", "contrast", "trajectory", "combined"]
         assert shot["best"] == "contrast"
         with h5py.File(samples / f"{name}.h5") as file:
             truth = file["truth/spin_rps"][0]

@@ -70,7 +70,7 @@ def spinscope(*arguments: Any) -> Result:
 def test_its_estimate_is_reported_and_trusted_where_its_rule_says_so(samples: Path) -> None:
     sample = samples / "flight_fast_top.h5"
     (shot,) = json.loads(spinscope("analyze", sample, "--json", "-").stdout)["shots"]
-    assert list(shot["spin"]) == ["triplet", "normal_flow", "contrast", "trajectory", "toy"]
+    assert list(shot["spin"]) == ["triplet", "normal_flow", "contrast", "trajectory", "combined", "toy"]
     assert shot["spin"]["toy"]["vector_rps"] == SPIN_RPS.tolist()
     assert shot["best"] == "toy"
     done = spinscope("analyze", sample, "--method", "toy")
@@ -110,4 +110,4 @@ def test_it_is_gone_afterwards(samples: Path) -> None:
     assert "toy" not in [method.name for method in methods()]
     done = spinscope("analyze", samples / "flight_fast_top.h5", "--method", "toy")
     assert done.exit_code == 2
-    assert "'triplet', 'normal_flow', 'contrast', 'trajectory', 'all'" in done.output
+    assert "'triplet', 'normal_flow', 'contrast', 'trajectory', 'combined', 'all'" in done.output

@@ -65,7 +65,10 @@ def test_the_report_of_a_shot_has_every_number_in_its_own_column() -> None:
     }
     t_us = 12_345.0 + 5000.0 * np.arange(count)
     measured = np.array([True, False, True, True])
-    shot = Shot(10_000, 30_000, t_us, state, std, measured, 812, estimates, "normal_flow")
+    shot = Shot(
+        10_000, 30_000, t_us, state, std, measured, 812, estimates, "normal_flow",
+        best_reason="dusk", began_by="bounce", ended_by="hit",
+    )  # fmt: skip
     report = shot.to_dict(CAMERA, 0.02)
     assert json.loads(json.dumps(report)) == report
     columns = report.pop("track")
@@ -87,7 +90,8 @@ def test_the_report_of_a_shot_has_every_number_in_its_own_column() -> None:
     assert spin["normal_flow"]["magnitude_std_rps"] == pytest.approx(math.sqrt(0.36 * 0.04 + 0.64 * 0.09))
     across_rps = math.sqrt(0.64 * 0.04 + 0.36 * 0.09)
     assert spin["normal_flow"]["axis_std_deg"] == pytest.approx(math.degrees(across_rps / 5.0))
-    assert report == {"start_us": 10_000, "end_us": 30_000, "logo_events": 812, "best": "normal_flow"}
+    how = {"began_by": "bounce", "ended_by": "hit", "best": "normal_flow", "best_reason": "dusk", "witnesses": []}
+    assert report == {"start_us": 10_000, "end_us": 30_000, "logo_events": 812, **how}
 
 
 def _place_m(x_px: float, y_px: float, radius_px: float) -> np.ndarray:

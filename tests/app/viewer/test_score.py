@@ -97,7 +97,7 @@ def test_the_map_of_axes_is_lightest_at_the_best(rivalled: ViewedRun, logged: di
 
 
 def test_nothing_is_claimed_without_contrast(flight: ViewedRun, tmp_path: Path) -> None:
-    ticks = [with_results(tick, contrast=None) for tick in flight.ticks]
+    ticks = [with_results(tick, contrast=None, combined=None) for tick in flight.ticks]
     write_rrd(dataclasses.replace(flight, ticks=ticks, truth=None), tmp_path / "run.rrd", "spin")
     logged = read_back(tmp_path / "run.rrd")
     for entity in (f"{entities.SPIN_MAGNITUDE}/contrast", entities.SCORE_MAGNITUDE, entities.SCORE_AXES):

@@ -95,7 +95,9 @@ def vague(result: MethodResult) -> MethodResult:
 
 def test_doubt_and_warnings_are_said(flight: ViewedRun, tmp_path: Path) -> None:
     ticks = [
-        with_results(tick, triplet=vague(tick.triplet), normal_flow=vague(tick.normal_flow), contrast=None)
+        with_results(
+            tick, triplet=vague(tick.triplet), normal_flow=vague(tick.normal_flow), contrast=None, combined=None
+        )
         for tick in flight.ticks
     ]
     doubtful = dataclasses.replace(flight, ticks=ticks, shots=[], warnings=["seven hot pixels"])

@@ -256,7 +256,7 @@ def test_the_picture_of_the_view_is_saved(tab: Tab) -> None:
         )
     picture = cv2.imread(str(download.value.path()))
     box = tab.page.locator("#viewer canvas").bounding_box()
-    assert picture.shape == (round(box["height"]), round(box["width"]), 3)
+    assert picture.shape[2] == 3 and np.allclose(picture.shape[:2], (box["height"], box["width"]), atol=1)
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 100
     assert (picture.max(axis=2) > 200).mean() > 0.002  # letters and curves
 

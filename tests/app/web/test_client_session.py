@@ -178,9 +178,9 @@ def test_a_dragged_slider_gets_a_picture_without_the_slowest_stage_first(
     client: Client, told: list[dict[str, Any]]
 ) -> None:
     done = client.run({"logo": {"pad_px": 3.3}}, interactive=True)
-    assert set(done["metrics"]["shots"][0]["spin"]) == {"triplet", "normal_flow", "contrast", "trajectory"}
+    assert set(done["metrics"]["shots"][0]["spin"]) == {"triplet", "normal_flow", "contrast", "trajectory", "combined"}
     (first,) = (m for m in told if m["state"] == "partial")
-    assert set(first["metrics"]["shots"][0]["spin"]) == {"triplet", "normal_flow"}
+    assert set(first["metrics"]["shots"][0]["spin"]) == {"triplet", "normal_flow", "trajectory"}
     assert first["picture"]["end_us"] == done["picture"]["end_us"] and first["picture"]["id"] != done["picture"]["id"]
     told.clear()
     client.run({"logo": {"pad_px": 3.3}}, interactive=True)

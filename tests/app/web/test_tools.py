@@ -28,7 +28,7 @@ def test_every_parameter_has_one_control() -> None:
     wanted = [f"{group}.{field}" for group, fields in Parameters().as_dict().items() for field in fields]
     assert sorted(names) == sorted(wanted)
     titles = [section.title for section in sections() if not section.is_setup]
-    assert titles[:3] == ["Filter", "Surface (EROS)", "Cleaning"] and titles[-2:] == ["Spin", "Contrast maximisation"]
+    assert titles[:3] == ["Filter", "Surface (EROS)", "Cleaning"] and titles[-2:] == ["Trajectory", "Combined"]
 
 
 @pytest.mark.parametrize("name", ["logo.pad_px", "filter.threshold_us", "surface.k_px", "track.coast_us"])
