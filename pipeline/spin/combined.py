@@ -184,10 +184,20 @@ def _by_pattern(contrast: ContrastResult) -> list[_Candidate]:
     spins_rps = np.concatenate([contrast.best_rps[None], contrast.rivals_rps])
     covariances = np.concatenate([contrast.covariance_rps2[None], contrast.rival_covariances_rps2])
     logs = -LOG_ODDS_PER_SIGMA * np.append(0.0, contrast.rival_sigmas)
+    nothing = np.zeros(len(SAMPLES))
     return [
-        _Candidate(spin + SAMPLES @ _root(covariance).T, np.zeros(len(SAMPLES)), float(log))
+        _Candidate(_spread(spin, covariance), nothing, float(log))
         for spin, covariance, log in zip(spins_rps, covariances, logs, strict=True)
     ]
+
+
+def _spread(spin_rps: Floats, covariance_rps2: Floats) -> Floats:
+    """Samples (n, 3) of a spin with its covariance; across the axis they turn it, without a change of magnitude."""
+    values, vectors = np.linalg.eigh(covariance_rps2)
+    samples = spin_rps + SAMPLES @ (vectors * np.sqrt(np.maximum(values, 0.0))).T
+    magnitudes = samples @ spin_rps / max(float(np.linalg.norm(spin_rps)), 1e-9)
+    spread: Floats = samples * (magnitudes / np.linalg.norm(samples, axis=1))[:, None]
+    return spread
 
 
 def _by_rhythm(rate: RateResult, trajectory: TrajectoryResult, gyro_std_deg: float) -> list[_Candidate]:
@@ -263,12 +273,6 @@ def _log_mean(logs: Floats) -> Floats:
     return mean
 
 
-def _root(covariance: Floats) -> Floats:
-    values, vectors = np.linalg.eigh(covariance)
-    root: Floats = vectors * np.sqrt(np.maximum(values, 0.0))
-    return root
-
-
 def _estimate(
     parameters: CombinedParameters,
     spins_rps: Floats,
@@ -288,10 +292,12 @@ def _estimate(
     probabilities = np.exp(evidence - np.logaddexp.reduce(evidence))
     share = probabilities[near, None] * shares[near] / probabilities[near].sum()
     mean = np.einsum("ks,ksi->i", share, spins_rps[near])
-    # Spins about scattered axes have a mean that is shorter than they are.
-    mean *= np.sum(share * np.linalg.norm(spins_rps[near], axis=2)) / np.linalg.norm(mean)
-    off = spins_rps[near] - mean
-    covariance = np.einsum("ks,ksi,ksj->ij", share, off, off)
+    axis, magnitudes = mean / np.linalg.norm(mean), np.linalg.norm(spins_rps[near], axis=2)
+    magnitude = float(np.sum(share * magnitudes))  # scattered axes have a mean that is shorter than they are
+    mean = magnitude * axis
+    across = (spins_rps[near] - mean) @ (np.eye(3) - np.outer(axis, axis))
+    covariance = np.einsum("ks,ksi,ksj->ij", share, across, across)
+    covariance += float(np.sum(share * (magnitudes - magnitude) ** 2)) * np.outer(axis, axis)
     # Few samples that count make the spread look too small.
     covariance *= 1.0 + 3.0 * float(np.sum(share**2))
     estimate = SpinEstimate(METHOD, mean, covariance, None, events)
