@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from .stages.logo import LogoResult
     from .stages.rate import RateResult
     from .stages.surface import SurfaceResult
-    from .stages.track import BallTrack, TrackResult
+    from .stages.track_result import BallTrack, TrackResult
 
 CACHE_BYTES = 2 << 30
 MAX_COLUMNS = 10_000

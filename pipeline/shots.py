@@ -17,7 +17,7 @@ from .registry import distrust_reason, trusted_method
 from .results import SpinEstimate, Truth
 from .spin.combined import CombinedResult
 from .spin.trajectory.motion import FittedMotion
-from .stages.track import BallTrack, BeganBy, EndedBy, ShotEnd
+from .stages.track_result import BallTrack, BeganBy, EndedBy, ShotEnd
 from .track_evidence import TrackEvidence
 
 Floats = NDArray[np.float64]

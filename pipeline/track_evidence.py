@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from .results import Circle
 
 if TYPE_CHECKING:
-    from .stages.track import BallTrack
+    from .stages.track_result import BallTrack
 
 # Three circles in a row: the first two give a velocity, the third confirms it. They must be seen over this time, for
 # circles of ticks that follow each other more quickly share events (track.contour_us is 3 ms).

@@ -16,7 +16,7 @@ from spinscope.pipeline.simulator.motion import trajectory
 from spinscope.pipeline.spin.trajectory import stage
 from spinscope.pipeline.spin.trajectory.stage import TrajectoryParameters, TrajectoryResult
 from spinscope.pipeline.stage import Context
-from spinscope.pipeline.stages.track import BallTrack
+from spinscope.pipeline.stages.track_result import BallTrack
 
 Floats = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from spinscope.pipeline.spin.parameters import SpinParameters
 from spinscope.pipeline.stage import Context
 from spinscope.pipeline.stages import flow, logo, rate
 from spinscope.pipeline.stages.filter import FilterResult
-from spinscope.pipeline.stages.track import BallTrack, TrackResult
+from spinscope.pipeline.stages.track_result import BallTrack, TrackResult
 
 Floats = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from spinscope.pipeline.chain import BallTick, Tick
 from spinscope.pipeline.shots import Shot
-from spinscope.pipeline.stages.track import Status
+from spinscope.pipeline.stages.track_result import Status
 
 Absent = Callable[[str, str], Any]
 

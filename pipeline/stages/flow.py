@@ -17,7 +17,7 @@ from ..results import Packet, ReadOnlyArrays
 from ..stage import Context, Stage
 from .logo import LogoResult
 from .rate import RateResult
-from .track import BallTrack
+from .track_result import BallTrack
 
 Floats = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from ..parameters import ParameterGroup, tunable
 from ..results import Packet, ReadOnlyArrays
 from ..stage import Context, Stage
 from .filter import FilterResult
-from .track import BallTrack
+from .track_result import BallTrack
 
 Floats = NDArray[np.float64]
 

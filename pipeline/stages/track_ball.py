@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from ..results import Circle, Packet
 from .track_contact import PATH_US, Contact, PathPoint
 from .track_kalman import OBSERVED, OBSERVED_BLOCK, BallFilter
 from .track_outline import Edge, Sighting, measure
+from .track_result import BeganBy
 
 Floats = NDArray[np.float64]
 
@@ -49,7 +49,6 @@ MEETING_US = 10_000
 FREE = np.full(5, 1e9)
 # 1 sigma of a state just after a contact, of place and radius: what a few circles leave open.
 AFTER_CONTACT_COVARIANCE = np.diag([0.3**2, 0.3**2, 0.0, 0.0, 0.3**2])
-BeganBy = Literal["entered", "bounce", "hit", "start", "found"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ import pytest
 from spinscope.pipeline.camera import Camera, CameraParameters
 from spinscope.pipeline.results import SpinEstimate, Truth
 from spinscope.pipeline.shots import Shot, ShotLog
-from spinscope.pipeline.stages.track import ShotEnd
+from spinscope.pipeline.stages.track_result import ShotEnd
 from spinscope.pipeline.track_evidence import NO_EVIDENCE
 
 CAMERA = Camera.of(CameraParameters(), 1280, 720)

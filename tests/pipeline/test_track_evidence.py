@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spinscope.pipeline.results import Circle
-from spinscope.pipeline.stages.track import BallTrack
+from spinscope.pipeline.stages.track_result import BallTrack
 from spinscope.pipeline.track_evidence import LARGEST_SCATTER, NO_EVIDENCE, TrackEvidence
 
 RADIUS_PX = 16.0

@@ -10,7 +10,7 @@ import numpy as np
 from ...registry import STAGES, Parameters
 from ...results import MethodResult, SpinEstimate
 from ...simulator import Scene, SensorModel, SimulatedRecording, flight, human_shot, simulate_scene, spinner, thrown
-from ...stages.track import BallTrack
+from ...stages.track_result import BallTrack
 from ..estimation import chain_over, spin_errors
 from ..plots import Figures, coverage_figure
 from ..tables import Cell, ResultTable, Row, distinct, summary, where

@@ -21,7 +21,7 @@ from ...parameters import ParameterGroup, switch, tunable
 from ...results import MethodResult, Packet, SpinEstimate
 from ...stage import Context, SpinMethod
 from ...stages.logo import LogoResult
-from ...stages.track import BallTrack
+from ...stages.track_result import BallTrack
 from .estimate import ScoreMap, estimate_spin, follow_spin, score_map
 from .events import BallUncertainty, ContrastEstimate, ContrastSettings, SphereEvents
 from .result import ContrastResult

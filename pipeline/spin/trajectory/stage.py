@@ -13,7 +13,7 @@ from ...kernels.arrays import Floats
 from ...parameters import ParameterGroup, tunable
 from ...results import Packet, ReadOnlyArrays, SpinEstimate
 from ...stage import Context, SpinMethod
-from ...stages.track import BallTrack
+from ...stages.track_result import BallTrack
 from .likelihood import FlightLikelihood, SetUp, SpinAcross, spin_across
 from .motion import FittedMotion, fit_flight
 

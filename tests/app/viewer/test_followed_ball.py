@@ -17,7 +17,7 @@ from spinscope.app.viewer.run import ViewedRun
 from spinscope.pipeline.registry import STAGES
 from spinscope.pipeline.session import Choices, Result, Session
 from spinscope.pipeline.stage import Stage
-from spinscope.pipeline.stages.track import ShotEnd, TrackResult
+from spinscope.pipeline.stages.track_result import ShotEnd, TrackResult
 from tests.app.viewer.reading import Rows, read_back
 
 CONTACT_US, KNOWN_US, OTHER_US = 52_000, 65_000, (30_000, 80_000)

@@ -18,7 +18,7 @@ from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.registry import STAGES, Parameters
 from spinscope.pipeline.session import Choices, Session
 from spinscope.pipeline.stage import Stage
-from spinscope.pipeline.stages.track import TrackResult
+from spinscope.pipeline.stages.track_result import TrackResult
 
 FIXED = Parameters().with_values(
     {"track": {"ball": "fixed", "fixed_x_px": 528.43, "fixed_y_px": 426.87, "fixed_radius_px": 16.49}}

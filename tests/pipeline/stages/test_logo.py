@@ -16,7 +16,7 @@ from spinscope.pipeline.stage import Context
 from spinscope.pipeline.stages import logo as stage
 from spinscope.pipeline.stages.filter import FilterResult
 from spinscope.pipeline.stages.logo import LogoParameters, LogoResult, TurningEvents
-from spinscope.pipeline.stages.track import BallTrack
+from spinscope.pipeline.stages.track_result import BallTrack
 from tests.spinning_ball import CONTEXT, known_ball
 
 LOGO_LABEL = 2  # of the truth

@@ -13,7 +13,7 @@ from spinscope.pipeline.stages import logo as logo_stage
 from spinscope.pipeline.stages import rate as stage
 from spinscope.pipeline.stages.filter import FilterResult
 from spinscope.pipeline.stages.rate import RateParameters, RateResult
-from spinscope.pipeline.stages.track import TrackResult
+from spinscope.pipeline.stages.track_result import TrackResult
 from tests.spinning_ball import CONTEXT, known_track, no_track, of_shot, packets
 
 

@@ -17,7 +17,7 @@ from spinscope.pipeline.registry import trusted_method
 from spinscope.pipeline.results import SpinEstimate
 from spinscope.pipeline.spin.parameters import SpinParameters
 from spinscope.pipeline.stages import filter as filter_stage
-from spinscope.pipeline.stages.track import BallTrack, TrackResult
+from spinscope.pipeline.stages.track_result import BallTrack, TrackResult
 from tests.spinning_ball import CONTEXT, after_track, errors, no_track, packets, track_with
 
 LATENCY_US = 65.0

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from spinscope.pipeline.events import EventBatch
-from spinscope.pipeline.stages.track import TrackParameters, TrackResult
+from spinscope.pipeline.stages.track import TrackParameters
+from spinscope.pipeline.stages.track_result import TrackResult
 from tests.track_runs import WIDTH, disc_events, inputs, run, sample, tracked, transformed
 
 IDEAL = TrackParameters(latency_us=0.0, lag_px=0.0, outline_px=0.0)
