@@ -66,6 +66,8 @@ LOOK_US, FEW_EVENTS = 5000, 5000
 # Shots come in across the border, within so many radii of it when first seen. A slow ball that turns up in the
 # middle rather rolls about: it is watched for a while, in which a real shot may come.
 COMING_IN, SLOW_M_S, WATCH_US = 5.0, 3.5, 20_000
+# An outline that waits to be seen again may be missed for a few ticks: on low contrast it shows in every second one.
+HELD_US = 15_000
 # A ball that was outside the view, or the recording not yet begun, so long ago was not there before it was found.
 BEFORE_US = 30_000
 # Circles measured after a contact until it is announced; fewer would not tell when it was. At a shot's end, the one
@@ -165,8 +167,8 @@ def _step_flying(
         hough = hough or anywhere
     contacts, earlier = _announce_contacts(parameters, state)
     for ball in state.balls:
-        if ball.is_shot and ball.speed_m_s(state.context.ball_radius_m) < ROLLING_M_S:
-            ball.is_shot = not rolls(ball.path, state.context.camera, state.context.ball_radius_m)
+        if ball.is_shot:
+            ball.is_shot = not _rolls(state, ball) and not any(ball.is_shadow_of(other) for other in state.balls)
     state.balls.sort(key=lambda ball: not ball.is_shot)
     balls = tuple(_ball_track(parameters, ball, packet.end_us, earlier.get(ball.shot, ())) for ball in state.balls)
     status: Status = "coasting"
@@ -245,6 +247,11 @@ def _announce_contacts(
     return ended, earlier
 
 
+def _rolls(state: TrackState, ball: TrackedBall) -> bool:
+    radius_m = state.context.ball_radius_m
+    return ball.speed_m_s(radius_m) < ROLLING_M_S and rolls(ball.path, state.context.camera, radius_m)
+
+
 def _is_search_due(state: TrackState, packet: Packet) -> bool:
     """Whether to look for balls anywhere: always while one is missed or it is cheap, else every LOOK_US."""
     missed = bool(state.pending) or not state.balls or any(ball.measured is None for ball in state.balls)
@@ -268,13 +275,17 @@ def _search(
     for sighting, circle in found:
         if any(ball.covers(sighting) for ball in state.balls if ball.measured is not None):
             continue
-        since = packet.end_us, sighting
-        since = next((one for one in pending if agree(one[1], sighting, packet.end_us - one[0])), since)
+        since = next((one for one in pending if agree(one[1], sighting, packet.end_us - one[0])), None)
+        if since is None:
+            since = packet.end_us, sighting
+        else:
+            pending.remove(since)
         if packet.end_us - since[0] < _wait_us(parameters, state, sighting):
             state.pending.append(since)
         else:
             _begin(state, packet, sighting)
             hough = circle
+    state.pending += [one for one in pending if packet.end_us - one[0] < HELD_US]
     return hough, state.pending[0][1] if state.pending else None
 
 

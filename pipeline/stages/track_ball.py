@@ -40,6 +40,9 @@ FIRST_SPEED_STD_M_S = 0.2
 SAME_RADIUS = 0.1
 # Two tracks of one ball agree in velocity to this share.
 SAME_VELOCITY = 0.2
+# A ball's shadow on a level table keeps pace with it: from above, its image is slower by the share that the table is
+# farther away, and under a slanted light it moves on by what the ball falls or rises.
+SHADOW_VELOCITY, REVERSED_CONTRAST = 0.3, 0.5
 # Outlines nearer to each other than this share events.
 APART_PX = 5.0
 # Error of the centre and radius of an outline that the border cuts, for each radius of it that is out of view.
@@ -108,7 +111,9 @@ class TrackedBall:
     path : list of PathPoint
         The shot's ticks of the last PATH_US.
     is_shot : bool
-        Whether it is taken for a flight: until it is seen to roll.
+        Whether it is taken for a flight: until it is seen to roll, or to be another's shadow.
+    contrast : float
+        Of its outline when it was last measured (see `Sighting`).
     """
 
     shot: int
@@ -119,6 +124,7 @@ class TrackedBall:
     seen: Floats
     path: list[PathPoint] = field(default_factory=list)
     is_shot: bool = True
+    contrast: float = 0.0
 
     @classmethod
     def at(cls, sighting: Sighting, measuring: Measuring, shot: int, packet: Packet, began_by: BeganBy) -> TrackedBall:
@@ -133,7 +139,7 @@ class TrackedBall:
         first_us = next(point.end_us for point in self.path if point.end_us > contact.time_us)
         state = contact.path.state(first_us)
         new = measuring.filter_at(state, AFTER_CONTACT_COVARIANCE)
-        return TrackedBall(shot, contact.time_us, contact.kind, new, first_us, state)
+        return TrackedBall(shot, contact.time_us, contact.kind, new, first_us, state, contrast=self.contrast)
 
     def follow(self, path: list[PathPoint], measuring: Measuring) -> Iterator[PathPoint]:
         """Go along the rest of a path from the shot's first tick on, with the circles that show no other shot."""
@@ -233,6 +239,12 @@ class TrackedBall:
             and np.hypot(*off[2:4]) < SAME_VELOCITY * np.hypot(*self.filter.mean[2:4])
         )
 
+    def is_shadow_of(self, other: TrackedBall) -> bool:
+        """Whether it is darker than what is around it and keeps pace with one that is brighter."""
+        off = np.hypot(*(self.filter.mean - other.filter.mean)[2:4])
+        reversed_contrast = self.contrast < -REVERSED_CONTRAST and other.contrast > REVERSED_CONTRAST
+        return reversed_contrast and bool(off < SHADOW_VELOCITY * np.hypot(*other.filter.mean[2:4]))
+
     def total_covariance(self) -> Floats:
         """(5, 5) float64: the filter's covariance plus the errors that every tick has in common."""
         late = self.filter.mean[2:4] * LATENCY_STD_US * 1e-6
@@ -247,7 +259,7 @@ class TrackedBall:
         return noise
 
     def _see(self, measuring: Measuring, sighting: Sighting, noise: Floats, end_us: int) -> None:
-        self.seen_us, self.seen = end_us, self.filter.mean
+        self.seen_us, self.seen, self.contrast = end_us, self.filter.mean, sighting.contrast
         hidden = HIDDEN_ERROR * (1.0 - sighting.visible) * sighting.ring[4]
         self._add(PathPoint(end_us, measuring.circle(sighting), noise + hidden**2 * np.eye(3)))
 

@@ -129,6 +129,14 @@ class Sighting:
         return self.ahead >= 0.8 and shown - self.clutter >= LEAST_EXPLAINED and self._is_velocity_known
 
     @property
+    def isolated(self) -> bool:
+        """Whether half of the half ahead is there and hardly an event around it.
+
+        So looks a ball before ground that is as bright as a part of its shaded rim.
+        """
+        return self.ahead >= 0.5 and self.clutter <= 0.1 and self._is_velocity_known
+
+    @property
     def _is_velocity_known(self) -> bool:
         """Whether the speed is known to a tenth."""
         return bool(self.covariance[2, 2] + self.covariance[3, 3] <= (0.1 * self.speed_px_s) ** 2)

@@ -40,8 +40,8 @@ class BallTrack(ReadOnlyArrays):
     began_by : str
         How the shot began: entered, bounce, hit, start (of the recording) or found (in the middle of the view).
     is_shot : bool
-        Whether the ball is in free flight. False from the tick on in which it is seen to roll: the last state decides
-        whether this was a shot.
+        Whether the ball is in free flight. False from the tick on in which it is seen to roll, or to be the shadow of
+        another one: the last state decides whether this was a shot.
     earlier : tuple of BallTrack
         States at the ends of the ticks since start_us before this one, oldest first: a contact is known only some
         ticks later. Given in the one tick in which the shot is announced, else empty.

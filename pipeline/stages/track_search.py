@@ -29,6 +29,8 @@ SAME_SHARE = 0.15
 # Share of the events around a circle that its disc must explain. Marks and shading on the ball draw circles as well, of
 # which the ball's own outline lies outside.
 LEAST_SHARE = 0.7
+# The same of an outline that shows only in part, where nothing else may move nearby.
+ISOLATED_SHARE = 0.95
 
 Found = list[tuple[Sighting, Circle]]
 # Where balls are looked for: the paper's surface, and the contour events (see `look`).
@@ -110,8 +112,9 @@ class _Searching:
         """Whether an outline may be a ball's: trusted, or one that alone explains the events around it."""
         if signed and sighting.trusted:
             return True
-        likely = sighting.promising if signed else sighting.explained
-        return likely and disc_share(sighting.ring, events, self.end_us) >= LEAST_SHARE
+        if sighting.promising if signed else sighting.explained:
+            return disc_share(sighting.ring, events, self.end_us) >= LEAST_SHARE
+        return not signed and sighting.isolated and disc_share(sighting.ring, events, self.end_us) >= ISOLATED_SHARE
 
 
 def _is_same(one: Circle, other: Circle) -> bool:

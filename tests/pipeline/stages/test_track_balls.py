@@ -12,9 +12,9 @@ from spinscope.pipeline.stages.track import TrackParameters
 from spinscope.pipeline.stages.track_result import ShotEnd, TrackResult
 from tests.track_runs import disc_events, inputs, merged, run, sample, setting, tracked
 
-# So long a lens that the outline is round; no latency, lag or width.
+# So long a lens that the outline is round, before which a ball of this size is out of reach; no latency, lag or width.
 PLACE = setting(focal_length_mm=500.0)
-IDEAL = TrackParameters(latency_us=0.0, lag_px=0.0, outline_px=0.0)
+IDEAL = TrackParameters(latency_us=0.0, lag_px=0.0, outline_px=0.0, radius_min_px=5.0, radius_max_px=40.0)
 RADIUS_PX, M_S = 17.0, 17.0 / 0.02
 
 
@@ -138,6 +138,31 @@ def test_a_ball_that_rolls_is_tracked_but_no_shot() -> None:
     (ball,) = results[59].balls
     assert not ball.is_shot and ball.measured is not None
     assert [(ball.shot, ball.is_shot) for ball in results[-1].balls] == [(1, True), (0, False)]
+
+
+def test_a_balls_shadow_is_tracked_but_no_shot() -> None:
+    """A dark disc that goes along with a bright one; one that comes towards it is another ball."""
+
+    def shots(shadow_m_s: float, shadow_x_px: float) -> list[tuple[int, bool]]:
+        shadow = disc_events(np.array([shadow_x_px, 400.0, shadow_m_s * M_S, 0.0, 20.0]), 0, 60_000, bright=False)
+        results = results_of(disc(300.0, 300.0, 6.0, 0.0, 0, 60_000), shadow)
+        return sorted((round(ball.mean[1]), ball.is_shot) for ball in results[-1].balls)
+
+    assert shots(5.4, 300.0) == [(300, True), (400, False)]
+    assert shots(-5.4, 900.0) == [(300, True), (400, True)]
+
+
+def test_a_ball_seen_in_part_counts_when_seen_again() -> None:
+    """Two thirds of its outline, in every second tick: ground as bright as the rest of it hides that."""
+    whole = disc(200.0, 360.0, 6.0, 0.0, 0, 60_000)
+    seen = whole[(whole.y_px < 360 + 0.3 * RADIUS_PX) & (whole.t_us // 5000 % 2 == 1)]
+    results = results_of(seen)
+    assert [len(result.balls) for result in results[:3]] == [0, 0, 1], "at 10, 15 and 20 ms"
+    assert results[0].status == results[1].status == "starting"
+    ball = results[2].balls[0]
+    np.testing.assert_allclose(
+        ball.mean, [200.0 + 6.0 * M_S * 0.02, 360.0, 6.0 * M_S, 0.0, RADIUS_PX], atol=0.5, rtol=0.05
+    )
 
 
 def test_the_samples_balls_begin_and_end_as_they_do() -> None:

@@ -67,6 +67,21 @@ def test_a_half_outline_is_promising_if_clear(enough: dict[str, object], too_lit
 
 
 @pytest.mark.parametrize(
+    ("enough", "too_little"),
+    [
+        ({"ahead": 0.51}, {"ahead": 0.49}),
+        ({"clutter": 0.09}, {"clutter": 0.11}),
+        ({"covariance": speed_known_to(0.099)}, {"covariance": speed_known_to(0.101)}),
+    ],
+)
+def test_a_part_of_an_outline_is_isolated_if_nothing_is_around_it(
+    enough: dict[str, object], too_little: dict[str, object]
+) -> None:
+    assert sighting(behind=0.0, contrast=0.0, **enough).isolated
+    assert not sighting(behind=0.0, contrast=0.0, **too_little).isolated
+
+
+@pytest.mark.parametrize(
     ("near", "far"),
     [
         ([2.0 + 2.45, 0, 0, 0, 0], [2.0 + 2.55, 0, 0, 0, 0]),  # 2 px and a tenth of the way of 5 ms
@@ -82,14 +97,14 @@ def test_two_sightings_are_of_one_ball_if_it_moved_as_it_said(near: list[float],
     assert not agree(sighting(), sighting(ring=moved + far), 5000)
 
 
-def test_other_balls_are_looked_for_every_10_ms_and_at_once_when_one_is_missed() -> None:
+def test_other_balls_are_looked_for_every_5_ms_and_at_once_when_one_is_missed() -> None:
     state = track.start(TrackParameters(), PAPER_CONTEXT)
     state.looked_us = 50_000
     many = np.zeros(track.FEW_EVENTS, np.int64)
     state.contour = EventBatch(many, many.astype(np.uint16), many.astype(np.uint16), many.astype(bool))
     assert track._is_search_due(state, packet_to(51_000)), "no ball yet"
     state.balls = [tracked_ball()]
-    assert not track._is_search_due(state, packet_to(59_999)) and track._is_search_due(state, packet_to(60_000))
+    assert not track._is_search_due(state, packet_to(54_999)) and track._is_search_due(state, packet_to(55_000))
     state.pending = [(50_000, sighting())]
     assert track._is_search_due(state, packet_to(51_000)), "a sighting waits"
     state.pending = []
@@ -286,6 +301,18 @@ def test_two_tracks_of_one_outline_are_told_from_two_balls_that_cross() -> None:
     assert not crossing.shares_outline(ball)
     double.coast(20_000)
     assert not double.shares_outline(ball)
+
+
+@pytest.mark.parametrize(
+    ("contrast", "velocity_share", "is_shadow"),
+    [(-0.9, 0.9, True), (-0.9, 0.75, True), (-0.9, 0.65, False), (-0.45, 0.9, False), (0.9, 0.9, False)],
+)
+def test_a_shadow_is_dark_and_keeps_pace_with_its_ball(contrast: float, velocity_share: float, is_shadow: bool) -> None:
+    ball, other = tracked_ball(), tracked_ball()
+    other.contrast = contrast
+    other.filter.mean = RING * np.array([1, 1, velocity_share, velocity_share, 1]) + [60.0, 0, 0, 0, 0]
+    assert other.is_shadow_of(ball) == is_shadow
+    assert not ball.is_shadow_of(other)
 
 
 @pytest.mark.parametrize(
