@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..camera import Camera
 from ..events import EventBatch
 from ..kernels import crossing
+from ..kernels.outline import ON_OUTLINE_PX
 from ..kernels.take_events import take_events
 from ..results import Circle, Packet
 from .track_contact import PATH_US, Contact, PathPoint
@@ -33,6 +34,9 @@ OUTLINE_COVARIANCE = OUTLINE_STD_PX**2 * np.eye(3)
 LATENCY_STD_US = 12.0
 PLACE_STD_PX, RADIUS_STD_PX = 0.06, 0.3
 COMMON_COVARIANCE = np.diag([PLACE_STD_PX**2, PLACE_STD_PX**2, 0.0, 0.0, RADIUS_STD_PX**2])
+# Events just outside a measured outline may be those of the ball's rim, before ground that hides most of it: the outline
+# is then one of the ball's shading. Those that count as just outside lie up to so far out (`kernels.outline.support`).
+OUTSIDE_PX = 4.0 * ON_OUTLINE_PX
 # A velocity from one outline is wrong by what the ball accelerates within its window; the paper: high enough to
 # converge fast.
 FIRST_SPEED_STD_M_S = 0.2
@@ -112,7 +116,7 @@ class TrackedBall:
         The shot's ticks of the last PATH_US.
     is_shot : bool
         Whether it is taken for a flight: until it is seen to roll, or to be another's shadow.
-    contrast : float
+    contrast, clutter : float
         Of its outline when it was last measured (see `Sighting`).
     """
 
@@ -125,6 +129,7 @@ class TrackedBall:
     path: list[PathPoint] = field(default_factory=list)
     is_shot: bool = True
     contrast: float = 0.0
+    clutter: float = 0.0
 
     @classmethod
     def at(cls, sighting: Sighting, measuring: Measuring, shot: int, packet: Packet, began_by: BeganBy) -> TrackedBall:
@@ -250,6 +255,7 @@ class TrackedBall:
         late = self.filter.mean[2:4] * LATENCY_STD_US * 1e-6
         covariance = self.filter.covariance + COMMON_COVARIANCE
         covariance[:2, :2] += late[:, None] * late
+        covariance[4, 4] += (OUTSIDE_PX * self.clutter / (1.0 + self.clutter)) ** 2
         return covariance
 
     def _noise(self, measuring: Measuring, sighting: Sighting, start_us: int, end_us: int) -> Floats:
@@ -259,7 +265,8 @@ class TrackedBall:
         return noise
 
     def _see(self, measuring: Measuring, sighting: Sighting, noise: Floats, end_us: int) -> None:
-        self.seen_us, self.seen, self.contrast = end_us, self.filter.mean, sighting.contrast
+        self.seen_us, self.seen = end_us, self.filter.mean
+        self.contrast, self.clutter = sighting.contrast, sighting.clutter
         hidden = HIDDEN_ERROR * (1.0 - sighting.visible) * sighting.ring[4]
         self._add(PathPoint(end_us, measuring.circle(sighting), noise + hidden**2 * np.eye(3)))
 
