@@ -34,8 +34,8 @@ OUTLINE_COVARIANCE = OUTLINE_STD_PX**2 * np.eye(3)
 LATENCY_STD_US = 12.0
 PLACE_STD_PX, RADIUS_STD_PX = 0.06, 0.3
 COMMON_COVARIANCE = np.diag([PLACE_STD_PX**2, PLACE_STD_PX**2, 0.0, 0.0, RADIUS_STD_PX**2])
-# Events just outside a measured outline may be those of the ball's rim, before ground that hides most of it: the outline
-# is then one of the ball's shading. Those that count as just outside lie up to so far out (`kernels.outline.support`).
+# Events just outside a measured outline may be those of the ball's rim, before ground that hides most of it: the
+# outline is then one of the ball's shading. Those that count lie up to so far out (`kernels.outline.support`).
 OUTSIDE_PX = 4.0 * ON_OUTLINE_PX
 # A velocity from one outline is wrong by what the ball accelerates within its window; the paper: high enough to
 # converge fast.
