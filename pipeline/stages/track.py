@@ -61,8 +61,8 @@ class TrackParameters(ParameterGroup):
 
 
 # Beside a track that is seen, other balls are looked for this often, in the surface and in the contour events by turns,
-# or in both in every tick that few events make cheap: soon enough to find one within 15 ms.
-LOOK_US, FEW_EVENTS = 5000, 5000
+# or in both where few events outside the balls make it cheap: soon enough to find one within 15 ms.
+LOOK_US, FEW_EVENTS = 5000, 300
 # Shots come in across the border, within so many radii of it when first seen. A slow ball that turns up in the
 # middle rather rolls about: it is watched for a while, in which a real shot may come.
 COMING_IN, SLOW_M_S, WATCH_US = 5.0, 3.5, 20_000
@@ -253,9 +253,9 @@ def _rolls(state: TrackState, ball: TrackedBall) -> bool:
 
 
 def _is_search_due(state: TrackState, packet: Packet) -> bool:
-    """Whether to look for balls anywhere: always while one is missed or it is cheap, else every LOOK_US."""
-    missed = bool(state.pending) or not state.balls or any(ball.measured is None for ball in state.balls)
-    return missed or len(state.contour) < FEW_EVENTS or packet.end_us - state.looked_us >= LOOK_US
+    """Whether to look for balls anywhere: always while one is missed, else every LOOK_US."""
+    missed = not state.balls or any(ball.measured is None for ball in state.balls)
+    return missed or packet.end_us - state.looked_us >= LOOK_US
 
 
 def _search(
@@ -267,7 +267,7 @@ def _search(
     events = outside_balls(state.contour, measured, packet.end_us)
     most = MOST_RIVALS if state.balls else MOST_CANDIDATES
     routes: tuple[Route, ...] = ROUTES
-    if state.balls and not state.pending and len(state.contour) >= FEW_EVENTS:
+    if state.balls and len(events) >= FEW_EVENTS:
         routes = (ROUTES[packet.end_us // LOOK_US % 2],)
     hough, found, excluded = look(surface, events, packet.end_us, state.context.camera, state.limits, most, routes)
     state.excluded = None if state.balls else excluded or state.excluded

@@ -246,9 +246,10 @@ class TrackedBall:
 
     def is_shadow_of(self, other: TrackedBall) -> bool:
         """Whether it is darker than what is around it and keeps pace with one that is brighter."""
+        if self.contrast > -REVERSED_CONTRAST or other.contrast < REVERSED_CONTRAST:
+            return False
         off = np.hypot(*(self.filter.mean - other.filter.mean)[2:4])
-        reversed_contrast = self.contrast < -REVERSED_CONTRAST and other.contrast > REVERSED_CONTRAST
-        return reversed_contrast and bool(off < SHADOW_VELOCITY * np.hypot(*other.filter.mean[2:4]))
+        return bool(off < SHADOW_VELOCITY * np.hypot(*other.filter.mean[2:4]))
 
     def total_covariance(self) -> Floats:
         """(5, 5) float64: the filter's covariance plus the errors that every tick has in common."""

@@ -113,11 +113,9 @@ def find_contact(
     coarse_us, gain = float(hinges_us[np.argmax(gains)]), float(gains.max())
     if gain < LEAST_GAIN or coarse_us > min(points[-least_after].end_us, last_us - straddled_us):
         return None  # or not yet
-    paths = [
-        HingedPath(points, float(time_us), (coarse_us, coarse_us + straddled_us), camera, ball_radius_m)
-        for time_us in np.arange(coarse_us - REFINED_US, min(coarse_us + REFINED_US, last_us), FINE_STEP_US)
-    ]
-    refined = min(paths, key=lambda one: one.cost)
+    places = _Places.of(points, (coarse_us, coarse_us + straddled_us), camera, ball_radius_m)
+    times_us = np.arange(coarse_us - REFINED_US, min(coarse_us + REFINED_US, last_us), FINE_STEP_US)
+    refined = HingedPath(places, float(times_us[np.argmin(places.costs(times_us))]), camera, ball_radius_m)
     before, after = refined.velocity_m_s(refined.hinge_us - 1), refined.velocity_m_s(refined.hinge_us)
     if np.linalg.norm(after - before) < LEAST_JUMP_M_S:
         return None
@@ -191,58 +189,92 @@ def _precisions(speed_px_s: float, radius_px: float, camera: Camera, ball_radius
     return 1.0 / np.outer([across, across, along], largest) ** 2
 
 
-class HingedPath:
-    """A ball's path in space, a cubic in time with a hinge, fitted to its measured circles.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Places:
+    """A ball's measured places in space.
 
-    In space, as perspective bends the path in the image when a contact turns the speed towards the camera.
-
-    Parameters
+    Attributes
     ----------
-    points : list of PathPoint
-        With circles.
-    hinge_us : float
-        Time of the hinge.
-    straddling_us : tuple of float
-        First and last end of the circles that have events from before and after the contact.
+    times_us : (n,) float64
+        When it was there.
+    centres_m, weights : (n, 3) float64, (n, 3, 3) float64
+        Its centres, camera frame, and the inverses of their covariances.
+    precisions : (6,) float64
+        One over the variances of a path's coefficients: what flight and contacts allow.
     """
 
-    def __init__(
-        self,
-        points: list[PathPoint],
-        hinge_us: float,
-        straddling_us: tuple[float, float],
-        camera: Camera,
-        ball_radius_m: float,
-    ) -> None:
-        self.hinge_us = hinge_us
-        self._camera, self._ball_radius_m = camera, ball_radius_m
+    times_us: Floats
+    centres_m: Floats
+    weights: Floats
+    precisions: Floats
+
+    @classmethod
+    def of(
+        cls, points: list[PathPoint], straddling_us: tuple[float, float], camera: Camera, ball_radius_m: float
+    ) -> _Places:
+        """The places of points with circles; those that end in the given span have events of both sides of a contact.
+
+        straddling_us is the first and last end of those.
+        """
         times_us = np.array([point.end_us for point in points], np.float64)
         circles = np.array([[c.x_px, c.y_px, c.radius_px] for point in points if (c := point.circle)])
         centres_m, weights = _located(circles, camera, ball_radius_m)
         straddles = (times_us >= straddling_us[0]) & (times_us < straddling_us[1])
         weights[straddles] *= (CLEAN_EDGE_STD_PX / STRADDLING_STD_PX) ** 2
-        terms = self._terms(times_us)
         span_s = (times_us[-1] - times_us[0]) * 1e-6
         speed_m_s = float(np.linalg.norm(np.diff(centres_m, axis=0)[:, :2], axis=1).sum()) / span_s
         lift_m_s2, drag_m_s2 = LIFT_1_M * speed_m_s**2, DRAG_1_M * speed_m_s**2
         jerk_m_s3 = 2.0 * DRAG_1_M * speed_m_s * (drag_m_s2 + lift_m_s2 + GRAVITY_M_S2)
         acceleration_m_s2 = GRAVITY_M_S2 + lift_m_s2 + drag_m_s2
         largest = np.array([1e3, 1e3, acceleration_m_s2 / 2, jerk_m_s3 / 6, JUMP_M_S, (1.0 + lift_m_s2) / 2])
-        normal = np.einsum("ni,nj,nab->iajb", terms, terms, weights).reshape(18, 18)
-        moment = np.einsum("ni,nab,nb->ia", terms, weights, centres_m).reshape(18)
-        spread = np.linalg.inv(normal + np.diag(np.repeat(largest**-2.0, 3)))
-        solution = spread @ moment
-        self._coefficients = solution.reshape(6, 3)
-        square = float(np.einsum("na,nab,nb->", centres_m, weights, centres_m))
-        self.cost = square - float(solution @ moment)
-        rough = max(1.0, self.cost / max(1, 3 * len(points) - 12))  # beyond the clean scene's errors
+        return cls(times_us, centres_m, weights, largest**-2.0)
+
+    def equations(self, hinges_us: Floats) -> tuple[Floats, Floats]:
+        """Normal matrices (m, 18, 18) and right sides (m, 18) of the paths with a hinge at these times (m,)."""
+        terms = _terms(self.times_us, hinges_us[:, None])
+        products = (terms[..., :, None] * terms[..., None, :]).reshape(*terms.shape[:2], 36)
+        normals = np.swapaxes(products, 1, 2) @ self.weights.reshape(-1, 9)
+        normals = normals.reshape(-1, 6, 6, 3, 3).swapaxes(2, 3).reshape(-1, 18, 18)
+        weighted = (self.weights @ self.centres_m[:, :, None])[..., 0]
+        return normals + np.diag(np.repeat(self.precisions, 3)), (np.swapaxes(terms, 1, 2) @ weighted).reshape(-1, 18)
+
+    def costs(self, hinges_us: Floats) -> Floats:
+        """Squared distances (m,), in sigma, of the places from the best paths with a hinge at these times (m,)."""
+        normals, moments = self.equations(hinges_us)
+        explained = np.sum(moments * np.linalg.solve(normals, moments[..., None])[..., 0], axis=1)
+        costs: Floats = np.einsum("na,nab,nb->", self.centres_m, self.weights, self.centres_m) - explained
+        return costs
+
+
+def _terms(times_us: Floats, hinge_us: float | Floats) -> Floats:
+    s = (times_us - hinge_us) * 1e-6
+    after = np.maximum(s, 0.0)
+    return np.stack([s**0, s, s**2, s**3, after, after**2], axis=-1)
+
+
+class HingedPath:
+    """A ball's path in space, a cubic in time with a hinge, fitted to its measured places.
+
+    In space, as perspective bends the path in the image when a contact turns the speed towards the camera.
+
+    Parameters
+    ----------
+    places : _Places
+        The places.
+    hinge_us : float
+        Time of the hinge.
+    """
+
+    def __init__(self, places: _Places, hinge_us: float, camera: Camera, ball_radius_m: float) -> None:
+        self.hinge_us = hinge_us
+        self._camera, self._ball_radius_m = camera, ball_radius_m
+        normals, moments = places.equations(np.array([hinge_us]))
+        spread = np.linalg.inv(normals[0])
+        self._coefficients = (spread @ moments[0]).reshape(6, 3)
+        cost = float(places.costs(np.array([hinge_us]))[0])
+        rough = max(1.0, cost / max(1, 3 * places.times_us.size - 12))  # beyond the clean scene's errors
         variances, directions = np.linalg.eigh(rough * spread[12:15, 12:15])
         self.unsure_m_s: Floats = 2.0 * math.sqrt(variances[-1]) * directions[:, -1]
-
-    def _terms(self, times_us: Floats) -> Floats:
-        s = (times_us - self.hinge_us) * 1e-6
-        after = np.maximum(s, 0.0)
-        return np.stack([s**0, s, s**2, s**3, after, after**2], axis=-1)
 
     def velocity_m_s(self, time_us: float) -> Floats:
         """(3,) float64 velocity in m/s, camera frame."""
@@ -253,7 +285,7 @@ class HingedPath:
 
     def state(self, time_us: float) -> Floats:
         """(5,) float64 [x_px, y_px, vx_px_s, vy_px_s, radius_px] of the ball in the image."""
-        centres_m = self._terms(np.array([time_us, time_us + 1.0])) @ self._coefficients
+        centres_m = _terms(np.array([time_us, time_us + 1.0]), self.hinge_us) @ self._coefficients
         x, y, radius = self._camera.silhouette(centres_m, self._ball_radius_m)
         return np.array([x[0], y[0], (x[1] - x[0]) * 1e6, (y[1] - y[0]) * 1e6, radius[0]])
 
