@@ -100,16 +100,9 @@ def test_two_sightings_are_of_one_ball_if_it_moved_as_it_said(near: list[float],
 def test_other_balls_are_looked_for_every_5_ms_and_at_once_when_one_is_missed() -> None:
     state = track.start(TrackParameters(), PAPER_CONTEXT)
     state.looked_us = 50_000
-    many = np.zeros(track.FEW_EVENTS, np.int64)
-    state.contour = EventBatch(many, many.astype(np.uint16), many.astype(np.uint16), many.astype(bool))
     assert track._is_search_due(state, packet_to(51_000)), "no ball yet"
     state.balls = [tracked_ball()]
     assert not track._is_search_due(state, packet_to(54_999)) and track._is_search_due(state, packet_to(55_000))
-    state.pending = [(50_000, sighting())]
-    assert track._is_search_due(state, packet_to(51_000)), "a sighting waits"
-    state.pending = []
-    few = dataclasses.replace(state, contour=state.contour[1:])
-    assert track._is_search_due(few, packet_to(51_000))
     assert not track._is_search_due(state, packet_to(51_000))
     state.balls[0].coast(51_000)
     assert track._is_search_due(state, packet_to(51_000))
