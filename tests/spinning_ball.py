@@ -170,7 +170,7 @@ def after_track(
             seen = logo.step(
                 groups[0], states[0], packet, FilterResult(packet.events, packet.events, packet.events), ball
             )
-            rhythm = rate.step(groups[1], states[1], packet, seen)
+            rhythm = rate.step(groups[1], states[1], packet, ball, seen)
             moved = flow.step(groups[2], states[2], packet, ball, seen, rhythm)
             spins = [
                 triplet.step(groups[3], states[3], packet, moved, rhythm),

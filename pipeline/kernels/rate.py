@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numba
 import numpy as np
 
-from .arrays import Flags, Floats, Integers
+from .arrays import Events, Flags, Floats, Integers
 
 
 @numba.njit(cache=True, nogil=True)
@@ -99,13 +101,55 @@ def add_to_pattern(pattern: Floats, bins: Integers, normals: Floats, on: Flags) 
         if bins[i] < 0 or bins[i] >= pattern.shape[1]:
             continue
         x, y = 0.5 * (normals[i, 0] + 1.0) * last, 0.5 * (normals[i, 1] + 1.0) * last
-        column, row = min(max(int(x), 0), last - 1), min(max(int(y), 0), last - 1)
-        right, down = x - column, y - row
-        cells = pattern[1 if on[i] else 0, bins[i]]
-        cells[row, column] += (1.0 - right) * (1.0 - down)
-        cells[row, column + 1] += right * (1.0 - down)
-        cells[row + 1, column] += (1.0 - right) * down
-        cells[row + 1, column + 1] += right * down
+        _spread(pattern[1 if on[i] else 0, bins[i]], x, y)
+
+
+@numba.njit(cache=True, nogil=True)
+def add_to_disc(
+    pattern: Floats,
+    events: Events,
+    start_us: float,
+    bin_us: float,
+    reference_us: float,
+    centre_px: tuple[float, float],
+    velocity_px_s: tuple[float, float],
+    reach_px: float,
+) -> None:
+    """Add the events around a moving centre to `pattern` (2, n, c, c): bins of time, linearly between c x c cells.
+
+    Parameters
+    ----------
+    start_us, bin_us : float
+        Start of the first bin, and width of all.
+    reference_us : float
+        The time stamp that an event of the scene with the ball at `centre_px` carries.
+    reach_px : float
+        Distance from the centre within which events count; the cells span it to all sides.
+    """
+    t_us, x_px, y_px, on = events
+    last = pattern.shape[2] - 1
+    per_px = 0.5 * last / reach_px
+    for i in range(t_us.size):
+        at = math.floor((t_us[i] - start_us) / bin_us)
+        if at < 0 or at >= pattern.shape[1]:
+            continue
+        dt_s = (t_us[i] - reference_us) * 1e-6
+        dx = x_px[i] - (centre_px[0] + velocity_px_s[0] * dt_s)
+        dy = y_px[i] - (centre_px[1] + velocity_px_s[1] * dt_s)
+        if dx * dx + dy * dy < reach_px * reach_px:
+            _spread(pattern[1 if on[i] else 0, at], 0.5 * last + dx * per_px, 0.5 * last + dy * per_px)
+
+
+@numba.njit(cache=True, nogil=True)
+def _spread(cells: Floats, x: float, y: float) -> None:
+    """Add one event at a place, in cells, to those around it."""
+    last = cells.shape[1] - 1
+    column, row = min(max(int(x), 0), last - 1), min(max(int(y), 0), last - 1)
+    right, down = x - column, y - row
+    cells[row, column] += (1.0 - right) * (1.0 - down)
+    cells[row, column + 1] += right * (1.0 - down)
+    cells[row + 1, column] += (1.0 - right) * down
+    cells[row + 1, column + 1] += right * down
 
 
 def lag_sums(rows: Floats) -> tuple[Floats, Floats, float]:

@@ -13,7 +13,9 @@ from ..parameters import ParameterGroup, choice, tunable
 from ..results import Packet, ReadOnlyArrays
 from ..stage import Context, Stage
 from .logo import LogoResult
+from .rate_disc import DiscPattern
 from .rate_period import EXCLUDED, LogoPattern, PatternPeriod
+from .track import BallTrack
 
 # Fewer logo events than this in the window have no period that could be told from chance.
 FEWEST_EVENTS = 100
@@ -66,7 +68,8 @@ class RateResult(ReadOnlyArrays):
         Why spin_rps is None.
     period_spins_rps, period_log_likelihoods : (k,) float64
         Not in the paper: magnitudes by which the logo's pattern on the ball comes back, best first, and their log
-        likelihoods less that of the first; also when refused.
+        likelihoods less that of the first; also when refused. Of the logo's events, or of all events around the ball
+        where only these tell a period.
     period_std_rps : float
         1 sigma of the first; NaN without one.
     period_reason : str, optional
@@ -99,6 +102,7 @@ class RateState:
     first_bin: int | None = None
     counts: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     pattern: LogoPattern = field(default_factory=LogoPattern)
+    disc: DiscPattern = field(default_factory=DiscPattern)
 
 
 def start(parameters: RateParameters, context: Context) -> RateState:
@@ -111,25 +115,35 @@ def absent(parameters: RateParameters, reason: str) -> RateResult:
     return _without_period(parameters, np.empty(0, np.int64), np.empty(0), "no ball", PatternPeriod.nothing("no ball"))
 
 
-def step(parameters: RateParameters, state: RateState, packet: Packet, logo: LogoResult) -> RateResult:
+def step(parameters: RateParameters, state: RateState, packet: Packet, ball: BallTrack, logo: LogoResult) -> RateResult:
     """The event rate up to the end of the tick and, once it is periodic, the spin magnitude behind it.
 
     The magnitude is the rate of the logo's reappearance, seen from the camera: while the ball flies past, the line
     of sight turns too, which adds or takes up to speed / (2 pi distance), about 0.7 rps at 9 m/s and 2 m.
     """
-    first_bin = _count(parameters, state, packet, logo)
+    first_bin = _count(parameters, state, packet, ball, logo)
     ended = packet.end_us // parameters.bin_us - first_bin
     counts = state.counts[: max(ended, 0)]
     t_us = (first_bin + np.arange(counts.size)) * parameters.bin_us
     bin_s = parameters.bin_us * 1e-6
-    rate_hz, period = counts / bin_s, state.pattern.period(counts.size, bin_s, BEYOND * state.max_spin_rps)
+    rate_hz, period = counts / bin_s, _period(state, counts.size, bin_s)
     if counts.sum() < FEWEST_EVENTS:
         reason = f"{counts.sum()} logo events, {FEWEST_EVENTS} are needed"
         return _without_period(parameters, t_us, rate_hz, reason, period)
     return _with_period(parameters, state.max_spin_rps, t_us, rate_hz, period)
 
 
-def _count(parameters: RateParameters, state: RateState, packet: Packet, logo: LogoResult) -> int:
+def _period(state: RateState, bins: int, bin_s: float) -> PatternPeriod:
+    """Period of the logo's events; where that is not to be trusted, of all events of the disc if that one is."""
+    fastest_rps = BEYOND * state.max_spin_rps
+    period = state.pattern.period(bins, bin_s, fastest_rps)
+    if period.reason is not None:
+        of_disc = state.disc.period(bins, bin_s, fastest_rps)
+        period = period if of_disc.reason is not None else of_disc
+    return period
+
+
+def _count(parameters: RateParameters, state: RateState, packet: Packet, ball: BallTrack, logo: LogoResult) -> int:
     """Add the tick's events to the bins, forget those before the window, and return the number of the first bin."""
     first_bin = -(-packet.start_us // parameters.bin_us) if state.first_bin is None else state.first_bin
     bins = logo.events.t_us // parameters.bin_us - first_bin
@@ -139,6 +153,8 @@ def _count(parameters: RateParameters, state: RateState, packet: Packet, logo: L
     forget = max(length - parameters.window_us // parameters.bin_us, 0)
     state.pattern.add(logo.turning, first_bin, length, parameters.bin_us)
     state.pattern.forget(forget)
+    state.disc.add(packet, ball, first_bin, length, parameters.bin_us)
+    state.disc.forget(forget)
     state.counts, state.first_bin = counts[forget:], first_bin + forget
     return state.first_bin
 
@@ -229,7 +245,7 @@ STAGE = Stage(
     name="rate",
     label="Event rate",
     help="Rate of the logo's events, its moving average, and the rotation that its zero crossings tell.",
-    inputs=("packet", "logo"),
+    inputs=("packet", "ball", "logo"),
     reads=("spin.max_spin_rps",),
     parameters=RateParameters,
     start=start,

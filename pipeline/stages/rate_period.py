@@ -27,6 +27,8 @@ EXCLUDED = -2.0
 # Error of the last return: 0.5 ms (rms) in 117 simulated flights of more than 1.2 turns, 0.2 ms on 18 spinners.
 RETURN_STD_S = 0.5e-3
 ALTERNATIVES, APART = 4, 0.05
+# With so many events more in a place, one that has only a few does not outweigh the others.
+SPARSE_EVENTS = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,26 +84,53 @@ class LogoPattern:
         evidence out. Each polarity is judged by its own chance level, and their squares are added: one that shows
         nothing adds nothing.
         """
-        kept = self.cells[:, :bins].reshape(2, -1, CELLS * CELLS)
-        span_s = kept.shape[1] * bin_s
-        slowest_rps = max(FEWEST_TURNS / max(span_s, 1e-9), SLOWEST_RPS)
-        if slowest_rps >= max_spin_rps:
-            return PatternPeriod.nothing("the shot is too short for a period")
-        # Neighbours differ by a quarter of a bin at the last return.
-        count = math.ceil(math.log(max_spin_rps / slowest_rps) / (0.25 * bin_s / span_s))
-        spins_rps = np.geomspace(slowest_rps, max_spin_rps, count + 1)
-        squares, sums, bounds = np.zeros((3, count + 1))
-        for pattern in kept:
-            events = pattern.sum(axis=1, keepdims=True)
-            varying = pattern - events * (pattern.sum(axis=0) / max(float(pattern.sum()), 1.0))
-            by_lag, bound_by_lag, mean_square = lag_sums(varying)
-            own, most, products = over_multiples(by_lag, bound_by_lag, 1.0 / (spins_rps * bin_s))
-            squares += np.maximum(own, 0.0) ** 2 / np.maximum(mean_square * products, 1e-9)
-            sums, bounds = sums + own, bounds + most
-        return _judged(spins_rps, np.sqrt(squares), sums / np.maximum(bounds, 1e-9), RETURN_STD_S / span_s)
+        return period_of(self.cells[:, :bins], bin_s, max_spin_rps, FEWEST_TURNS, FEWEST_SIGMAS, None)
 
 
-def _judged(spins_rps: Floats, sigmas: Floats, correlations: Floats, relative_std: float) -> PatternPeriod:
+def period_of(
+    cells: Floats,
+    bin_s: float,
+    max_spin_rps: float,
+    fewest_turns: float,
+    fewest_sigmas: float,
+    nuisance: Floats | None,
+) -> PatternPeriod:
+    """Period of counts (2, n, c, c) by polarity, bin of time and place; see `LogoPattern.period`.
+
+    Parameters
+    ----------
+    fewest_turns, fewest_sigmas : float
+        Turns that the bins must hold of the slowest magnitude looked for, and the lead over chance that is asked for.
+    nuisance : (n, k) float64, optional
+        Orthonormal curves over time of what changes without the spin, taken out of each place's counts; the rest is
+        weighed by the counts' own standard deviation (Pearson's residuals), for places of many events drown the others.
+    """
+    kept = cells.reshape(2, cells.shape[1], -1)
+    span_s = kept.shape[1] * bin_s
+    slowest_rps = max(fewest_turns / max(span_s, 1e-9), SLOWEST_RPS)
+    if slowest_rps >= max_spin_rps:
+        return PatternPeriod.nothing("the shot is too short for a period")
+    # Neighbours differ by a quarter of a bin at the last return.
+    count = math.ceil(math.log(max_spin_rps / slowest_rps) / (0.25 * bin_s / span_s))
+    spins_rps = np.geomspace(slowest_rps, max_spin_rps, count + 1)
+    squares, sums, bounds = np.zeros((3, count + 1))
+    for pattern in kept:
+        events = pattern.sum(axis=1, keepdims=True)
+        varying = pattern - events * (pattern.sum(axis=0) / max(float(pattern.sum()), 1.0))
+        if nuisance is not None:
+            varying = varying - nuisance @ (nuisance.T @ varying)
+            varying /= np.sqrt((pattern.sum(axis=0) + SPARSE_EVENTS) / pattern.shape[0])
+        by_lag, bound_by_lag, mean_square = lag_sums(varying)
+        own, most, products = over_multiples(by_lag, bound_by_lag, 1.0 / (spins_rps * bin_s))
+        squares += np.maximum(own, 0.0) ** 2 / np.maximum(mean_square * products, 1e-9)
+        sums, bounds = sums + own, bounds + most
+    relative_std = RETURN_STD_S / span_s
+    return _judged(spins_rps, np.sqrt(squares), sums / np.maximum(bounds, 1e-9), relative_std, fewest_sigmas)
+
+
+def _judged(
+    spins_rps: Floats, sigmas: Floats, correlations: Floats, relative_std: float, fewest_sigmas: float
+) -> PatternPeriod:
     """The highest peaks of a curve of sigmas (m,) over magnitudes (m,), and whether the first is to be trusted.
 
     The sigmas grow with what overlaps, and so lean to short lags; the correlations (m,) say where a peak really is.
@@ -120,8 +149,8 @@ def _judged(spins_rps: Floats, sigmas: Floats, correlations: Floats, relative_st
     found = np.array([spins_rps[np.argmax(np.where(rows, correlations, -np.inf))] for rows in near])
     likelihoods = -0.5 * ((1.0 - sigmas[chosen] / best) / SPREAD) ** 2
     reason = None
-    if best < FEWEST_SIGMAS:
-        reason = f"the logo's pattern comes back by {best:.1f} sigma, {FEWEST_SIGMAS:g} are needed"
+    if best < fewest_sigmas:
+        reason = f"the logo's pattern comes back by {best:.1f} sigma, {fewest_sigmas:g} are needed"
     elif found.size > 1 and likelihoods[1] > EXCLUDED:
         reason = f"the logo's pattern comes back with {found[0]:.1f} and with {found[1]:.1f} rps"
     return PatternPeriod(found, likelihoods, float(found[0]) * relative_std, reason)

@@ -146,7 +146,7 @@ def test_a_flight_through_the_stages_after_the_track(benchmark: Any, name: str) 
                 groups[0], states[0], packet, FilterResult(packet.events, packet.events, packet.events), track.ball
             )
             clock.append(time.thread_time())
-            rhythm = rate.step(groups[1], states[1], packet, seen)
+            rhythm = rate.step(groups[1], states[1], packet, track.ball, seen)
             clock.append(time.thread_time())
             moved = flow.step(groups[2], states[2], packet, track.ball, seen, rhythm)
             clock.append(time.thread_time())

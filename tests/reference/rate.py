@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.kernels.arrays import Flags, Floats, Integers
 
 
@@ -18,6 +19,16 @@ def naive_pattern(bins: Integers, normals: Floats, on: Flags, length: int, cells
                     weight = max(1.0 - abs(x - column), 0.0) * max(1.0 - abs(y - row), 0.0)
                     pattern[int(on[i]), number, row, column] += weight
     return pattern
+
+
+def naive_disc(
+    events: EventBatch, at_px: Floats, start_us: float, bin_us: float, length: int, cells: int, reach_px: float
+) -> Floats:
+    """(2, length, cells, cells) of the events within reach of the centres (n, 2), as `naive_pattern` spreads them."""
+    off = (np.stack([events.x_px, events.y_px], axis=1) - at_px) / reach_px
+    rows = np.flatnonzero(np.hypot(off[:, 0], off[:, 1]) < 1.0)
+    bins = np.floor((events.t_us[rows] - start_us) / bin_us).astype(np.int64)
+    return naive_pattern(bins, off[rows], events.on[rows], length, cells)
 
 
 def naive_lag_sums(rows: Floats) -> tuple[Floats, Floats, float]:

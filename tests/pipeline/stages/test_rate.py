@@ -45,7 +45,7 @@ def rates(
             shot, state = track.shot, stage.start(group, CONTEXT)
         filtered = FilterResult(packet.events, packet.events, packet.events)
         seen = logo_stage.step(logo_stage.LogoParameters(), logo_state, packet, filtered, track.ball)
-        results.append(stage.step(group, state, packet, seen))
+        results.append(stage.step(group, state, packet, track.ball, seen))
     return results
 
 
@@ -98,7 +98,7 @@ def test_above_the_highest_spin_there_is_no_answer() -> None:
         track = known_track(packet.end_us)
         filtered = FilterResult(packet.events, packet.events, packet.events)
         logo = logo_stage.step(logo_stage.LogoParameters(), seen, packet, filtered, track.ball)
-        result = stage.step(group, state, packet, logo)
+        result = stage.step(group, state, packet, track.ball, logo)
     assert result.spin_rps is None
 
 
@@ -129,5 +129,5 @@ def test_ticks_of_another_length_than_the_bins_give_the_same_bins() -> None:
         track = known_track(packet.end_us)
         filtered = FilterResult(packet.events, packet.events, packet.events)
         logo = logo_stage.step(logo_stage.LogoParameters(), logo_state, packet, filtered, track.ball)
-        result = stage.step(group, state, packet, logo)
+        result = stage.step(group, state, packet, track.ball, logo)
     np.testing.assert_array_equal(result.rate_hz, rates(events, group)[-1].rate_hz)

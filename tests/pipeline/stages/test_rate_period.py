@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from spinscope.pipeline.kernels.rate import add_to_pattern, lag_sums, over_multiples
 from spinscope.pipeline.stages.logo import TurningEvents
-from spinscope.pipeline.stages.rate_period import CELLS, LogoPattern, PatternPeriod, _judged
+from spinscope.pipeline.stages.rate_period import CELLS, FEWEST_SIGMAS, LogoPattern, PatternPeriod, _judged
 from tests.reference.contrast import dotted_ball
 from tests.reference.rate import naive_lag_sums, naive_over_multiples, naive_pattern
 
@@ -110,7 +110,7 @@ def test_the_reason_for_refusal_names_what_remains(double: float, height: float,
         high * np.exp(-0.5 * (np.log(magnitudes / at) / 0.01) ** 2)
         for at, high in ((40.0, height), (80.0, double * height))
     )
-    found = _judged(magnitudes, curve, curve, 0.01).reason
+    found = _judged(magnitudes, curve, curve, 0.01, FEWEST_SIGMAS).reason
     assert found is None if reason is None else reason in str(found)
 
 

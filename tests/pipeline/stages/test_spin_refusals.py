@@ -89,7 +89,7 @@ def test_half_a_correlation_is_a_rhythm(monkeypatch: pytest.MonkeyPatch, peak: f
 def test_the_rate_needs_a_hundred_events(count: int, reason: str) -> None:
     packet = Packet(0, 0, 50_000, in_the_middle(np.linspace(0, 49_000, count).astype(np.int64)))
     state = rate.start(RateParameters(), CONTEXT)
-    assert reason in str(rate.step(RateParameters(), state, packet, seen(packet)).reason)
+    assert reason in str(rate.step(RateParameters(), state, packet, known_ball(packet.end_us), seen(packet)).reason)
 
 
 def test_the_first_bin_of_a_shot_lies_wholly_in_it() -> None:
@@ -101,7 +101,7 @@ def test_the_first_bin_of_a_shot_lies_wholly_in_it() -> None:
         Packet(1, 5000, 10_000, in_the_middle(t_us[:100])),
         Packet(2, 10_000, 15_000, in_the_middle(t_us[100:])),
     ):
-        result = rate.step(group, state, packet, seen(packet))
+        result = rate.step(group, state, packet, known_ball(packet.end_us), seen(packet))
     assert result.t_us[0] == 5600 and result.t_us[-1] == 14_000
     np.testing.assert_allclose(result.rate_hz, 14 / 700e-6)
 
