@@ -14,7 +14,7 @@ from ..results import Packet, ReadOnlyArrays
 from ..stage import Context, Stage
 from .logo import LogoResult
 from .rate_disc import DiscPattern
-from .rate_period import EXCLUDED, LogoPattern, PatternPeriod
+from .rate_period import EXCLUDED, FEWEST_SIGMAS, LogoPattern, PatternPeriod
 from .track import BallTrack
 
 # Fewer logo events than this in the window have no period that could be told from chance.
@@ -74,6 +74,8 @@ class RateResult(ReadOnlyArrays):
         1 sigma of the first; NaN without one.
     period_reason : str, optional
         Why the first is not to be trusted; None if it is.
+    period_sigmas : float
+        By how many standard deviations of chance the first comes back.
     """
 
     t_us: NDArray[np.int64]
@@ -89,6 +91,7 @@ class RateResult(ReadOnlyArrays):
     period_log_likelihoods: NDArray[np.float64]
     period_std_rps: float
     period_reason: str | None
+    period_sigmas: float = 0.0
 
 
 @dataclass(slots=True)
@@ -134,10 +137,10 @@ def step(parameters: RateParameters, state: RateState, packet: Packet, ball: Bal
 
 
 def _period(state: RateState, bins: int, bin_s: float) -> PatternPeriod:
-    """Period of the logo's events; where that is not to be trusted, of all events of the disc if that one is."""
+    """Period of the logo's events; where these show none, of all events of the disc if that is to be trusted."""
     fastest_rps = BEYOND * state.max_spin_rps
     period = state.pattern.period(bins, bin_s, fastest_rps)
-    if period.reason is not None:
+    if period.sigmas < FEWEST_SIGMAS:
         of_disc = state.disc.period(bins, bin_s, fastest_rps)
         period = period if of_disc.reason is not None else of_disc
     return period
@@ -175,8 +178,8 @@ def _without_period(
     )  # fmt: skip
 
 
-def _fields(period: PatternPeriod) -> tuple[NDArray[np.float64], NDArray[np.float64], float, str | None]:
-    return period.spins_rps, period.log_likelihoods, period.std_rps, period.reason
+def _fields(period: PatternPeriod) -> tuple[NDArray[np.float64], NDArray[np.float64], float, str | None, float]:
+    return period.spins_rps, period.log_likelihoods, period.std_rps, period.reason, period.sigmas
 
 
 def _ema_weight(parameters: RateParameters) -> float:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..kernels.rate import add_to_disc
 from ..results import Packet
-from .rate_period import PatternPeriod, period_of
+from .rate_period import FEWEST_TURNS, PatternPeriod, period_of
 from .track import BallTrack
 
 Floats = NDArray[np.float64]
@@ -18,8 +18,8 @@ Floats = NDArray[np.float64]
 # pattern: 0.37 of the radius.
 REACH, CELLS = 1.3, 8
 # The outline changes with the ball's way through the image; a cubic of time leaves nothing of that beyond chance in
-# what comes back three times.
-TREND_ORDER, FEWEST_TURNS = 3, 2.5
+# what comes back three times. Slower magnitudes are looked for as well: half of what is found is one.
+TREND_ORDER, RETURNS_TURNS = 3, 2.5
 # On balls without a logo (40 simulated flights, half of them of weak sensors) chance stays below 5 sigma.
 FEWEST_SIGMAS = 8.0
 # Lamps at the mains make the whole outline flicker at these rates, known as well as three periods tell.
@@ -49,7 +49,7 @@ class DiscPattern:
             (vx_px_s, vy_px_s),
             REACH * radius_px,
         )
-        x_px, y_px = ball.centre_px((first_bin + np.arange(kept, length) + 0.5) * bin_us)
+        x_px, y_px = ball.centre_px((first_bin + 0.5 + np.arange(kept, length, dtype=np.float64)) * bin_us)
         edges_px = np.stack([x_px - radius_px, x_px + radius_px, y_px - radius_px, y_px + radius_px], axis=1)
         self.cells, self.edges_px = grown, np.concatenate([self.edges_px, edges_px])
 
@@ -68,6 +68,8 @@ class DiscPattern:
         found = period_of(
             self.cells[:, :bins], bin_s, max_spin_rps, FEWEST_TURNS, FEWEST_SIGMAS, _nuisance(self.edges_px[:bins])
         )
+        if found.reason is None and found.spins_rps[0] * bins * bin_s < RETURNS_TURNS:
+            return replace(found, reason=f"{RETURNS_TURNS:g} turns are needed where only the outline tells the period")
         if found.reason is None and any(abs(found.spins_rps[0] - lamp_hz) < LAMP_WIDTH_HZ for lamp_hz in LAMPS_HZ):
             return replace(found, reason=f"the outline comes back with {found.spins_rps[0]:.0f} Hz, as lamps flicker")
         return found

@@ -58,6 +58,7 @@ LOG_ODDS_PER_SIGMA = 1.7
 NEGLIGIBLE = 0.01
 # Longer stretches may hold steady shading for the search to be rid of, and bursts to tell it by.
 BURSTS_FROM_S = 0.015
+NO_RHYTHMS = np.empty(0)
 # Below this part of a turn there are no other visits of the logo to be confused with; the grid search saw all of it.
 SCAN_FROM_TURNS = 0.7
 MAP_MAGNITUDES, MAP_DIRECTIONS = 41, 100
@@ -69,6 +70,7 @@ def estimate_spin(
     settings: ContrastSettings,
     *,
     starts_rps: Floats | None = None,
+    rhythms_rps: Floats = NO_RHYTHMS,
     searching: bool = True,
     scanning: bool = True,
 ) -> ContrastEstimate:
@@ -80,6 +82,8 @@ def estimate_spin(
         The logo's events of one stretch of time.
     starts_rps : (k, 3) float64, optional
         Spins to try first.
+    rhythms_rps : (k,) float64
+        Magnitudes at which the scan looks at all axes too: those by which the logo's pattern comes back.
     searching : bool
         Search over all spins, not only around the starts and their aliases; always so without starts.
     scanning : bool
@@ -102,7 +106,7 @@ def estimate_spin(
     seen_again = stretch.span_s * float(np.linalg.norm(spins[0])) > SCAN_FROM_TURNS * TURN
     if scanning and (not searching or seen_again):
         # The scan's few events may rank what is known already below its aliases.
-        spins = np.concatenate([alias_scan(moving, spins, settings), spins[:STARTS_KEPT]])
+        spins = np.concatenate([alias_scan(moving, spins, settings, rhythms_rps), spins[:STARTS_KEPT]])
     spins, margins = _ranked(events, spins, settings)
     some = _off_rim(events, settings).thinned(settings.refine_events)
     spins[0], _, _, _ = maximise(_objective(some, settings, settings.sigma_rad), spins[0], NO_OFFSETS, 1)
@@ -176,11 +180,14 @@ def maximise_over_growing_segments(events: SphereEvents, spins_rad_s: Floats, se
         turns *= GROW_RATIO
 
 
-def alias_scan(events: SphereEvents, spins_rad_s: Floats, settings: ContrastSettings) -> Floats:
+def alias_scan(
+    events: SphereEvents, spins_rad_s: Floats, settings: ContrastSettings, rhythms_rps: Floats = NO_RHYTHMS
+) -> Floats:
     """At most 6 spins (k, 3), best first: maxima of the score over everything, also far from the given ones.
 
     A logo that shows in short visits fixes the spin within a visit only roughly, and between visits only up to whole
-    turns. So magnitudes are looked for along each given axis, and all axes at each of these magnitudes.
+    turns. So magnitudes are looked for along each given axis, and all axes at each of these magnitudes and of the
+    rhythm's: a search may miss the axis that belongs to these.
     """
     sigma_rad, some = 2.0 * settings.sigma_rad, events.thinned(settings.scan_events)
     window, spread_s = _objective(some, settings, sigma_rad).window, float(np.std(some.t_s))
@@ -199,7 +206,8 @@ def alias_scan(events: SphereEvents, spins_rad_s: Floats, settings: ContrastSett
             ):
                 magnitudes.append(float(one))
     directions = spread_directions(SCAN_DIRECTIONS)
-    candidates = np.concatenate([*(directions * one for one in magnitudes[:ALIASES]), spins_rad_s])
+    looked_at = [*magnitudes[:ALIASES], *(rhythms_rps * TURN)]
+    candidates = np.concatenate([*(directions * one for one in looked_at), spins_rad_s])
     order = np.argsort(-scores(candidates, window, sigma_rad, settings.floor), kind="stable")
     candidates = candidates[order][distinct(candidates[order], 0.1, 6, 2)]
     candidates = np.concatenate([spins_rad_s, candidates])

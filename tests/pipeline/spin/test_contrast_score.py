@@ -149,6 +149,15 @@ def test_a_scan_where_nothing_turns_still_names_its_best(monkeypatch) -> None:
     assert_same(spins[0] / (2 * np.pi), SPIN)
 
 
+def test_a_scan_finds_the_axis_of_the_rhythm() -> None:
+    """From a start four times as fast about another axis, whose aliases do not reach it."""
+    start, magnitude = 4.0 * np.roll(SPIN, 1), float(np.linalg.norm(SPIN))
+    for rhythms, found in ((np.empty(0), False), (np.array([magnitude]), True)):
+        spins = estimate.alias_scan(dotted_ball(SPIN), 2 * np.pi * start[None], ContrastSettings(), rhythms)
+        apart = np.linalg.norm(spins / (2 * np.pi) - SPIN, axis=1).min()
+        assert (apart < 0.1 * magnitude) == found
+
+
 def test_following_goes_on_from_an_answer() -> None:
     events = dotted_ball(SPIN, duration_s=0.04, events=900)
     first = answer_of(events.at(events.t_s < 0.012))

@@ -10,6 +10,9 @@ import pytest
 
 from spinscope.pipeline.spin.contrast import stage
 from spinscope.pipeline.spin.contrast.events import ContrastEstimate
+from spinscope.pipeline.stages import rate
+from spinscope.pipeline.stages.rate import RateResult
+from tests.reference.contrast import dotted_ball
 
 PARAMETERS = stage.ContrastParameters(
     min_gain=0.25,
@@ -53,3 +56,32 @@ def test_each_threshold_is_where_its_parameter_says(
 ) -> None:
     assert stage._doubt(PARAMETERS, trusted) is None
     assert re.search(reason, stage._doubt(PARAMETERS, doubted) or "")
+
+
+def rhythm(*spins_rps: float, sigmas: float = 9.0) -> RateResult:
+    """A result of the rate stage with these magnitudes by which the pattern comes back."""
+    return replace(
+        rate.absent(rate.RateParameters(), "none"), period_spins_rps=np.array(spins_rps), period_sigmas=sigmas
+    )
+
+
+@pytest.mark.parametrize(
+    ("told", "misses"),
+    [
+        (rhythm(sigmas=0.0), False),
+        (rhythm(40.0, 20.0), False),  # one of them is enough
+        (rhythm(40.0, 80.0), True),
+        (rhythm(40.0, 80.0, sigmas=4.9), False),
+        (rhythm(22.2), False),  # 2.2 rps: three times 0.76
+        (rhythm(22.4), True),
+    ],
+)
+def test_an_answer_has_one_of_the_rhythms_magnitudes(told: RateResult, misses: bool) -> None:
+    assert stage._misses_rhythm(told, SURE) == misses
+
+
+@pytest.mark.parametrize(("off", "share"), [(0, 0.0), (3, 0.03), (50, 0.5), (98, 0.02)])
+def test_the_rarer_polarity_is_that_of_fewer_events(off: int, share: float) -> None:
+    ball = dotted_ball(SPIN, duration_s=0.02, events=100)
+    state = stage.ContrastState({}, parts=[(0, replace(ball, polarity=(np.arange(100) >= off).astype(np.int64)))])  # type: ignore[arg-type]
+    assert stage._rarer_polarity(state) == pytest.approx(share)

@@ -99,6 +99,10 @@ def test_pixels_that_the_outline_comes_to_are_no_period(monkeypatch: pytest.Monk
     assert period(*events).reason is None
 
 
+def test_two_visits_are_not_enough() -> None:
+    assert "2.5 turns are needed" in (period(*outline(logo_rps=21.0)).reason or "")
+
+
 @pytest.mark.parametrize("flicker_hz", [100.0, 120.0])
 def test_lamps_that_flicker_are_no_period(flicker_hz: float) -> None:
     assert "lamps" in (period(*outline(flicker_hz=flicker_hz)).reason or "")

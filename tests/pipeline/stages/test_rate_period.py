@@ -93,6 +93,10 @@ def test_what_does_not_come_back_is_refused() -> None:
     assert np.isnan(short.std_rps)
 
 
+def test_a_few_events_have_no_period() -> None:
+    assert "39 logo events, 40 are needed" in str(turning(np.array([50.0, 0.0, 0.0]), events=39).reason)
+
+
 @pytest.mark.parametrize(
     ("double", "height", "reason"),
     [
