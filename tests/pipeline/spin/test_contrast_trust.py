@@ -61,7 +61,10 @@ def test_each_threshold_is_where_its_parameter_says(
 def rhythm(*spins_rps: float, sigmas: float = 9.0) -> RateResult:
     """A result of the rate stage with these magnitudes by which the pattern comes back."""
     return replace(
-        rate.absent(rate.RateParameters(), "none"), period_spins_rps=np.array(spins_rps), period_sigmas=sigmas
+        rate.absent(rate.RateParameters(), "none"),
+        period_spins_rps=np.array(spins_rps),
+        period_log_likelihoods=-7.0 * np.arange(len(spins_rps)),
+        period_sigmas=sigmas,
     )
 
 
@@ -71,6 +74,7 @@ def rhythm(*spins_rps: float, sigmas: float = 9.0) -> RateResult:
         (rhythm(sigmas=0.0), False),
         (rhythm(40.0, 20.0), False),  # one of them is enough
         (rhythm(40.0, 80.0), True),
+        (rhythm(40.0, 80.0, 20.0), True),  # too unlikely
         (rhythm(40.0, 80.0, sigmas=4.9), False),
         (rhythm(22.2), False),  # 2.2 rps: three times 0.76
         (rhythm(22.4), True),
