@@ -15,7 +15,7 @@ from ..stage import Context, Stage
 from .logo import LogoResult
 from .rate_disc import DiscPattern
 from .rate_period import EXCLUDED, FEWEST_SIGMAS, LogoPattern, PatternPeriod
-from .track import BallTrack
+from .track_result import BallTrack
 
 # Fewer logo events than this in the window have no period that could be told from chance.
 FEWEST_EVENTS = 100

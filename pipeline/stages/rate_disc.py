@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..kernels.rate import add_to_disc
 from ..results import Packet
 from .rate_period import FEWEST_TURNS, PatternPeriod, period_of
-from .track import BallTrack
+from .track_result import BallTrack
 
 Floats = NDArray[np.float64]
 
