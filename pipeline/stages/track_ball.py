@@ -15,9 +15,10 @@ from ..kernels import crossing
 from ..kernels.outline import ON_OUTLINE_PX
 from ..kernels.take_events import take_events
 from ..results import Circle, Packet
-from .track_contact import PATH_US, Contact, PathPoint
+from .track_contact import PATH_US, Contact
 from .track_kalman import OBSERVED, OBSERVED_BLOCK, BallFilter
 from .track_outline import Edge, Sighting, measure
+from .track_path import PathPoint
 from .track_result import BeganBy
 
 Floats = NDArray[np.float64]

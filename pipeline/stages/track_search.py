@@ -24,6 +24,7 @@ MOST_CANDIDATES, MOST_RIVALS = 4, 2
 # Events of the second route: the latest of a busy scene's. An edge that moves on a pixel in SUPPORT_US (the slowest
 # ball of 20 px radius does) has its neighbour within that time.
 LEAST_EVENTS, MOST_EVENTS, SUPPORT_US = 40, 10_000, 2000
+DRAWING = SurfaceParameters()  # of the surface that they are drawn on
 # The velocity vote and the first fit take in circles that are off by 0.15 radii.
 SAME_SHARE = 0.15
 # Share of the events around a circle that its disc must explain. Marks and shading on the ball draw circles as well, of
@@ -65,7 +66,7 @@ def look(
     supported = supported_events(events, camera)
     if len(supported) < LEAST_EVENTS:
         return first, found, excluded
-    drawing = OrdinalSurface(SurfaceParameters(), camera.width_px, camera.height_px, table=eros.value_table)
+    drawing = OrdinalSurface(DRAWING, camera.width_px, camera.height_px, table=eros.value_table)
     drawn = SurfaceResult(drawing.drawn(supported), surface.cleaning)
     second, found, excluded_there = searching.circles(drawn, supported, stated, signed=False)
     excluded = excluded or excluded_there

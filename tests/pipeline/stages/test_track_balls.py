@@ -177,11 +177,13 @@ def test_the_samples_balls_begin_and_end_as_they_do() -> None:
 def test_a_shots_states_follow_each_other() -> None:
     for results in (tracked("flight_two_balls"), hit(42_000)):
         for shot in {ball.shot for result in results for ball in result.balls}:
-            times = [
-                state.t_us
+            ends_us = [
+                state.t_us + state.latency_us
                 for result in results
                 for ball in result.balls
                 if ball.shot == shot
                 for state in (*ball.earlier, ball)
             ]
-            assert all(later - before == 5000 for before, later in itertools.pairwise(times))
+            (start_us,) = {ball.start_us for result in results for ball in result.balls if ball.shot == shot}
+            assert ends_us[0] > start_us, "its first tick ends after the shot began"
+            assert all(later - before == 5000 for before, later in itertools.pairwise(ends_us))

@@ -12,7 +12,8 @@ from spinscope.pipeline.results import Circle
 from spinscope.pipeline.simulator import Air, Ball, Flight, Scene, flight
 from spinscope.pipeline.simulator.motion import Trajectory, trajectory, triple
 from spinscope.pipeline.stages import track_contact
-from spinscope.pipeline.stages.track_contact import Contact, PathPoint, find_contact, rolls
+from spinscope.pipeline.stages.track_contact import Contact, find_contact, rolls
+from spinscope.pipeline.stages.track_path import PathPoint
 
 ABOVE = Camera.of(CameraParameters(), 1280, 720)
 SIDE = Camera.of(CameraParameters(up=(0.0, -1.0, 0.0)), 1280, 720)
