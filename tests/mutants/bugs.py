@@ -26,8 +26,8 @@ CHAIN = [
     Mutant("pipeline/chain.py", "column.fault = error", "pass", "tests/pipeline/test_chain.py"),
     Mutant(
         "pipeline/chain.py",
-        "len(shot.results) >= wanted[number] for",
-        "len(shot.results) > 0 for",
+        "one.first + len(one.results) > last[shot] for",
+        "len(one.results) > 0 for",
         "tests/pipeline/test_chain.py",
     ),
     Mutant(
@@ -56,8 +56,8 @@ CHAIN = [
     ),
     Mutant(
         "pipeline/registry.py",
-        "for method in reversed(methods()):",
-        "for method in methods():",
+        "for method in reversed(methods()) if",
+        "for method in methods() if",
         "tests/pipeline/test_trusted_method.py",
     ),
     Mutant(
@@ -134,8 +134,8 @@ VALUES = [
     ),
     Mutant(
         "pipeline/shots.py",
-        "estimates=rows[-1].estimates,",
-        "estimates=rows[0].estimates,",
+        "estimates, doubt = rows[-1].estimates,",
+        "estimates, doubt = rows[0].estimates,",
         "tests/pipeline/test_shots.py",
     ),
     Mutant(
@@ -144,7 +144,43 @@ VALUES = [
         "return list(self._ended)",
         "tests/pipeline/test_shots.py",
     ),
-    Mutant("pipeline/shots.py", "end_us=rows[-1].end_us", "end_us=rows[-1].start_us", "tests/pipeline/test_shots.py"),
+    Mutant("pipeline/shots.py", "end_us=end.end_us", "end_us=rows[-1].end_us", "tests/pipeline/test_shots.py"),
+    Mutant(
+        "pipeline/shots.py",
+        "rows = [row for row in self._flying.pop(end.shot) if row.end_us <= end.end_us]",
+        "rows = self._flying.pop(end.shot)",
+        "tests/pipeline/test_shots.py",
+    ),
+    Mutant(
+        "pipeline/track_evidence.py",
+        "self.most_in_row < FEWEST_IN_ROW or self.longest_row_us < SHORTEST_US",
+        "self.most_in_row < FEWEST_IN_ROW and self.longest_row_us < SHORTEST_US",
+        "tests/pipeline/test_track_evidence.py",
+    ),
+    Mutant(
+        "pipeline/spin/combined.py",
+        "if odds < parameters.odds:",
+        "if odds < 1.0:",
+        "tests/pipeline/spin/test_combined.py",
+    ),
+    Mutant(
+        "pipeline/spin/combined.py",
+        "apart @ apart > (NEAR * np.linalg.norm(alone.vector_rps)) ** 2",
+        "apart @ apart > 0.0",
+        "tests/pipeline/spin/test_combined.py",
+    ),
+    Mutant(
+        "pipeline/spin/trajectory/stage.py",
+        "axis_std <= TRUSTED_AXIS_DEG and std <=",
+        "axis_std <= TRUSTED_AXIS_DEG or std <=",
+        "tests/pipeline/test_trusted_method.py",
+    ),
+    Mutant(
+        "pipeline/spin/trajectory/likelihood.py",
+        "known = set_up.gravity_m_s2 + set_up.drag_per_m * brake",
+        "known = set_up.gravity_m_s2 - set_up.drag_per_m * brake",
+        "tests/pipeline/spin/test_trajectory.py",
+    ),
     Mutant(
         "pipeline/shots.py",
         '"y_std_px": std["y_px"]',
@@ -300,14 +336,14 @@ STAGES = [
     ),
     Mutant(
         "pipeline/stages/track.py",
-        "packet.end_us - state.seen_us > parameters.coast_us",
-        "packet.end_us - state.seen_us >= parameters.coast_us",
+        "end_us - ball.seen_us > parameters.coast_us",
+        "end_us - ball.seen_us >= parameters.coast_us",
         "tests/pipeline/stages/test_track.py",
     ),
     Mutant(
-        "pipeline/stages/track.py",
-        "expected = _edge(parameters).outline(expected)",
-        "expected = _edge(parameters).ball(expected)",
+        "pipeline/stages/track_ball.py",
+        "expected = measuring.edge.outline(self.filter.mean)\n        # The velocity",
+        "expected = measuring.edge.ball(self.filter.mean)\n        # The velocity",
         "tests/pipeline/stages/test_track.py",
     ),
     Mutant(
@@ -615,8 +651,8 @@ EVALUATION = [
 COMMANDS = [
     Mutant(
         "app/commands/analyze.py",
-        "report = session.estimate(method, on_progress).to_dict()",
-        "report = session.estimate(on_progress=on_progress).to_dict()",
+        "result = session.estimate(method, on_progress)",
+        "result = session.estimate(on_progress=on_progress)",
         "tests/app/test_analyze.py -k one_method_only",
     ),
     Mutant(
