@@ -168,6 +168,10 @@ def step(
     # Neither does a flight that excludes them all.
     weights = drawn + np.where(by_flight.max(axis=1) > EXCLUDED, by_flight.T, 0.0).T
     estimate, rivals = _estimate(parameters, spins_rps, weights, evidence, best, by_logo, contrast.estimate.events)
+    if not by_logo and _log_mean(by_flight)[best] <= EXCLUDED:
+        # Its axis would be the flight's, which then must be that of a spin partly along the flight.
+        reason = f"no spin of {np.linalg.norm(spins_rps[best][0]):.0f} rps across the flight bends it like this one"
+        estimate = SpinEstimate.refused(METHOD, reason, contrast.estimate.events)
     by_witness = {name: _log_mean(values) for name, values in logs.items()}
     by_witness["contrast" if by_logo else "rate"] = own
     rival = max(rivals, key=lambda k: evidence[k], default=best)

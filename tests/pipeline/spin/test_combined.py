@@ -158,3 +158,21 @@ def test_it_is_trusted_where_contrast_alone_is_not_or_tells_another_spin() -> No
     assert trusted_method({"combined": together, "contrast": alone}) == "contrast"
     assert trusted_method({"combined": together, "contrast": REFUSED}) == "combined"
     assert trusted_method({"combined": together, "contrast": replace(alone, vector_rps=OTHER)}) == "combined"
+
+
+class _StraightFlight(_Flight):
+    """Flight that is bent as by a slow spin, by three sigma and more less than by a fast one across it."""
+
+    def log_likelihood(self, spins: np.ndarray) -> np.ndarray:
+        fast = np.linalg.norm(np.asarray(spins, float).reshape(-1, 3), axis=1) > 30.0
+        return super().log_likelihood(spins) - 8.0 * fast
+
+
+def test_a_rhythm_faster_than_the_flight_is_bent_has_no_axis() -> None:
+    """The spin lies partly along the flight, which does not bend it: the flight's axis is not the spin's."""
+    hidden = ContrastResult.nothing(SpinEstimate.refused("contrast", "the logo was not seen"))
+    straight = _StraightFlight(TOP, 8.0)
+    straight.magnitude_rps = 16.0
+    bent = replace(flight(TOP), likelihood=straight, across=straight)  # type: ignore[arg-type]
+    assert "across the flight" in (answered(hidden, bent, rhythm([60.2])).estimate.reason or "")
+    assert answered(hidden, bent, rhythm([16.2])).estimate.status == "ok"
