@@ -29,9 +29,9 @@ def results(
     parameters = contrast.ContrastParameters()
     state = session.chain.start(session.parameters, contrast.STAGE)
     found = []
-    for tick in session.ticks(("logo", "normal_flow"), forget=("surface",)):
+    for tick in session.ticks(("logo", "rate", "normal_flow"), forget=("surface",)):
         if tick.track.ball is not None:
-            given = tick.packet, tick.track.ball, logo_of(tick.logo), tick.normal_flow
+            given = tick.packet, tick.track.ball, tick.rate, logo_of(tick.logo), tick.normal_flow
             found.append(contrast.step(parameters, state, *given))
     assert session.truth is not None
     return found, session.truth.spin_rps[0]
@@ -120,7 +120,7 @@ def test_a_sure_normal_flow_that_says_otherwise_is_heard_until_the_logo_has_come
     ticks = list(session.ticks(forget=("surface",)))
     for tick in ticks:
         assert tick.track.ball is not None
-        given = tick.packet, tick.track.ball, tick.logo, MethodResult(other)
+        given = tick.packet, tick.track.ball, tick.rate, tick.logo, MethodResult(other)
         estimate = contrast.step(parameters, state, *given).estimate
         if tick.packet.end_us == 20_000:  # one turn
             assert estimate.status == "refused" and estimate.against == "normal_flow"
@@ -138,7 +138,7 @@ def test_noise_on_a_ball_is_no_spin_for_any_trusted_method(seed: int) -> None:
     ticks = [(packet, known_track(packet.end_us)) for packet in packets(events)]
     parameters = contrast.ContrastParameters()
     state = contrast.start(parameters, CONTEXT)
-    for (packet, track), (logo, _, _, spin) in zip(ticks, after_track(ticks), strict=True):
+    for (packet, track), (logo, rhythm, _, spin) in zip(ticks, after_track(ticks), strict=True):
         assert track.ball is not None
-        result = contrast.step(parameters, state, packet, track.ball, logo, MethodResult(spin["normal_flow"]))
+        result = contrast.step(parameters, state, packet, track.ball, rhythm, logo, MethodResult(spin["normal_flow"]))
         assert trusted_method({**spin, "contrast": result.estimate}) is None

@@ -13,12 +13,13 @@ from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.results import MethodResult, Packet, SpinEstimate
 from spinscope.pipeline.spin.contrast import stage as contrast
 from spinscope.pipeline.spin.contrast.events import ContrastEstimate
-from spinscope.pipeline.stages import logo
+from spinscope.pipeline.stages import logo, rate
 from spinscope.pipeline.stages.filter import FilterResult
 from tests.spinning_ball import CONTEXT, known_ball, packets, spinning_ball
 
 SPIN_RPS = np.array([40.0, 0.0, 20.0])
 SILENT = MethodResult(SpinEstimate.refused("normal_flow", "nothing yet"))
+NO_RHYTHM = rate.absent(rate.RateParameters(), "nothing yet")
 
 
 def seen(packet: Packet, **known: float) -> logo.LogoResult:
@@ -38,7 +39,7 @@ def test_events_and_places_older_than_the_window_are_forgotten_together(window_u
     state = contrast.start(parameters, CONTEXT)
     for number, packet in enumerate(ticks(), start=1):
         known = {"position_std_px": float(number), "radius_std_px": 0.1 * number, "velocity_std_px_s": 10.0 * number}
-        contrast.step(parameters, state, packet, known_ball(packet.end_us), seen(packet, **known), SILENT)
+        contrast.step(parameters, state, packet, known_ball(packet.end_us), NO_RHYTHM, seen(packet, **known), SILENT)
         kept = list(range(max(1, number - window_us // 5000 + 1), number + 1))
         assert [end_us for end_us, _ in state.parts] == [5000 * one for one in kept]
         assert [stds[0] for stds in state.ball_stds] == kept
@@ -70,7 +71,7 @@ def stated(position_std_px: float, velocity_std_px_s: float, radius_std_px: floa
     for packet in ticks():
         known = {"position_std_px": position_std_px, "velocity_std_px_s": velocity_std_px_s}
         given = seen(packet, radius_std_px=radius_std_px, **known)
-        result = contrast.step(parameters, state, packet, known_ball(packet.end_us), given, SILENT)
+        result = contrast.step(parameters, state, packet, known_ball(packet.end_us), NO_RHYTHM, given, SILENT)
     assert result.estimate.status == "ok", result.estimate.reason
     return result.estimate
 
@@ -96,7 +97,7 @@ def judged(answer: ContrastEstimate, flow: SpinEstimate, **values: float) -> Spi
     parameters = contrast.ContrastParameters(**values)
     state = contrast.start(parameters, CONTEXT)
     state.answer, state.reason = answer, contrast._doubt(parameters, answer)
-    return contrast._result(parameters, state, 300, True, flow).estimate
+    return contrast._result(parameters, state, 300, True, NO_RHYTHM, flow).estimate
 
 
 @pytest.mark.parametrize(("flow_sigmas", "sigmas"), [(6.0, 5.9), (6.0, 6.1), (2.0, 1.9), (2.0, 2.1)])
@@ -159,7 +160,7 @@ def test_a_tick_without_events_keeps_what_is_known() -> None:
     parameters = contrast.ContrastParameters(fewest_events=10)
     state = contrast.start(parameters, CONTEXT)
     for packet in ticks():
-        contrast.step(parameters, state, packet, known_ball(packet.end_us), seen(packet), SILENT)
+        contrast.step(parameters, state, packet, known_ball(packet.end_us), NO_RHYTHM, seen(packet), SILENT)
     empty = Packet(8, 40_000, 45_000, EventBatch.empty())
-    result = contrast.step(parameters, state, empty, known_ball(45_000), seen(empty), SILENT)
+    result = contrast.step(parameters, state, empty, known_ball(45_000), NO_RHYTHM, seen(empty), SILENT)
     assert result.estimate.status == "ok" and state.answer is not None
