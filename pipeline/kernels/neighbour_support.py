@@ -18,8 +18,9 @@ def supported_events(last_us: Pixels, events: Events, within_us: int) -> Integer
     Parameters
     ----------
     last_us : (height + 2, width + 2) uint16
-        Time of each pixel's last event less the first one's, plus one, at most 65,535; zeros at the start. Two bytes
-        a pixel: fetching them is most of the work. The frame of one pixel around the image stays empty.
+        Time of each pixel's last event less the first one's, plus one, at most 65,535; zeros at the start and again at
+        the end, so that it can be used again: a new one costs more than the work. Two bytes a pixel, as fetching them
+        is most of that. The frame of one pixel around the image stays empty.
     within_us : int
         Longest time between an event and its neighbour's.
     """
@@ -37,4 +38,6 @@ def supported_events(last_us: Pixels, events: Events, within_us: int) -> Integer
         last_us[row, column] = now_us
         chosen[m] = i
         m += (newest_us > 0) & (now_us - newest_us <= within_us)
+    for i in range(t_us.size):
+        last_us[np.int64(y_px[i]) + 1, np.int64(x_px[i]) + 1] = 0
     return chosen[:m].copy()

@@ -30,7 +30,7 @@ from .track_kalman import load_filter
 from .track_limits import Limits
 from .track_outline import VOTE_US, Edge, Sighting
 from .track_result import BallTrack, BeganBy, EndedBy, ShotEnd, Status, TrackResult
-from .track_search import MOST_CANDIDATES, MOST_RIVALS, ROUTES, Route, agree, look, moved, outside_balls
+from .track_search import MOST_CANDIDATES, MOST_RIVALS, ROUTES, Route, agree, look, moved, outside_balls, support_times
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,6 +82,7 @@ class TrackState:
     context: Context
     limits: Limits
     measuring: Measuring
+    last_us: NDArray[np.uint16]
     contour: EventBatch = field(default_factory=EventBatch.empty)
     balls: list[TrackedBall] = field(default_factory=list)
     pending: list[tuple[int, Sighting]] = field(default_factory=list)
@@ -112,7 +113,7 @@ def start(parameters: TrackParameters, context: Context) -> TrackState:
     )
     if parameters.ball == "flying":
         load_filter()  # loaded now and not in the middle of a shot
-    return TrackState(context, limits, measuring)
+    return TrackState(context, limits, measuring, support_times(context.camera))
 
 
 def step(
@@ -269,7 +270,8 @@ def _search(
     routes: tuple[Route, ...] = ROUTES
     if state.balls and len(events) >= FEW_EVENTS:
         routes = (ROUTES[packet.end_us // LOOK_US % 2],)
-    hough, found, excluded = look(surface, events, packet.end_us, state.context.camera, state.limits, most, routes)
+    camera, limits = state.context.camera, state.limits
+    hough, found, excluded = look(surface, events, packet.end_us, camera, limits, state.last_us, most, routes)
     state.excluded = None if state.balls else excluded or state.excluded
     pending, state.pending = state.pending, []
     for sighting, circle in found:

@@ -45,6 +45,7 @@ def look(
     end_us: int,
     camera: Camera,
     limits: Limits,
+    last_us: NDArray[np.uint16],
     most: int,
     routes: tuple[Route, ...] = ROUTES,
 ) -> tuple[Circle | None, Found, str | None]:
@@ -52,7 +53,7 @@ def look(
 
     Trusted ones come first, then the faster ones. The paper's surface is searched first. Where it shows no ball, the
     contour events that a neighbour supports: in low contrast an outline gives one event a pixel, of which STC lets
-    nothing pass.
+    nothing pass. For that, last_us is of `support_times` and used again and again.
     """
     stated = limits.radius_min_px, limits.radius_max_px
     searching = _Searching(end_us, camera, limits, most)
@@ -63,7 +64,7 @@ def look(
         first, found, excluded = searching.circles(surface, events, stated, signed=True)
     if found or "contour" not in routes or len(events) < LEAST_EVENTS:
         return first, found, excluded
-    supported = supported_events(events, camera)
+    supported = supported_events(events, last_us)
     if len(supported) < LEAST_EVENTS:
         return first, found, excluded
     drawing = OrdinalSurface(DRAWING, camera.width_px, camera.height_px, table=eros.value_table)
@@ -125,10 +126,14 @@ def _is_same(one: Circle, other: Circle) -> bool:
     return bool(apart_px < error_px and abs(one.radius_px - other.radius_px) < error_px)
 
 
-def supported_events(events: EventBatch, camera: Camera) -> EventBatch:
+def support_times(camera: Camera) -> NDArray[np.uint16]:
+    """Empty times of each pixel's last event, see `neighbour_support.supported_events`."""
+    return np.zeros((camera.height_px + 2, camera.width_px + 2), np.uint16)
+
+
+def supported_events(events: EventBatch, last_us: NDArray[np.uint16]) -> EventBatch:
     """The events, of many the latest MOST_EVENTS, that a neighbour supports."""
     latest = events[-MOST_EVENTS:]
-    last_us = np.zeros((camera.height_px + 2, camera.width_px + 2), np.uint16)
     rows = neighbour_support.supported_events(last_us, latest.columns, SUPPORT_US)
     return EventBatch(*take_events(rows, latest.columns))
 
