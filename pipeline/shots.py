@@ -151,8 +151,8 @@ class Shot:
 class ShotLog:
     """Shots gathered from ticks in order of time, keeping of each tick only what a shot needs.
 
-    A ball that was followed for a single tick of several is no shot, nor one that rolls or lies. What a shot's results
-    say of ticks that end after it, before its end was known, does not count.
+    A ball that was followed for a single tick of several is no shot, nor one that rolls, lies or is a shadow. What a
+    shot's results say of ticks that end after it, before its end was known, does not count.
     """
 
     def __init__(self) -> None:
@@ -200,7 +200,7 @@ class ShotLog:
     def _end(self, end: ShotEnd) -> None:
         rows = [row for row in self._flying.pop(end.shot) if row.end_us <= end.end_us]
         if rows and not rows[-1].track.is_shot:
-            self._last_reason = "no shot: a ball rolls or lies, it does not fly"
+            self._last_reason = "no shot: what is seen rolls, lies or is a shadow, it does not fly"
         elif len(rows) > 1 or (rows and self._tick_count == 1):
             self._ended.append(_shot(rows, end))
         else:
