@@ -98,7 +98,8 @@ def _last_estimate(case: str, recording: SimulatedRecording, parameters: Paramet
             ball = _true_ball(ball, tick.packet.end_us, recording, ball.latency_us if late else 0.0)
             mask = parameters.logo if late else replace(parameters.logo, delay_us=0.0)
             events = mask_stage.step(mask, chain.start(parameters, mask_stage), tick.packet, tick.filter, ball)
-        estimate = stage.step(parameters.contrast, state, tick.packet, ball, events, normal_flow).estimate
+        inputs = (tick.packet, ball, events, tick.rate, normal_flow)
+        estimate = stage.step(parameters.contrast, state, *inputs).estimate
         end_us = tick.packet.end_us
     return estimate, end_us
 
