@@ -98,7 +98,7 @@ def _last_estimate(case: str, recording: SimulatedRecording, parameters: Paramet
             ball = _true_ball(ball, tick.packet.end_us, recording, ball.latency_us if late else 0.0)
             mask = parameters.logo if late else replace(parameters.logo, delay_us=0.0)
             events = mask_stage.step(mask, chain.start(parameters, mask_stage), tick.packet, tick.filter, ball)
-        inputs = (tick.packet, ball, events, tick.rate, normal_flow)
+        inputs = (tick.packet, ball, tick.rate, events, normal_flow)
         estimate = stage.step(parameters.contrast, state, *inputs).estimate
         end_us = tick.packet.end_us
     return estimate, end_us
