@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..kernels.rate import add_to_disc
 from ..results import Packet
-from .rate_period import FEWEST_TURNS, PatternPeriod, period_of
+from .rate_period import FEWEST_EVENTS, FEWEST_TURNS, PatternPeriod, period_of
 from .track_result import BallTrack
 
 Floats = NDArray[np.float64]
@@ -65,6 +65,9 @@ class DiscPattern:
         the logo. What the outline does without it is taken out of every place's counts first: slow changes, and the
         burst whenever one of the disc's four edges comes to the next row or column of pixels.
         """
+        events = round(float(self.cells[:, :bins].sum()))
+        if events < FEWEST_EVENTS:
+            return PatternPeriod.nothing(f"{events} events on the ball, {FEWEST_EVENTS} are needed")
         found = period_of(
             self.cells[:, :bins], bin_s, max_spin_rps, FEWEST_TURNS, FEWEST_SIGMAS, _nuisance(self.edges_px[:bins])
         )

@@ -24,7 +24,7 @@ LABEL = "Real scenes"
 HELP = "Every flight in scenes like a lab's or a club's: backgrounds, clutter, bounces, several balls, sensors."
 
 CHOICE_SEED, SEED = 75_000, 660_557
-SEEDS = 4  # scenes of each kind
+SEEDS = 2  # scenes of each kind
 QUICK = ("davis346", "bounce", "crossing")
 
 # Smallest share of flights answered, by group: what is asked of the program.

@@ -13,7 +13,7 @@ from spinscope.pipeline.results import Packet
 from spinscope.pipeline.stages import rate_disc
 from spinscope.pipeline.stages.rate_disc import CELLS, DiscPattern
 from spinscope.pipeline.stages.rate_period import PatternPeriod
-from spinscope.pipeline.stages.track import BallTrack
+from spinscope.pipeline.stages.track_result import BallTrack
 from tests.reference.rate import naive_disc
 
 BIN_US, RADIUS_PX, DURATION_US = 500, 18.0, 100_000
@@ -106,3 +106,8 @@ def test_two_visits_are_not_enough() -> None:
 @pytest.mark.parametrize("flicker_hz", [100.0, 120.0])
 def test_lamps_that_flicker_are_no_period(flicker_hz: float) -> None:
     assert "lamps" in (period(*outline(flicker_hz=flicker_hz)).reason or "")
+
+
+def test_a_shot_that_begins_right_before_a_ticks_end_has_no_period_yet() -> None:
+    period = DiscPattern().period(0, BIN_US * 1e-6, 165.0)
+    assert period.reason == "0 events on the ball, 40 are needed" and not period.spins_rps.size
