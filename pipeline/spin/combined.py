@@ -39,6 +39,11 @@ NEAR = 0.1
 # Beyond this spread (1 sigma) the flight names no axis; axes are drawn so many times as widely as it states.
 WIDEST_RAD, WIDER = math.radians(30.0), 1.5
 LABELS = {"rate": "the rhythm", "normal_flow": "the normal flow", "contrast": "the pattern", "trajectory": "the flight"}
+# Without a pattern nothing tells how many marks the ball has: a seam, or stamps on both sides, come back twice a turn.
+# Few balls show these alone.
+TWO_SIDED = 0.05
+# People's shots: median 46 rps, 95 % below 120 (4,024 real shots). Counts where only rhythm and flight speak.
+HUMAN_RPS, HUMAN_SPREAD = 46.0, math.log(120.0 / 46.0) / 1.645
 # A witness that makes one spin three times as likely as the next speaks for it.
 SPEAKS = math.log(3.0)
 # Standard normal deviates by which every candidate's spread is sampled.
@@ -52,6 +57,7 @@ class CombinedParameters(ParameterGroup):
     odds: float = tunable(
         100.0, 1.0, 1e6, 1.0, "", "how many times more likely the spin must be than all others together"
     )
+    rhythm_odds: float = tunable(20.0, 1.0, 1e6, 1.0, "", "the same where only rhythm and flight speak")
     axis_std_deg: float = tunable(12.0, 0.1, 180.0, 0.5, "deg", "largest stated error of an axis by the logo (1 sigma)")
     flight_axis_std_deg: float = tunable(
         20.0, 0.1, 180.0, 0.5, "deg", "largest stated error of an axis by the flight alone (1 sigma)"
@@ -168,9 +174,9 @@ def step(
     # Neither does a flight that excludes them all.
     weights = drawn + np.where(by_flight.max(axis=1) > EXCLUDED, by_flight.T, 0.0).T
     estimate, rivals = _estimate(parameters, spins_rps, weights, evidence, best, by_logo, contrast.estimate.events)
-    if not by_logo and _log_mean(by_flight)[best] <= EXCLUDED:
-        # Its axis would be the flight's, which then must be that of a spin partly along the flight.
-        reason = f"no spin of {np.linalg.norm(spins_rps[best][0]):.0f} rps across the flight bends it like this one"
+    if not by_logo and _log_mean(by_flight)[0] <= EXCLUDED:
+        # The rhythm's spin is partly along the flight, or comes back more than once a turn.
+        reason = f"no spin of {np.linalg.norm(spins_rps[0][0]):.0f} rps across the flight bends it like this one"
         estimate = SpinEstimate.refused(METHOD, reason, contrast.estimate.events)
     by_witness = {name: _log_mean(values) for name, values in logs.items()}
     by_witness["contrast" if by_logo else "rate"] = own
@@ -219,9 +225,19 @@ def _by_rhythm(rate: RateResult, trajectory: TrajectoryResult, gyro_std_deg: flo
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     log_weights = 0.5 * SAMPLES[:, 1] ** 2
     return [
-        _Candidate((magnitude + std * SAMPLES[:, 0])[:, None] * directions, log_weights, log)
+        _Candidate(
+            ((magnitude + std * SAMPLES[:, 0]) / marks)[:, None] * directions,
+            log_weights,
+            log + math.log(share) + _log_prior(magnitude / marks),
+        )
         for magnitude, std, log in _rhythms(rate)
+        for marks, share in ((1, 1.0 - TWO_SIDED), (2, TWO_SIDED))
     ]
+
+
+def _log_prior(magnitude_rps: float) -> float:
+    """Logarithmic density of a magnitude among people's shots, per logarithm of the magnitude, less the highest."""
+    return -0.5 * (math.log(magnitude_rps / HUMAN_RPS) / HUMAN_SPREAD) ** 2
 
 
 def _rhythms(rate: RateResult) -> list[tuple[float, float, float]]:
@@ -323,7 +339,7 @@ def _doubt(
     magnitude, std, axis_std = estimate.magnitude_rps, estimate.magnitude_std_rps, estimate.axis_std_deg
     if magnitude is None or std is None or axis_std is None:
         return "the ball does not turn"
-    if odds < parameters.odds:
+    if odds < (parameters.odds if by_logo else parameters.rhythm_odds):
         rival = means[others[np.argmax(evidence[others])]]
         return (
             f"all witnesses together leave two spins open: {_words(estimate.vector_rps)} is only {odds:.0f} times "

@@ -176,3 +176,9 @@ def test_a_rhythm_faster_than_the_flight_is_bent_has_no_axis() -> None:
     bent = replace(flight(TOP), likelihood=straight, across=straight)  # type: ignore[arg-type]
     assert "across the flight" in (answered(hidden, bent, rhythm([60.2])).estimate.reason or "")
     assert answered(hidden, bent, rhythm([16.2])).estimate.status == "ok"
+
+
+def test_a_seam_that_comes_back_twice_a_turn_is_not_taken_for_twice_the_spin() -> None:
+    hidden = ContrastResult.nothing(SpinEstimate.refused("contrast", "the logo was not seen"))
+    fast = answered(hidden, flight(TOP), rhythm([115.0])).estimate
+    assert "two spins open" in (fast.reason or ""), "half of it is as usual as it is rare"
