@@ -2,7 +2,7 @@
 
 recording | camera | simulator -> packets of one tick
     -> per recording: filter -> surface -> track
-    -> per ball in flight: logo -> rate -> flow -> triplet, normal_flow -> contrast -> trajectory
+    -> per ball in flight: logo -> rate -> flow -> triplet, normal_flow -> contrast, trajectory -> combined
 
 A column is one stage's results so far plus the state to go on. Its key is the source's identity and the chain of
 (stage, parameter values) up to it, compared by value: a changed parameter re-runs its stage and those that read

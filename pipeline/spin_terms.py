@@ -99,6 +99,11 @@ def spin_words(estimate: SpinEstimate) -> str:
     return f"{magnitude:.1f}{margin} rps ({rpm(magnitude):.0f} rpm)"
 
 
+def vector_words(spin_rps: Vector | None) -> str:
+    """Components of a spin (3,) in whole rps, "nothing" without one."""
+    return "nothing" if spin_rps is None else f"({', '.join(f'{value:.0f}' for value in spin_rps)}) rps"
+
+
 def std_words(std: float) -> str:
     """One decimal, or two where one would say that there is no uncertainty."""
     return f"{std:.1f}" if std >= 0.095 else f"{std:.2f}"

@@ -18,6 +18,7 @@ import numpy as np
 from ..kernels.arrays import Floats, Integers
 from ..parameters import ParameterGroup, tunable
 from ..results import MethodResult, ReadOnlyArrays, SpinEstimate
+from ..spin_terms import vector_words
 from ..stage import Context, SpinMethod
 from ..stages.rate import RateResult
 from .contrast.estimate import LOG_ODDS_PER_SIGMA
@@ -342,18 +343,14 @@ def _doubt(
     if odds < (parameters.odds if by_logo else parameters.rhythm_odds):
         rival = means[others[np.argmax(evidence[others])]]
         return (
-            f"all witnesses together leave two spins open: {_words(estimate.vector_rps)} is only {odds:.0f} times "
-            f"as likely as {_words(rival)}"
+            f"all witnesses together leave two spins open: {vector_words(estimate.vector_rps)} is only "
+            f"{odds:.0f} times as likely as {vector_words(rival)}"
         )
     if std > max(parameters.magnitude_std_rps, 0.1 * magnitude):
         return f"the magnitude is too uncertain: {magnitude:.1f} +- {std:.1f} rps"
     if axis_std > (parameters.axis_std_deg if by_logo else parameters.flight_axis_std_deg):
         return f"the axis is too uncertain: +- {axis_std:.0f} degrees"
     return None
-
-
-def _words(spin_rps: Floats | None) -> str:
-    return "nothing" if spin_rps is None else f"({', '.join(f'{value:.0f}' for value in spin_rps)}) rps"
 
 
 def _witnesses(

@@ -19,6 +19,7 @@ import numpy as np
 from ...kernels.arrays import Floats
 from ...parameters import ParameterGroup, switch, tunable
 from ...results import MethodResult, Packet, SpinEstimate
+from ...spin_terms import vector_words
 from ...stage import Context, SpinMethod
 from ...stages.logo import LogoResult
 from ...stages.rate import RateResult
@@ -301,7 +302,7 @@ def _doubt(parameters: ContrastParameters, answer: ContrastEstimate) -> str | No
         return "the ball does not turn"
     if answer.margins.size and answer.margins.min() < parameters.rival_sigmas:
         rival = answer.rivals_rps[int(np.argmin(answer.margins))]
-        return f"another spin explains the logo about as well: {_words(answer.spin_rps)} or {_words(rival)}"
+        return f"another spin explains the logo about as well: {vector_words(answer.spin_rps)} or {vector_words(rival)}"
     if std > max(parameters.magnitude_std_rps, 0.1 * magnitude):
         return f"the magnitude is too uncertain: {magnitude:.1f} +- {std:.1f} rps"
     if axis_std > parameters.axis_std_deg:
@@ -339,10 +340,6 @@ def _misses_rhythm(rate: RateResult, answer: ContrastEstimate) -> bool:
     return bool(np.all(off_rps > RHYTHM_SIGMAS * math.hypot(std, RHYTHM_SHARE * magnitude, SIGHT_RPS)))
 
 
-def _words(spin_rps: Floats | None) -> str:
-    return "nothing" if spin_rps is None else f"({', '.join(f'{value:.0f}' for value in spin_rps)}) rps"
-
-
 def _result(
     parameters: ContrastParameters, state: ContrastState, count: int, full: bool, rate: RateResult, flow: SpinEstimate
 ) -> ContrastResult:
@@ -362,10 +359,13 @@ def _result(
         )
         estimate = SpinEstimate.refused(METHOD, reason, count)
     elif (sigmas := _apart(estimate, flow)) > parameters.flow_sigmas and not _settled(parameters, state):
-        reason = f"the normal flow says {_words(flow.vector_rps)}, {sigmas:.0f} sigma from {_words(answer.spin_rps)}"
+        best, other = vector_words(answer.spin_rps), vector_words(flow.vector_rps)
+        reason = f"the normal flow says {other}, {sigmas:.0f} sigma from {best}"
         estimate = SpinEstimate.refused(METHOD, reason, count, against=FLOW_METHOD)
     elif misses_rhythm:
-        reason = f"the logo comes back with {rate.period_spins_rps[0]:.1f} rps, not with {_words(answer.spin_rps)}"
+        reason = (
+            f"the logo comes back with {rate.period_spins_rps[0]:.1f} rps, not with {vector_words(answer.spin_rps)}"
+        )
         estimate = SpinEstimate.refused(METHOD, reason, count)
     middle_us, half_us = answer.reference_s * 1e6, 0.5e6 * answer.span_s
     return ContrastResult(
