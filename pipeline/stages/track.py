@@ -26,7 +26,6 @@ from .surface import SurfaceResult
 from .track_ball import Measuring, TrackedBall
 from .track_contact import ROLLING_M_S, Contact, find_contact, rolls
 from .track_hough import hough_near
-from .track_kalman import load_filter
 from .track_limits import Limits
 from .track_outline import VOTE_US, Edge, Sighting
 from .track_result import BallTrack, BeganBy, EndedBy, ShotEnd, Status, TrackResult
@@ -111,8 +110,6 @@ def start(parameters: TrackParameters, context: Context) -> TrackState:
         parameters.acceleration_m_s2,
         parameters.approach_m_s,
     )
-    if parameters.ball == "flying":
-        load_filter()  # loaded now and not in the middle of a shot
     return TrackState(context, limits, measuring, support_times(context.camera))
 
 
