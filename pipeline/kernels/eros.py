@@ -23,6 +23,8 @@ event-cameras", IEEE Transactions on Pattern Analysis and Machine Intelligence 4
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numba import njit
 
@@ -42,8 +44,9 @@ def odd_px(k_px: int) -> int:
     return k_px | 1
 
 
+@cache
 def value_table(k_px: int) -> Bytes:
-    """Value of each level: (levels + 1,) uint8; the last is 255, at the level that an event sets.
+    """Value of each level: (levels + 1,) uint8, not to be written into; the last is 255, at the level an event sets.
 
     By multiplying again and again, as the reference does: 255 x 0.3 = 76.5 is a tie that rounding errors
     decide.

@@ -64,11 +64,24 @@ def peak(votes: Pixels, radius0_px: int) -> tuple[float, int, int, int]:
     return best, best_a, best_b, best_k
 
 
+@njit(cache=True, nogil=True)
 def bright_pixels(image: Bytes, least: int, most_pixels: int) -> tuple[Integers, Integers]:
     """Columns and rows (m,) int64 of the pixels of at least this value, thinned evenly to most_pixels."""
-    rows, columns = np.nonzero(image >= least)
-    stride = max(1, -(-rows.size // max(most_pixels, 1))) | 1  # odd: even ones would pick out whole columns
-    return columns[::stride].copy(), rows[::stride].copy()
+    height, width = image.shape
+    bright = 0
+    for y in range(height):
+        for x in range(width):
+            bright += image[y, x] >= least
+    stride = max(1, -(-bright // max(most_pixels, 1))) | 1  # odd: even ones would pick out whole columns
+    columns, rows = np.empty(-(-bright // stride), np.int64), np.empty(-(-bright // stride), np.int64)
+    n = 0
+    for y in range(height):
+        for x in range(width):
+            if image[y, x] >= least:
+                if n % stride == 0:
+                    columns[n // stride], rows[n // stride] = x, y
+                n += 1
+    return columns, rows
 
 
 @njit(cache=True, nogil=True)
@@ -95,32 +108,55 @@ def active_cells(values: Bytes, x_px: Pixels, y_px: Pixels, least: int, cell_px:
         bright += values[y_px[i], x_px[i]] >= least
     if bright < 8:
         return np.empty(0, np.int64), np.empty(0, np.int64)
-    rows = -(-values.shape[0] // cell_px)
-    columns = -(-values.shape[1] // cell_px)
-    active = np.zeros((rows + 2, columns + 2), np.uint8)
-    first, last = rows, 1
+    stride = _stride(values.shape[1] // cell_px + 3)
+    active = np.zeros((values.shape[0] // cell_px + 3) * stride, np.uint8)
     for i in range(x_px.size):
         if values[y_px[i], x_px[i]] >= least:
-            row = y_px[i] // cell_px + 1
-            active[row, x_px[i] // cell_px + 1] = 1
-            first, last = min(first, row), max(last, row)
-    xs, ys = np.empty(rows * columns, np.int64), np.empty(rows * columns, np.int64)
+            active[(y_px[i] // cell_px + 1) * stride + x_px[i] // cell_px + 1] = 1
+    columns, rows = _marked_cells(active, stride, bright)
     m = 0
-    for b in range(first, last + 1):
-        for a in range(1, columns + 1):
-            if active[b, a] and active[b - 1 : b + 2, a - 1 : a + 2].sum() > 1:
-                xs[m], ys[m] = a - 1, b - 1
-                m += 1
-    return xs[:m].copy(), ys[:m].copy()
+    for n in range(columns.size):
+        a, b = columns[n], rows[n]
+        neighbours = 0
+        for row in range(b - 1, b + 2):
+            for column in range(a - 1, a + 2):
+                neighbours += active[row * stride + column]
+        columns[m], rows[m] = a - 1, b - 1
+        m += neighbours > 1
+    return columns[:m].copy(), rows[:m].copy()
 
 
+@njit(cache=True, nogil=True)
+def _stride(width: int) -> int:
+    """Distance from one row of cells to the next: the width rounded up to whole words."""
+    return (width + 7) // 8 * 8
+
+
+@njit(cache=True, nogil=True)
+def _marked_cells(cells: Bytes, stride: int, most: int) -> tuple[Integers, Integers]:
+    """Columns and rows (m,) int64 of the at most `most` cells that are not 0, rising by row, then column."""
+    columns, rows = np.empty(most, np.int64), np.empty(most, np.int64)
+    words = cells.view(np.uint64)
+    m = 0
+    for n in range(words.size):
+        if words[n] != 0:
+            for cell in range(8 * n, 8 * n + 8):
+                if cells[cell]:
+                    columns[m], rows[m] = cell % stride, cell // stride
+                    m += 1
+    return columns[:m].copy(), rows[:m].copy()
+
+
+@njit(cache=True, nogil=True)
 def twice_as_wide(columns: Integers, rows: Integers) -> tuple[Integers, Integers]:
     """Columns and rows (m,) int64 of the cells of twice the width in which these cells lie, rising by row."""
     if columns.size == 0:
         return columns, rows
-    width = int(columns.max()) // 2 + 1
-    wide = np.unique(rows // 2 * width + columns // 2)
-    return wide % width, wide // width
+    stride = _stride(columns.max() // 2 + 1)
+    wide = np.zeros((rows.max() // 2 + 1) * stride, np.uint8)
+    for n in range(columns.size):
+        wide[rows[n] // 2 * stride + columns[n] // 2] = 1
+    return _marked_cells(wide, stride, columns.size)
 
 
 @njit(cache=True, nogil=True)

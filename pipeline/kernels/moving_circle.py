@@ -205,18 +205,33 @@ def fit_circle(
 
 
 @njit(cache=True, nogil=True)
-def outside_circle(circle: Floats, events: Events, reference_us: float, margin_px: float) -> Integers:
-    """Indices (m,) int64 of events more than margin_px outside the moving circle."""
+def outside_circles(circles: Floats, events: Events, reference_us: float, margins_px: Floats) -> Integers:
+    """Indices (k,) int64 of events outside moving circles (m, 5) by more than their margins (m,)."""
     t_us, x_px, y_px, _ = events
-    tau_s = (t_us - reference_us) * 1e-6
-    dx, dy = x_px - (circle[0] + circle[2] * tau_s), y_px - (circle[1] + circle[3] * tau_s)
-    return np.flatnonzero(dx * dx + dy * dy > (circle[4] + margin_px) ** 2)
+    outside = np.empty(t_us.size, np.int64)
+    squares = (circles[:, 4] + margins_px) ** 2
+    k = 0
+    for i in range(t_us.size):
+        tau = (t_us[i] - reference_us) * 1e-6
+        is_outside = True
+        for m in range(squares.size):
+            dx = x_px[i] - (circles[m, 0] + circles[m, 2] * tau)
+            dy = y_px[i] - (circles[m, 1] + circles[m, 3] * tau)
+            is_outside &= dx * dx + dy * dy > squares[m]
+        outside[k] = i  # stays only if counted: no branch to mispredict
+        k += is_outside
+    return outside[:k].copy()
 
 
 @njit(cache=True, nogil=True)
 def in_square(x_px: Pixels, y_px: Pixels, centre_x_px: float, centre_y_px: float, reach_px: float) -> Integers:
     """Indices (m,) int64 of events within reach_px of a place, in both columns and rows."""
-    return np.flatnonzero((np.abs(x_px - centre_x_px) <= reach_px) & (np.abs(y_px - centre_y_px) <= reach_px))
+    inside = np.empty(x_px.size, np.int64)
+    m = 0
+    for i in range(x_px.size):
+        inside[m] = i
+        m += (abs(x_px[i] - centre_x_px) <= reach_px) & (abs(y_px[i] - centre_y_px) <= reach_px)
+    return inside[:m].copy()
 
 
 @njit(cache=True, nogil=True)

@@ -140,11 +140,11 @@ def supported_events(events: EventBatch, last_us: NDArray[np.uint16]) -> EventBa
 
 def outside_balls(events: EventBatch, rings: list[NDArray[np.float64]], end_us: int) -> EventBatch:
     """The events outside these balls' rings (5,) at end_us."""
-    for ring in rings:
-        margin = 0.3 * ring[4] + 2.0  # for trails
-        rows = kernels.outside_circle(ring, events.columns, end_us, margin)
-        events = EventBatch(*take_events(rows, events.columns))
-    return events
+    if not rings:
+        return events
+    circles = np.array(rings)
+    rows = kernels.outside_circles(circles, events.columns, end_us, 0.3 * circles[:, 4] + 2.0)  # margins for trails
+    return EventBatch(*take_events(rows, events.columns))
 
 
 def moved(ring: NDArray[np.float64], by_us: int) -> NDArray[np.float64]:

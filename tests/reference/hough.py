@@ -183,7 +183,10 @@ def support(
     )
 
 
-def outside_circle(circle: Floats, tau_s: Floats, x_px: Floats, y_px: Floats, margin_px: float) -> Ints:
-    """Indices of the events farther out than the circle and the margin."""
-    dx, dy = from_centre(circle, tau_s, x_px, y_px)
-    return np.flatnonzero(np.hypot(dx, dy) > circle[4] + margin_px)
+def outside_circles(circles: Floats, tau_s: Floats, x_px: Floats, y_px: Floats, margins_px: Floats) -> Ints:
+    """Indices of the events farther out than every circle and its margin."""
+    outside = [
+        np.hypot(*from_centre(circle, tau_s, x_px, y_px)) > circle[4] + margin_px
+        for circle, margin_px in zip(circles, margins_px, strict=True)
+    ]
+    return np.flatnonzero(np.all(outside, axis=0))
