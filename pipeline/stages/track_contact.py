@@ -25,6 +25,7 @@ Floats = NDArray[np.float64]
 PATH_US, TESTED_US, RECENT_CIRCLES = 250_000, 100_000, 8
 # Errors of the outline's edge ahead and of the circle's radius from tick to tick that the test must bear, in clutter.
 EDGE_STD_PX, RADIUS_STD_PX = 0.1, 0.15
+ERRORS_PX2 = np.array([EDGE_STD_PX, EDGE_STD_PX, RADIUS_STD_PX]) ** 2
 # Gain in chi^2 that a hinge must bring. 300 simulated flights of 3 to 22 m/s and up to 120 rps without a contact stay
 # below 33, whatever the time of the hinge; bounces reach 100 to 5000, hits 10^5.
 LEAST_GAIN = 60.0
@@ -77,6 +78,8 @@ def find_contact(
     if len(points) < 3 + least_after:
         return None
     fit = _PathFit(points, camera, ball_radius_m)
+    if fit.smooth_cost < LEAST_GAIN:
+        return None  # no hinge can gain more
     last_us = points[-1].end_us
     first_us = points[max(1, len(points) - RECENT_CIRCLES)].end_us
     hinges_us = np.arange(first_us + 1, last_us, STEP_US, dtype=np.float64)
@@ -107,11 +110,7 @@ def _independent(path: list[PathPoint], apart_us: int) -> list[PathPoint]:
 
 
 class _PathFit:
-    """Least-squares paths through measured circles.
-
-    Its channels are not x, y and radius but the place of the edge ahead (along the flight, plus radius), the place
-    across it, and the radius: only the half of the outline ahead is fitted, so that a circle too large by 0.2 px lies
-    0.2 px back, and its edge ahead is right.
+    """Least-squares paths through measured circles, in the channels of `kernels.edge_channels`.
 
     Parameters
     ----------
@@ -122,30 +121,26 @@ class _PathFit:
     def __init__(self, points: list[PathPoint], camera: Camera, ball_radius_m: float) -> None:
         self.origin_us = points[-1].end_us
         self._times_s = np.array([(point.end_us - self.origin_us) * 1e-6 for point in points])
-        circles = np.array([[c.x_px, c.y_px, c.radius_px] for point in points if (c := point.circle)])
-        steps = np.diff(circles[:, :2], axis=0)
-        speed_px_s = float(np.hypot(*steps.T).sum()) / float(self._times_s[-1] - self._times_s[0])
-        ux, uy = steps.sum(axis=0).tolist()
-        length = math.hypot(ux, uy) or 1.0
-        ux, uy = ux / length, uy / length
-        self._channels = np.array([[ux, uy, 1.0], [-uy, ux, 0.0], [0.0, 0.0, 1.0]])
-        self._values = circles @ self._channels.T
+        circles = np.array([(c.x_px, c.y_px, c.radius_px) for point in points if (c := point.circle)])
         noises = np.array([point.noise for point in points])
-        noise = np.sum((self._channels @ noises) * self._channels, axis=2)  # the diagonals of C N C^T
-        self._weights = 1.0 / (noise + np.array([EDGE_STD_PX, EDGE_STD_PX, RADIUS_STD_PX]) ** 2)
+        self._values, self._weights, speed_px_s = kernels.edge_channels(self._times_s, circles, noises, ERRORS_PX2)
         self._precisions = _precisions(speed_px_s, float(circles[-1, 2]), camera, ball_radius_m)
+        self.smooth_cost = float(self._costs(np.empty(0))[0])
 
     def gains(self, hinges_us: Floats) -> Floats:
         """Gains (m,) in chi^2 by a hinge at these times (m,).
 
         In units of what then remains, where that is more than the stated noise: clutter is no contact.
         """
-        costs = np.empty(1 + hinges_us.size)
-        hinges_s = (hinges_us - self.origin_us) * 1e-6
-        kernels.path_costs(costs, self._times_s, self._values, self._weights, self._precisions, hinges_s)
+        costs = self._costs((hinges_us - self.origin_us) * 1e-6)
         freedom = max(1, 3 * (self._times_s.size - kernels.SMOOTH_TERMS))
         gains: Floats = (costs[0] - costs[1:]) / np.maximum(1.0, costs[1:] / freedom)
         return gains
+
+    def _costs(self, hinges_s: Floats) -> Floats:
+        costs = np.empty(1 + hinges_s.size)
+        kernels.path_costs(costs, self._times_s, self._values, self._weights, self._precisions, hinges_s)
+        return costs
 
 
 def _precisions(speed_px_s: float, radius_px: float, camera: Camera, ball_radius_m: float) -> Floats:

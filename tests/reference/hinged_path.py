@@ -8,6 +8,17 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
+def edge_channels(times_s: Floats, circles: Floats, noises: Floats, errors_px2: Floats) -> tuple[Floats, Floats, float]:
+    """One matrix turns the circles into channels, and their covariances with them."""
+    steps = np.diff(circles[:, :2], axis=0)
+    along = circles[-1, :2] - circles[0, :2]
+    if along.any():
+        along /= np.hypot(*along)
+    channels = np.array([[*along, 1.0], [-along[1], along[0], 0.0], [0.0, 0.0, 1.0]])
+    variances = np.diagonal(channels @ noises @ channels.T, axis1=1, axis2=2) + errors_px2
+    return circles @ channels.T, 1.0 / variances, float(np.hypot(*steps.T).sum() / (times_s[-1] - times_s[0]))
+
+
 def path_costs(times_s: Floats, circles: Floats, weights: Floats, precisions: Floats, hinges_s: Floats) -> Floats:
     """Each channel's least squares by `lstsq`, the priors as further rows."""
     costs = []

@@ -29,6 +29,18 @@ def test_costs_equal_the_twins(seed: int, count: int) -> None:
     assert np.all(costs[1:] <= costs[0] + 1e-3), "a hinge never costs more"
 
 
+@given(seed=st.integers(0, 2**32 - 1), count=st.integers(2, 25), stays=st.booleans())
+def test_channels_equal_the_twins(seed: int, count: int, stays: bool) -> None:
+    rng = np.random.default_rng(seed)
+    times_s = np.cumsum(rng.uniform(1e-3, 6e-3, count))
+    circles = rng.uniform(-300, 300, (count, 3))
+    circles[-1, :2] = circles[0, :2] if stays else circles[-1, :2]
+    roots = rng.normal(size=(count, 3, 3))
+    given_to = times_s, circles, roots @ np.swapaxes(roots, 1, 2), rng.uniform(0.01, 0.1, 3)
+    for found, expected in zip(hinged_path.edge_channels(*given_to), reference.edge_channels(*given_to), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+
 @given(seed=st.integers(0, 2**32 - 1), balls=st.integers(1, 3))
 def test_the_nearest_outline_is_the_twins(seed: int, balls: int) -> None:
     rng = np.random.default_rng(seed)

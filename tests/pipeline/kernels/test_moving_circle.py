@@ -89,7 +89,7 @@ def test_choices_of_events_equal_the_twins(seed: int, gate: float, most: int, ah
     events = read_only(t_us, *columns, on)
     near = moving_circle.near_outline(ring, events, 7_000_000, gate, most, ahead_only)
     assert np.array_equal(near, reference.near_outline(ring, *exact, gate, most, ahead_only))
-    rings, margins = np.array([ring, ring + [40, -30, 500, 0, -2]]), np.array([margin, 0.5 * margin])
+    rings, margins = np.array([ring, ring + np.array([40, -30, 500, 0, -2])]), np.array([margin, 0.5 * margin])
     for count in (1, 2):
         clear = moving_circle.outside_circles(rings[:count], events, 7_000_000, margins[:count])
         assert np.array_equal(clear, reference.outside_circles(rings[:count], *exact, margins[:count]))
