@@ -30,9 +30,25 @@ def vote(votes: Pixels, x_px: Integers, y_px: Integers, x0_px: int, y0_px: int, 
         # d rounds to the radius where (radius - 1/2)^2 <= d^2 < (radius + 1/2)^2; d^2 is a whole number.
         first = radius * radius - radius + 1 if radius > 0 else 0
         radius_of[first : radius * radius + radius + 1] = k
+    # Where the votes reach around the pixels, all of one pixel's are at the same offsets: 4 x faster than clipping.
+    flat = votes.reshape(-1)
+    offsets = np.empty((2 * reach + 1) ** 2 if min(width, height) > 2 * reach else 0, np.int64)
+    m = 0
+    if offsets.size > 0:
+        for dy in range(-reach, reach + 1):
+            for dx in range(-reach, reach + 1):
+                k = radius_of[dx * dx + dy * dy]
+                if k < radii:
+                    offsets[m] = (dy * width + dx) * radii + k
+                    m += 1
     for i in range(x_px.size):
         x = x_px[i] - x0_px
         y = y_px[i] - y0_px
+        if reach <= x < width - reach and reach <= y < height - reach:
+            centre = (y * width + x) * radii
+            for n in range(m):
+                flat[np.uint64(centre + offsets[n])] += np.uint16(1)
+            continue
         for b in range(max(0, y - reach), min(height, y + reach + 1)):
             dy2 = (y - b) * (y - b)
             for a in range(max(0, x - reach), min(width, x + reach + 1)):

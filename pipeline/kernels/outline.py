@@ -194,7 +194,7 @@ def fit_outline(
     prior_std: Floats,
     ellipticity: Floats,
     events: Events,
-    reference_us: float,
+    reference_us: int,
     gate_px: float,
     width_px: int,
     height_px: int,
@@ -240,7 +240,7 @@ def find_moving_circle(
     y_px: float,
     radius_px: float,
     events: Events,
-    reference_us: float,
+    reference_us: int,
     span_s: float,
     fastest_px_s: float,
     signed: bool,
@@ -251,8 +251,8 @@ def find_moving_circle(
 
     Parameters
     ----------
-    x_px, y_px, radius_px, reference_us : float
-        Place and radius at the reference time.
+    x_px, y_px, radius_px : float
+        Place and radius at the time reference_us.
     span_s : float
         Time that the events go back.
     signed : bool

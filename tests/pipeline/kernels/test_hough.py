@@ -22,8 +22,8 @@ def pixels_of_circle(x_px: float, y_px: float, radius_px: float) -> tuple[NDArra
 
 
 @given(
-    height=st.integers(1, 12),
-    width=st.integers(1, 12),
+    height=st.integers(1, 20),
+    width=st.integers(1, 20),
     radii=st.integers(1, 6),
     radius0=st.integers(1, 8),
     x0=st.integers(-10, 10),
