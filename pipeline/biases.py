@@ -1,4 +1,4 @@
-"""The five biases of Prophesee's IMX636 (EVK4), a model of their physical units, and `.bias` files.
+"""The five biases of Prophesee's IMX636 (EVK4), a model of their physical units, and the files that state them.
 
 The biases are offsets from the factory setting (0). The maker publishes their direction and their range, not
 what they are in per cent, hertz or microseconds. `CURVES` is therefore a model: monotone, in one place,
@@ -7,6 +7,7 @@ marked as not calibrated, to be replaced by one's own measurements (`SensorModel
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,6 +28,8 @@ class BiasParameters(ParameterGroup):
     hpf: int = tunable(0, 0, 120, 1, "", "cut-off of the pixel's high-pass; higher = slow motion vanishes")
     refr: int = tunable(80, -20, 235, 1, "", "refractory period; higher = shorter dead time, more events")
 
+
+LARGEST_BYTES = 1 << 20  # of a file of biases; real ones have some hundred bytes, camera settings a few thousand
 
 PAPER = BiasParameters()
 FACTORY = BiasParameters(diff_on=0, diff_off=0, fo=0, hpf=0, refr=0)
@@ -89,32 +92,82 @@ CURVES = {
 
 
 def read_biases(path: Path | str) -> BiasParameters:
-    """Read a `.bias` file: one `value % bias_name` a line, empty lines allowed; a missing bias counts as 0.
+    """Read a file of biases as offsets of the IMX636; a missing bias counts as 0.
 
     Raises RecordingError for a file that cannot be read or of another form, ParameterError for a bias that is unknown
-    or out of range.
+    or out of range, as those of other sensors are. `bias_diff`, the reference of both thresholds, is 0 on an IMX636.
+    """
+    values, known = read_bias_values(path), BiasParameters.tunables()
+    what = [f"bias_{name} is unknown" for name in sorted(values.keys() - {"diff", *known})]
+    if values.get("diff"):
+        what.append(f"bias_diff = {values['diff']} is out of range (0)")
+    for name, one in known.items():
+        if not (one.low or 0) <= values.get(name, 0) <= (one.high or 0):
+            what.append(f"bias_{name} = {values[name]} is out of range ({one.allowed})")
+    if what:
+        raise ParameterError(
+            f"the biases are not those of an IMX636 (EVK4): {', '.join(what)}. Older sensors and the GenX320 state "
+            f"absolute values, not the offsets {', '.join(f'bias_{name}' for name in known)}: {path}"
+        )
+    return BiasParameters(**{name: values.get(name, 0) for name in known})
+
+
+def read_bias_values(path: Path | str) -> dict[str, int]:
+    """Read the biases of any sensor from a `.bias` file or the JSON of a camera's settings, told by the content.
+
+    A `.bias` file has one `value % bias_name` a line, with units or ranges after another %; lines that begin with %
+    are comments. The JSON of camera settings lists them as `ll_biases_state.bias`, where a value of 0 may be missing.
+
+    Returns
+    -------
+    dict of str to int
+        By name without `bias_`, as the file states them.
+
+    Raises
+    ------
+    RecordingError
+        The file cannot be read, is of another form, or states no bias or one twice.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise RecordingError(f"the bias file cannot be read ({error.__class__.__name__}): {path}") from error
-    values: dict[str, int] = dict.fromkeys(BiasParameters.tunables(), 0)
+        with open(path, "rb") as file:
+            content = file.read(LARGEST_BYTES + 1)
+    except OSError as error:
+        raise RecordingError(f"the bias file cannot be read ({error.strerror}): {path}") from error
+    if len(content) > LARGEST_BYTES:
+        raise RecordingError(f"the file is larger than {LARGEST_BYTES >> 20} MB, as no bias file is: {path}")
+    text = content.decode("utf-8-sig", errors="replace")  # only comments hold more than ASCII
+    try:
+        pairs = _settings_biases(text) if text.lstrip().startswith("{") else _bias_lines(text)
+    except ValueError as error:
+        raise RecordingError(f"{error}: {path}") from None
+    names = [name for name, _ in pairs]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise RecordingError(f"bias_{twice[0]} is stated twice: {path}")
+    if not names:
+        raise RecordingError(f"the file states no bias, like `40 % bias_diff_on`: {path}")
+    return dict(pairs)
+
+
+def _bias_lines(text: str) -> list[tuple[str, int]]:
+    pairs = []
     for number, line in enumerate(text.splitlines(), start=1):
-        if not line.strip():
+        if not line.strip() or line.lstrip().startswith("%"):
             continue
-        left, percent, name = line.partition("%")
+        value, _, rest = line.partition("%")
+        name = rest.partition("%")[0].split()
         try:
-            value = int(left)
-        except ValueError:
-            percent = ""
-        if not percent:
-            raise RecordingError(f"line {number} is {line.strip()!r}, not `value % bias_name`: {path}")
-        field = name.strip().removeprefix("bias_")
-        if field not in values:
-            known = ", ".join(f"bias_{known}" for known in values)
-            raise ParameterError(f"{name.strip()} is unknown, there are {known}: {path}")
-        values[field] = value
-    return BiasParameters(**values)
+            pairs.append((name[0].removeprefix("bias_"), int(value, 16 if "x" in value.lower() else 10)))
+        except (ValueError, IndexError):
+            raise ValueError(f"line {number} is {line.strip()[:80]!r}, not `value % bias_name`") from None
+    return pairs
+
+
+def _settings_biases(text: str) -> list[tuple[str, int]]:
+    try:
+        listed = json.loads(text)["ll_biases_state"]["bias"]
+        return [(str(one["name"]).removeprefix("bias_"), int(one.get("value", 0))) for one in listed]
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        raise ValueError("the JSON is no camera settings with `ll_biases_state`") from None
 
 
 def write_biases(biases: BiasParameters, path: Path | str) -> None:

@@ -55,8 +55,8 @@ def _tunables(command: Callable[..., None]) -> Callable[..., None]:
 @click.option(
     "--biases",
     type=click.Path(path_type=Path),
-    metavar="FILE.bias",
-    help="Biases of the sensor; the paper's by default.",
+    metavar="FILE.bias|FILE.json",
+    help="Biases of the sensor, a .bias file or the JSON of camera settings; the paper's by default.",
 )
 @click.option(
     "--scene",

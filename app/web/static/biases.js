@@ -31,14 +31,14 @@ export class Biases extends EventTarget {
     this.progress = element("progress", { hidden: true, max: 1, value: 0 });
     this.stop = element("button", { hidden: true, onclick: () => this.#cancel() }, "Cancel");
     const rows = Object.entries(this.state.ranges).map(([name, range]) => this.#row(name, range));
-    const load = { type: "file", accept: ".bias", hidden: true, onchange: () => attempt(() => this.#load()) };
+    const load = { type: "file", accept: ".bias,.json", hidden: true, onchange: () => attempt(() => this.#load()) };
     this.file = element("input", load);
     const options = this.state.swept.map(({ name, label }) => element("option", { value: name }, label));
     this.which = element("select", { "aria-label": "Bias to sweep" }, ...options);
     this.draw = element("button", { onclick: () => attempt(() => this.#sweep()) });
     this.text = element("div");
     this.charts = element("div.charts");
-    const open = element("button", { onclick: () => this.file.click() }, "Load .bias");
+    const open = element("button", { onclick: () => this.file.click() }, "Load biases");
     const save = element("button", { onclick: () => attempt(() => this.#save()) }, "Save .bias");
     parent.append(
       this.note,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +16,7 @@ from spinscope.pipeline.biases import (
     PAPER,
     BiasCurve,
     BiasParameters,
+    read_bias_values,
     read_biases,
     write_biases,
 )
@@ -86,6 +89,17 @@ def test_files_come_back(tmp_path: Path):
         ("much % bias_fo\n", RecordingError, "line 1"),
         ("40 % bias_pr\n", ParameterError, "bias_pr is unknown"),
         ("900 % bias_fo\n", ParameterError, "out of range"),
+        # Stock files of the GenX320 and of the Gen3.1: absolute values, some within the IMX636's ranges.
+        ("51 % bias_diff\n40 % bias_diff_on\n40 % bias_diff_off\n29 % bias_fo\n", ParameterError, "bias_diff = 51"),
+        ("299 % bias_diff\n1507 % bias_fo_n\n1250 % bias_pr\n", ParameterError, "bias_fo_n is unknown.*absolute"),
+        ("4 % bias_fo\n5 % bias_fo\n", RecordingError, "stated twice"),
+        ("% nothing but a comment\n", RecordingError, "states no bias"),
+        ("4 %\n", RecordingError, "line 1"),
+        ("{}", RecordingError, "ll_biases_state"),
+        ('{"ll_biases_state": {"bias": [7]}}', RecordingError, "ll_biases_state"),
+        ("[" * 100_000, RecordingError, "line 1"),
+        ('{"a":' * 100_000, RecordingError, "ll_biases_state"),
+        ("0 % bias_fo\n" * 100_000, RecordingError, "larger than"),
     ],
 )
 def test_bad_files_are_refused_in_words(tmp_path: Path, text: str, error: type[Exception], words: str):
@@ -93,6 +107,54 @@ def test_bad_files_are_refused_in_words(tmp_path: Path, text: str, error: type[E
     file.write_text(text)
     with pytest.raises(error, match=words):
         read_biases(file)
+
+
+STOCK = "% subsystem_ID 1\n% system_ID 49\n20   % bias_diff_off   %   v\n-10  % bias_diff_on   %   v\n0 % bias_fo % i\n"
+SETTINGS = {
+    "ll_biases_state": {
+        "bias": [
+            {"name": "bias_diff", "value": 0},
+            {"name": "bias_diff_off", "value": 20},
+            {"name": "bias_diff_on", "value": -10},
+            {"name": "bias_fo"},  # protobuf's JSON may leave zeros out
+        ]
+    },
+    "roi_state": {"enabled": False},
+    "event_trail_filter_state": {"enabled": True, "filtering_type": "TRAIL", "threshold": 10000},
+}
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        STOCK.encode(),
+        b"\xef\xbb\xbf" + STOCK.encode(),
+        STOCK.replace("\n", "\r\n").encode(),
+        ("0 % bias_diff\n" + STOCK).encode(),
+        STOCK.replace("% system_ID 49", "% K\xfcche").encode("latin-1"),
+        STOCK.replace("20   ", "0x14 ").encode(),
+        STOCK.replace("%   v", "% (-35 .. 190)").encode(),
+        json.dumps(SETTINGS, indent=2).encode(),
+        b"\xef\xbb\xbf" + json.dumps(SETTINGS).encode(),
+    ],
+)
+def test_files_are_read_as_cameras_software_writes_them(tmp_path: Path, content: bytes):
+    file = tmp_path / "camera.bias"
+    file.write_bytes(content)
+    assert read_biases(file) == replace(FACTORY, diff_on=-10, diff_off=20)
+
+
+def test_biases_of_any_sensor_are_read_by_name(tmp_path: Path):
+    file = tmp_path / "gen31.bias"
+    file.write_text("% gen 3.1 CD standard biases\n299 % bias_diff\n1480 % bias_fo % i\n1250 % bias_pr\n")
+    assert read_bias_values(file) == {"diff": 299, "fo": 1480, "pr": 1250}
+
+
+@pytest.mark.skipif("SPINSCOPE_REAL_RECORDINGS" not in os.environ, reason="needs real recordings")
+def test_stock_files_are_read():
+    folder = Path(os.environ["SPINSCOPE_REAL_RECORDINGS"]) / "trouble"
+    assert read_biases(folder / "40b_bias_imx636.bias") == FACTORY
+    assert read_biases(folder / "40e_bias_comments_units.bias") == replace(FACTORY, diff_on=-10, diff_off=20)
 
 
 def test_missing_files_are_refused_in_words(tmp_path: Path):
