@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from .camera import Camera, CameraParameters
+from .camera import Camera
 from .chain import Chain, EventsInMemory, Tick
 from .errors import ParameterError, RecordingError
 from .presets import preset
@@ -19,6 +19,7 @@ from .recordings.in_memory import RecordingInMemory
 from .registry import STAGES, Parameters, methods
 from .results import Truth
 from .shots import Shot, ShotLog
+from .sidecar import GROUPS, Sidecar
 from .stages.fixed_ball import find_fixed_ball
 
 SAMPLES = Path(__file__).parents[1] / "sample_recordings"
@@ -83,6 +84,7 @@ class Session:
     chain: Chain
     warnings: list[str] = field(default_factory=list)
     read_seconds: float = 0.0
+    sidecar: Sidecar = Sidecar()
 
     @classmethod
     def open(
@@ -110,10 +112,11 @@ class Session:
             (recording.identity(), window_us), events, recording.width_px, recording.height_px, *window_us
         )
         read_seconds = time.perf_counter() - begin
-        parameters = _with_attributes(parameters, recording.attributes, choices)
+        sidecar = Sidecar.beside(recording.path) if isinstance(recording, Recording) else Sidecar()
+        parameters = _with_attributes(parameters, {**recording.attributes, **sidecar.parameters}, choices)
         warnings += recording.warnings
-        session = cls(recording, source, parameters, _timed(source), warnings, read_seconds)
-        session.place_fixed_ball(choices.fixed_ball)
+        session = cls(recording, source, parameters, _timed(source), warnings, read_seconds, sidecar)
+        session.place_fixed_ball(choices.fixed_ball or sidecar.fixed_ball)
         return session
 
     @property
@@ -342,17 +345,19 @@ def _timed(source: EventsInMemory, **options: Any) -> Chain:
 
 
 def _with_attributes(parameters: Parameters, attributes: dict[str, Any], choices: Choices) -> Parameters:
-    """Take camera values that the recording states, unless the user set them."""
+    """Take values of camera and ball that the recording or its sidecar states, unless the user set them."""
     chosen = {text.partition("=")[0].strip() for text in choices.assignments}
-    stated = {
-        name: attributes[f"camera.{name}"]
-        for name in CameraParameters.tunables()
-        if f"camera.{name}" in attributes and f"camera.{name}" not in chosen
-    }
-    if choices.preset or choices.flight_calibration:
-        default = CameraParameters()
-        stated = {k: v for k, v in stated.items() if getattr(parameters.camera, k) == getattr(default, k)}
-    return parameters.with_groups(camera=parameters.camera.with_values(stated))
+    for group, made in GROUPS.items():
+        own = parameters.group(group)
+        stated = {
+            name: attributes[f"{group}.{name}"]
+            for name in made.tunables()
+            if f"{group}.{name}" in attributes and f"{group}.{name}" not in chosen
+        }
+        if choices.preset or choices.flight_calibration:
+            stated = {name: value for name, value in stated.items() if getattr(own, name) == getattr(made(), name)}
+        parameters = parameters.with_groups(**{group: own.with_values(stated)})
+    return parameters
 
 
 def _no_events(window_us: tuple[int, int] | None, path: Path) -> str:

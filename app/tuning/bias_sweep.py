@@ -15,12 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spinscope.pipeline.biases import CURVES, BiasParameters, read_biases
+from spinscope.pipeline.biases import CURVES, BiasParameters
 from spinscope.pipeline.errors import ParameterError, RecordingError, SpinscopeError
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.recordings import open_recording, readable_suffixes
 from spinscope.pipeline.registry import Parameters
 from spinscope.pipeline.session import AnyRecording, Session
+from spinscope.pipeline.sidecar import biases_beside
 from spinscope.pipeline.simulated_recordings import BIASES, description_in, simulate_again_to_file
 from spinscope.pipeline.simulator import simulate_again
 
@@ -134,17 +135,15 @@ def bias_state(recording: AnyRecording) -> BiasState:
 
 
 def known_biases(path: Path, recording: AnyRecording | None = None) -> BiasParameters | None:
-    """Biases that a recording states, or has in a .bias file of its name; None where it has none or is unreadable."""
+    """Biases that a recording has in a sidecar, or states itself; None where it has none or is unreadable."""
     if path.suffix.lower() not in readable_suffixes() or not path.is_file():
         return None
-    beside = path.with_suffix(".bias")
     try:
-        if recording is None and beside.is_file():
-            return read_biases(beside)
+        beside = biases_beside(path)
+        if beside is not None:
+            return beside
         stated = (recording or open_recording(path)).attributes.get(BIASES)
-        if stated is not None:
-            return BiasParameters().with_values(json.loads(str(stated)))
-        return read_biases(beside) if beside.is_file() else None
+        return None if stated is None else BiasParameters().with_values(json.loads(str(stated)))
     except (SpinscopeError, json.JSONDecodeError, TypeError):
         return None
 

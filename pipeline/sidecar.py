@@ -1,0 +1,186 @@
+"""Sidecars: what stands beside a recording about its camera, ball, truth and biases.
+
+`NAME.toml` beside `NAME.raw` has the tables [camera] and [ball] (parameters), [fixed_ball] (`x_px`, `y_px`,
+`radius_px`), [truth] and [biases]; `NAME.bias` is as the camera's software writes it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from .biases import LARGEST_BYTES, BiasParameters, read_biases
+from .camera import BallParameters, CameraParameters
+from .errors import ParameterError, RecordingError
+from .extensions import did_you_mean
+from .parameters import ParameterGroup
+
+GROUPS: dict[str, type[ParameterGroup]] = {"camera": CameraParameters, "ball": BallParameters}
+TABLES = (*GROUPS, "fixed_ball", "truth", "biases")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StatedTruth:
+    """Truth of a real recording, as it was set or measured beside the camera.
+
+    Attributes
+    ----------
+    spin_rps : (float, float, float), optional
+        Spin in the camera frame; None where only its magnitude is known.
+    rps : float
+        Magnitude, as of a tachometer.
+    spin_std_rps : float, optional
+        1 sigma of the magnitude.
+    ball : int, optional
+        Number of the ball, 1 to 7 of the paper's.
+    speed_m_s : float, optional
+        Speed as set.
+    setting : str, optional
+        Setting of the spinner or thrower, in the user's words.
+    """
+
+    spin_rps: tuple[float, float, float] | None
+    rps: float
+    spin_std_rps: float | None = None
+    ball: int | None = None
+    speed_m_s: float | None = None
+    setting: str | None = None
+
+    @classmethod
+    def of(cls, table: Mapping[str, Any]) -> StatedTruth:
+        """The truth of a table with `spin_rps`, `axis` and `rps`, or `rps` alone; raises ParameterError."""
+        known = (*(one.name for one in fields(cls)), "axis")
+        for name in table:
+            if name not in known:
+                raise ParameterError(f"truth.{name} is unknown{did_you_mean(name, known)}")
+        spin, rps = _vector(table, "spin_rps"), _number(table, "rps")
+        axis = _vector(table, "axis")
+        if axis is not None:
+            length = math.hypot(*axis)
+            if spin is not None or rps is None or length == 0:
+                raise ParameterError("truth.axis goes with truth.rps: give spin_rps = [x, y, z], or axis and rps")
+            x, y, z = (rps * component / length for component in axis)
+            spin = (x, y, z)
+        elif spin is not None and rps is not None:
+            raise ParameterError("truth.spin_rps is the whole vector, truth.rps its length: give one of them")
+        elif spin is None and rps is None:
+            raise ParameterError("truth states no spin: give spin_rps = [x, y, z], axis and rps, or rps alone")
+        return cls(
+            spin_rps=spin,
+            rps=math.hypot(*(spin or ())) if rps is None else rps,
+            spin_std_rps=_number(table, "spin_std_rps"),
+            ball=table.get("ball"),
+            speed_m_s=_number(table, "speed_m_s"),
+            setting=table.get("setting"),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Sidecar:
+    """What stands beside a recording; empty where nothing does.
+
+    Attributes
+    ----------
+    parameters : dict of str to any
+        By `group.field`, of the groups camera and ball.
+    fixed_ball : (x_px, y_px, radius_px), optional
+        Circle of a ball spinner's ball.
+    truth : StatedTruth, optional
+    biases : BiasParameters, optional
+        Of the table [biases].
+    digest : str
+        Of the file's content: "" without a file.
+    """
+
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    fixed_ball: tuple[float, float, float] | None = None
+    truth: StatedTruth | None = None
+    biases: BiasParameters | None = None
+    digest: str = ""
+
+    @classmethod
+    def beside(cls, recording: Path) -> Sidecar:
+        """The sidecar `NAME.toml` of a recording; raises RecordingError or ParameterError where it is wrong."""
+        path = recording.with_suffix(".toml")
+        if not path.is_file():
+            return cls()
+        try:
+            with open(path, "rb") as file:
+                content = file.read(LARGEST_BYTES + 1)
+            if len(content) > LARGEST_BYTES:
+                raise RecordingError(f"the sidecar is larger than {LARGEST_BYTES >> 20} MB: {path}")
+            tables = tomllib.loads(content.decode("utf-8-sig"))
+        except OSError as error:
+            raise RecordingError(f"the sidecar cannot be read ({error.strerror}): {path}") from error
+        except (ValueError, RecursionError) as error:  # not UTF-8, not TOML
+            raise RecordingError(f"the sidecar is no TOML ({error}): {path}") from None
+        try:
+            return cls._of(tables, hashlib.blake2b(content, digest_size=12).hexdigest())
+        except ParameterError as error:
+            raise ParameterError(f"{error}: {path}") from None
+
+    @classmethod
+    def _of(cls, tables: Mapping[str, Any], digest: str) -> Sidecar:
+        for name, table in tables.items():
+            if name not in TABLES:
+                hint = did_you_mean(name, TABLES)
+                raise ParameterError(f"a sidecar has no table [{name}]{hint}; settings of stages go with --preset")
+            if not isinstance(table, Mapping):
+                raise ParameterError(f"{name} = {table!r} is not a table: write [{name}]")
+        parameters: dict[str, Any] = {}
+        for name, group in GROUPS.items():
+            stated = group().with_values(tables.get(name, {}))
+            parameters |= {f"{name}.{one}": getattr(stated, one) for one in tables.get(name, {})}
+        circle = tables.get("fixed_ball")
+        biases = tables.get("biases")
+        return cls(
+            parameters=parameters,
+            fixed_ball=None if circle is None else _circle(circle),
+            truth=StatedTruth.of(tables["truth"]) if "truth" in tables else None,
+            biases=None
+            if biases is None
+            else BiasParameters().with_values({name.removeprefix("bias_"): value for name, value in biases.items()}),
+            digest=digest,
+        )
+
+
+def biases_beside(recording: Path) -> BiasParameters | None:
+    """Biases of a recording's `NAME.bias`, else of its `NAME.toml`; None without; raises as `read_biases` does."""
+    path = recording.with_suffix(".bias")
+    return read_biases(path) if path.is_file() else Sidecar.beside(recording).biases
+
+
+def _circle(table: Mapping[str, Any]) -> tuple[float, float, float]:
+    names = ("x_px", "y_px", "radius_px")
+    if set(table) != set(names):
+        raise ParameterError(f"[fixed_ball] has {', '.join(table) or 'nothing'}: give {', '.join(names)}")
+    x, y, radius = (_finite(f"fixed_ball.{name}", table[name]) for name in names)
+    return x, y, radius
+
+
+def _number(table: Mapping[str, Any], name: str) -> float | None:
+    value = _finite(f"truth.{name}", table[name]) if name in table else None
+    if value is not None and value < 0:
+        raise ParameterError(f"truth.{name} = {value:g} is not allowed: give a number of 0 or more")
+    return value
+
+
+def _vector(table: Mapping[str, Any], name: str) -> tuple[float, float, float] | None:
+    if name not in table:
+        return None
+    values = table[name]
+    if not isinstance(values, list) or len(values) != 3:
+        raise ParameterError(f"truth.{name} = {values!r} is not allowed: give three numbers [x, y, z]")
+    x, y, z = (_finite(f"truth.{name}", value) for value in values)
+    return x, y, z
+
+
+def _finite(name: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ParameterError(f"{name} = {value!r} is not allowed: give a number")
+    return float(value)
