@@ -128,6 +128,13 @@ class SpinEstimate(ReadOnlyArrays):
         }
 
 
+def spin_errors(found_rps: Vector, true_rps: Vector) -> tuple[float, float]:
+    """Error of the magnitude in rps and angle between the signed axes in degrees of two (3,) spins in rps."""
+    size, true_size = float(np.linalg.norm(found_rps)), float(np.linalg.norm(true_rps))
+    cosine = float(found_rps @ true_rps) / max(size * true_size, 1e-9)
+    return abs(size - true_size), math.degrees(math.acos(min(max(cosine, -1.0), 1.0)))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class MethodResult:
     """Result of a spin method that has no more to show than its estimate from the present shot so far."""

@@ -14,7 +14,7 @@ from .camera import Camera
 from .chain import BallTick, Tick
 from .errors import ParameterError
 from .registry import distrust_reason, trusted_method
-from .results import SpinEstimate, Truth
+from .results import SpinEstimate, Truth, spin_errors
 from .spin.combined import CombinedResult
 from .spin.trajectory.motion import FittedMotion
 from .stages.track_result import BallTrack, BeganBy, EndedBy, ShotEnd
@@ -37,6 +37,25 @@ ENDED_WORDS: dict[EndedBy, str] = {
     "end": "in view to the end",
     "lost": "was lost",
 }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShotTick:
+    """What the stages say of a shot at the end of one of its ticks, from all events up to there.
+
+    Attributes
+    ----------
+    logo_rate_hz : float, optional
+        Logo events of the tick over its length; None where the logo was not asked for.
+    rate_rps : float, optional
+        Magnitude by the rhythm of the logo's events; None where it tells none or was not asked for.
+    estimates : dict[str, SpinEstimate]
+        The spin by method.
+    """
+
+    logo_rate_hz: float | None
+    rate_rps: float | None
+    estimates: dict[str, SpinEstimate]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,6 +92,8 @@ class Shot:
         The flight as fitted by the trajectory method; None where that was not run or found none.
     combined : CombinedResult, optional
         Evidence of each witness for the combined answer; None where that was not run.
+    history : tuple of ShotTick
+        Each tick's results, one for each row of `state`.
     """
 
     start_us: int
@@ -90,6 +111,7 @@ class Shot:
     number: int = 0
     motion: FittedMotion | None = None
     combined: CombinedResult | None = None
+    history: tuple[ShotTick, ...] = ()
 
     def positions_m(self, camera: Camera, ball_radius_m: float) -> Floats:
         """(n, 3) float64 centres of the ball in the camera frame, from silhouettes, metres."""
@@ -139,13 +161,11 @@ class Shot:
         if method not in self.estimates:
             raise ParameterError(f"{method} was not run: there are {', '.join(self.estimates)}")
         estimate = self.estimates[method]
-        if estimate.vector_rps is None or estimate.axis is None:
+        if estimate.vector_rps is None:
             return None
         middle = (self.start_us + self.end_us) / 2
         spin = np.array([np.interp(middle, truth.t_us, truth.spin_rps[:, axis]) for axis in range(3)])
-        magnitude = float(np.linalg.norm(spin))
-        cosine = float(np.clip(estimate.axis @ spin / magnitude, -1, 1)) if magnitude > 0 else 1.0
-        return abs(float(np.linalg.norm(estimate.vector_rps)) - magnitude), float(np.degrees(np.arccos(cosine)))
+        return spin_errors(estimate.vector_rps, spin)
 
 
 class ShotLog:
@@ -211,22 +231,26 @@ class ShotLog:
 class _Row:
     """One tick of a shot."""
 
+    start_us: int
     end_us: int
     track: BallTrack
     evidence: TrackEvidence
     logo_events: int | None
+    rate_rps: float | None
     estimates: dict[str, SpinEstimate]
     motion: FittedMotion | None
     combined: CombinedResult | None
 
 
 def _row(ball: BallTick) -> _Row:
-    logo, trajectory = ball.results.get("logo"), ball.results.get("trajectory")
+    logo, rate, trajectory = (ball.results.get(name) for name in ("logo", "rate", "trajectory"))
     return _Row(
+        start_us=ball.packet.start_us,
         end_us=ball.packet.end_us,
         track=ball.track,
         evidence=ball.evidence,
         logo_events=None if logo is None else len(logo.events),
+        rate_rps=None if rate is None else rate.spin_rps,
         estimates=ball.estimates,
         motion=None if trajectory is None else trajectory.motion,
         combined=ball.results.get("combined"),
@@ -252,4 +276,10 @@ def _shot(rows: list[_Row], end: ShotEnd) -> Shot:
         number=end.shot,
         motion=rows[-1].motion,
         combined=rows[-1].combined,
+        history=tuple(map(_shot_tick, rows)),
     )
+
+
+def _shot_tick(row: _Row) -> ShotTick:
+    events, length_us = row.logo_events, row.end_us - row.start_us
+    return ShotTick(None if events is None else events / (length_us * 1e-6), row.rate_rps, row.estimates)

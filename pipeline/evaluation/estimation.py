@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..api import estimate
 from ..chain import Chain, EventsInMemory
@@ -20,8 +18,6 @@ from ..simulator import SimulatedRecording
 from ..simulator.sensor import LOGO
 from .tables import Cell, Row, distinct, share, summary, where
 from .uncertainty_calibration import ERRORS, STATED, is_answer, is_right
-
-Floats = NDArray[np.float64]
 
 BEST = "best"  # what the program itself trusts
 
@@ -70,13 +66,6 @@ def estimate_rows(result: Result, truth: Truth, about: Row) -> list[Row]:
             row |= zip((*STATED, "reason"), (found.magnitude_std_rps, found.axis_std_deg, found.reason), strict=True)
         rows.append(row)
     return rows
-
-
-def spin_errors(found_rps: Floats, true_rps: Floats) -> tuple[float, float]:
-    """Error of the magnitude in rps and angle between the signed axes in degrees of two (3,) spins in rps."""
-    size, true_size = float(np.linalg.norm(found_rps)), float(np.linalg.norm(true_rps))
-    cosine = float(found_rps @ true_rps) / max(size * true_size, 1e-9)
-    return abs(size - true_size), math.degrees(math.acos(min(max(cosine, -1.0), 1.0)))
 
 
 COLUMNS = ("method", "n", "success", "right", "of those with logo", "magnitude error [rps]", "axis error [deg]")

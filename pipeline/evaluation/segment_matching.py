@@ -7,12 +7,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..results import spin_errors
 from ..session import Result
 from ..shots import Shot
 from ..simulator import SimulatedRecording
 from ..simulator.segments import Segment
 from ..simulator.simulation import truth_of
-from .estimation import BEST, spin_errors
+from .estimation import BEST
 from .tables import Row
 from .uncertainty_calibration import ERRORS, STATED, is_right
 

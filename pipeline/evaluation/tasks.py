@@ -93,16 +93,26 @@ def run(
 
     An error in a task cancels the others; the rows of those that are done stay on disk.
     """
-    parallel = parallel or Parallel(return_as="generator")
     if context.cache is not None:
         _limit_cache(context.cache)
     rows = {number: kept for number, task in enumerate(tasks) if (kept := _kept(context, task)) is not None}
-    pending = [number for number in range(len(tasks)) if number not in rows]
-    for number, result in parallel(delayed(_perform)(context, tasks[number], number) for number in pending):
+    pending = {number: task for number, task in enumerate(tasks) if number not in rows}
+    for number, result in performed(pending, context, parallel):
         rows[number] = result
         if on_progress:
             on_progress(len(rows) / len(tasks), f"{len(rows)} of {len(tasks)}")
     return [row for number in range(len(tasks)) for row in rows[number]]
+
+
+def performed(
+    tasks: Mapping[int, Task], context: TaskContext, parallel: Parallel | None = None
+) -> Iterator[tuple[int, list[Row]]]:
+    """Each task's number and rows as soon as they are known, in any order; `parallel`: see `run`.
+
+    An error in a task, or closing the iterator, cancels the others.
+    """
+    parallel = parallel or Parallel(return_as="generator")
+    yield from parallel(delayed(_perform)(context, task, number) for number, task in tasks.items())
 
 
 def _perform(context: TaskContext, task: Task, number: int) -> tuple[int, list[Row]]:

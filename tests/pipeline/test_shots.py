@@ -20,7 +20,7 @@ CAMERA = Camera.of(CameraParameters(), 1280, 720)
 def ball(number: int, shot: int, *, start_us: int | None = None, x_px: float = 100.0, is_shot: bool = True) -> Any:
     """What a shot needs of one ball in a tick."""
     return SimpleNamespace(
-        packet=SimpleNamespace(end_us=5000 * (number + 1)),
+        packet=SimpleNamespace(start_us=5000 * number, end_us=5000 * (number + 1)),
         track=SimpleNamespace(
             shot=shot,
             t_us=5000.0 * (number + 1) - 100,

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from ...registry import STAGES, Parameters
-from ...results import MethodResult, SpinEstimate
+from ...results import MethodResult, SpinEstimate, spin_errors
 from ...simulator import Scene, SensorModel, SimulatedRecording, flight, human_shot, simulate_scene, spinner, thrown
 from ...stages.track_result import BallTrack
-from ..estimation import chain_over, spin_errors
+from ..estimation import chain_over
 from ..plots import Figures, coverage_figure
 from ..tables import Cell, ResultTable, Row, distinct, summary, where
 from ..tasks import Task, TaskContext

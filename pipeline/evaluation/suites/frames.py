@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ...results import spin_errors
 from .. import paper
-from ..estimation import COLUMNS, method_lines, spin_errors
+from ..estimation import COLUMNS, method_lines
 from ..frame_camera import FrameCamera, frames
 from ..frame_matching import spin_from_frames
 from ..plots import flight_figure

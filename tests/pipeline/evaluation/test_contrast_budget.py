@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from spinscope.pipeline.evaluation import TaskContext
-from spinscope.pipeline.evaluation.estimation import estimated, longest, spin_errors
+from spinscope.pipeline.evaluation.estimation import estimated, longest
 from spinscope.pipeline.evaluation.rendering import render
 from spinscope.pipeline.evaluation.suites.contrast_budget import CASES, figures, measure, scene_of, tables, tasks
 from spinscope.pipeline.evaluation.suites.spinner import known_circle
 from spinscope.pipeline.evaluation.tables import Row, Summary
 from spinscope.pipeline.registry import Parameters
+from spinscope.pipeline.results import spin_errors
 
 
 def made_up(kind: str, number: int, case: str, magnitude: float | None, axis: float | None) -> Row:
