@@ -27,6 +27,8 @@ from spinscope.pipeline.evaluation import SUITES, Report, TaskContext, evaluate,
 from spinscope.pipeline.evaluation.plots import draw
 from spinscope.pipeline.evaluation.tasks import Progress, write_whole
 
+from .terminal import console as terminal_console
+
 WIDE = ("picture",)  # columns that no table of text should hold
 
 
@@ -97,7 +99,7 @@ def suite_list() -> str:
 
 def print_evaluation(evaluation: Evaluation, console: Console | None = None) -> None:
     """Show the tables on a terminal."""
-    console = console or Console()
+    console = console or terminal_console()
     for table in evaluation.report.tables:
         screen = ScreenTable(title=escape(table.title), header_style="bold", title_justify="left")
         for column in table.columns:

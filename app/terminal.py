@@ -9,12 +9,18 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+UNFOLDED_COLUMNS = 1000  # wider than any table
 PATIENCE_S = 1.0  # work that ends sooner shows no bar
 
 
 def note(text: str) -> None:
     """Print one line on standard error."""
     print(text, file=sys.stderr, flush=True)
+
+
+def console() -> Console:
+    """Console for tables on standard output: as wide as the terminal, or unfolded where it is piped or a file."""
+    return Console(width=None if sys.stdout.isatty() else UNFOLDED_COLUMNS)
 
 
 class ProgressBar:

@@ -1,12 +1,12 @@
-"""`spinscope analyze`: the shots of a recording as JSON for programs."""
+"""`spinscope analyze`: the shots of recordings for people, as JSON for programs, and as tables."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
 import sys
-import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +14,14 @@ import click
 
 from spinscope.pipeline.errors import ParameterError, SpinscopeError
 from spinscope.pipeline.files import check_writable
-from spinscope.pipeline.flight_calibration import doubt_about_up, flight_calibration
+from spinscope.pipeline.flight_calibration import flight_calibration
 from spinscope.pipeline.registry import methods
-from spinscope.pipeline.session import Choices, Progress, Result, Session
+from spinscope.pipeline.result_rows import ResultRow, shot_rows
+from spinscope.pipeline.session import Choices, Result, Session
 from spinscope.pipeline.shots import BEGAN_WORDS, ENDED_WORDS
 
+from ..analysis import report_on
+from ..batch import BatchWork, absolute_choices, analyze_to_table, recordings_in
 from ..terminal import ProgressBar, note
 from .options import RECORDING, ListingCommand, RegisteredName, session_options, write_text
 
@@ -26,6 +29,27 @@ from .options import RECORDING, ListingCommand, RegisteredName, session_options,
 def _methods() -> dict[str, str]:
     """Names of the spin methods and what they do."""
     return {**{method.name: method.help for method in methods()}, "all": "All of them."}
+
+
+class PartOf(click.ParamType[tuple[int, int]]):
+    """I/N: the I-th of N parts."""
+
+    name = "I/N"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        """Value of the option; fails with what is allowed."""
+        part, _, parts = str(value).partition("/")
+        if not (part.isdecimal() and parts.isdecimal() and 1 <= int(part) <= int(parts)):
+            self.fail(f"{value!r} is no part: write I/N, like 3/10 for the third of ten", param, ctx)
+        return int(part), int(parts)
+
+
+@dataclass(frozen=True, slots=True)
+class AnalyzedRecording:
+    """Report on one recording, and its shots as rows; no rows where it could not be analyzed."""
+
+    report: dict[str, Any]
+    rows: Sequence[ResultRow] = ()
 
 
 @click.command(cls=ListingCommand, title="Methods", entries=_methods)
@@ -44,6 +68,29 @@ def _methods() -> dict[str, str]:
     help="Which estimates of the spin to report; only what they need is run.",
 )
 @click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    metavar="TABLE.csv|.parquet|.jsonl",
+    help="Write a table with a row for each shot. Recordings are worked on in parallel, each one's rows are kept at "
+    "once; the same command resumes, also with more recordings.",
+)
+@click.option(
+    "--series",
+    type=click.Path(path_type=Path),
+    metavar="TABLE.csv|.parquet|.jsonl",
+    help="With --out: write circle, place, rates and spins of every tick as a second table.",
+)
+@click.option("--jobs", type=click.IntRange(1), help="With --out: processes on this machine; one a core by default.")
+@click.option(
+    "--cluster", metavar="ADDRESS", help="With --out: scheduler of a running Dask cluster that does the work."
+)
+@click.option(
+    "--part",
+    type=PartOf(),
+    help="With --out: only the I-th of N parts, for array jobs. The command without --part then writes the table.",
+)
+@click.option("--overwrite", is_flag=True, help="With --out: begin anew where there are other results.")
+@click.option(
     "--calibrate-flight",
     "calibration",
     type=click.Path(path_type=Path),
@@ -53,37 +100,94 @@ def _methods() -> dict[str, str]:
 )
 @session_options
 def analyze(
-    recordings: tuple[Path, ...], output: str | None, method: str, calibration: Path | None, choices: Choices
+    recordings: tuple[Path, ...],
+    output: str | None,
+    method: str,
+    out: Path | None,
+    series: Path | None,
+    jobs: int | None,
+    cluster: str | None,
+    part: tuple[int, int] | None,
+    overwrite: bool,
+    calibration: Path | None,
+    choices: Choices,
 ) -> None:
-    """Find the shots of recordings and estimate their spin.
+    """Find the shots of recordings (files, folders, patterns) and estimate their spin.
 
     A shot is one free flight of one ball: a bounce or a hit ends it and begins another. In the table * marks the
-    estimate that the program itself trusts, +- is 1 sigma, axes are in the camera frame.
+    estimate that the program itself trusts, +- is 1 sigma, axes are in the camera frame. A recording without a flight
+    in which a ball turns in place is taken as one of a ball spinner, and it is said.
     """
     if output is not None and output != "-":
         check_writable(Path(output), "JSON")
+    found = recordings_in(recordings, [path for path in (out, series) if path is not None])
     if calibration is not None:
-        calibrate_to_file(recordings, choices, calibration)
+        calibrate_to_file(found, choices, calibration)
         choices = dataclasses.replace(choices, flight_calibration=calibration)
-    reports: list[dict[str, Any]] = []
+    if out is None:
+        batch_options = {"series": series, "jobs": jobs, "cluster": cluster, "part": part, "overwrite": overwrite}
+        if given := [name for name, value in batch_options.items() if value]:
+            raise click.UsageError(f"--{given[0]} goes with --out TABLE")
+        has_failed = analyze_one_by_one(found, choices, method, output)
+    else:
+        if output is not None or (overwrite and part):
+            raise click.UsageError("--json and --out, --overwrite and --part exclude each other: give one of them")
+        work = BatchWork(
+            choices=absolute_choices(choices),
+            method=method,
+            table=out,
+            series=series,
+            part=part,
+            jobs=jobs,
+            cluster=cluster,
+            overwrite=overwrite,
+        )
+        has_failed = analyze_batch(found, work)
+    if has_failed:
+        sys.exit(2)
+
+
+def analyze_one_by_one(recordings: Sequence[Path], choices: Choices, method: str, output: str | None) -> bool:
+    """Report on recordings as a table for people or as JSON; whether one of several could not be analyzed."""
+    analyzed: list[AnalyzedRecording] = []
     for recording in recordings:
         try:
             with ProgressBar() as bar:
-                reports.append(analyze_recording(recording, choices, method, bar, cold=not reports))
+                report, result = report_on(recording, choices, method, bar, cold=not analyzed)
+            analyzed.append(AnalyzedRecording(report, shot_rows(result)))
         except SpinscopeError as error:
             if len(recordings) == 1:
                 raise
             note(f"error: {error}")
-            reports.append({"schema": 1, "recording": {"path": str(recording)}, "error": str(error)})
+            failed = {"schema": 1, "recording": {"path": str(recording)}, "error": str(error)}
+            analyzed.append(AnalyzedRecording(failed))
     if output is None:
-        print_reports(reports)
+        print_shots(analyzed)
     else:
-        write_text(output, "".join(json.dumps(report, allow_nan=False) + "\n" for report in reports))
-    if any("error" in report for report in reports):
-        sys.exit(2)
+        write_text(output, "".join(json.dumps(one.report, allow_nan=False) + "\n" for one in analyzed))
+    return any("error" in one.report for one in analyzed)
 
 
-def calibrate_to_file(recordings: tuple[Path, ...], choices: Choices, out: Path) -> None:
+def analyze_batch(recordings: Sequence[Path], work: BatchWork) -> bool:
+    """Analyze recordings into a table and say what came of it; whether one could not be analyzed."""
+    with ProgressBar() as bar:
+        try:
+            summary = analyze_to_table(recordings, work, bar)
+        except KeyboardInterrupt:
+            note(f"stopped: what is done is kept beside {work.table}, the same command goes on from there")
+            raise
+    for failure in summary.failed:
+        note(f"error: {failure}")
+    earlier = f", {summary.known} of them known from earlier" if summary.known else ""
+    counts = f"{summary.recordings} recordings{earlier}, {len(summary.failed)} failed"
+    if work.part is not None:
+        note(f"part {work.part[0]} of {work.part[1]}: {counts}; the command without --part writes {work.table}")
+    else:
+        note(f"wrote {' and '.join(str(path) for path in (work.table, work.series) if path)}: {counts}")
+    return bool(summary.failed)
+
+
+def calibrate_to_file(recordings: Sequence[Path], choices: Choices, out: Path) -> None:
     """Calibrate the set-up by the flights of those recordings that can be read; raises SpinscopeError."""
     if out.suffix != ".toml":
         raise ParameterError(f"a calibration is a TOML file: give a name that ends with .toml instead of {out}")
@@ -93,7 +197,7 @@ def calibrate_to_file(recordings: tuple[Path, ...], choices: Choices, out: Path)
     note(f"calibrated: {calibration}: {out}")
 
 
-def _results(recordings: tuple[Path, ...], choices: Choices) -> Iterator[Result]:
+def _results(recordings: Sequence[Path], choices: Choices) -> Iterator[Result]:
     """The results of the recordings that can be read; the others are reported when they are answered."""
     for recording in recordings:
         try:
@@ -103,60 +207,47 @@ def _results(recordings: tuple[Path, ...], choices: Choices) -> Iterator[Result]
             continue
 
 
-def analyze_recording(
-    path: Path, choices: Choices, method: str, on_progress: Progress | None = None, *, cold: bool = True
-) -> dict[str, Any]:
-    """The report on one recording (tests/app/analyze.schema.json); raises SpinscopeError.
-
-    Parameters
-    ----------
-    path : Path
-        The recording.
-    choices : Choices
-        Options of the command line.
-    method : str
-        Name of a spin method, or "all".
-    on_progress : callable, optional
-        Told the share done and what is being done.
-    cold : bool
-        Whether this is the process's first; loading the kernels is then told apart from the work itself.
-    """
-    begin = time.perf_counter()
-    session = Session.open(path, choices, on_progress)
-    load_seconds = session.load_kernels(method) if cold else 0.0
-    result = session.estimate(method, on_progress)
-    report = result.to_dict()
-    report["warnings"] = [*report["warnings"], *filter(None, [doubt_about_up(result)])]
-    report["recording"]["path"] = str(path)
-    report["seconds"] |= {"load": load_seconds, "total": time.perf_counter() - begin}
-    return report
-
-
-def print_reports(reports: list[dict[str, Any]]) -> None:
-    """The reports of `analyze` for people: a heading for every shot and a row for every method under it."""
-    for report in reports:
+def print_shots(analyzed: Sequence[AnalyzedRecording]) -> None:
+    """Print the shots for people: a heading for every shot and a row for every method under it."""
+    for one in analyzed:
+        report = one.report
         name = Path(report["recording"]["path"]).name
         if "error" in report:
             print(f"{name}: error: {report['error']}")
         elif not report["shots"]:
             print(f"{name}: {report['no_shot_reason']} (a ball on a spinner needs --fixed-ball)")
-        for number, shot in enumerate(report.get("shots", [])):
-            speed = "" if shot["speed_m_s"] is None else f", {shot['speed_m_s']:.2f} m/s"
+        for shot, row in zip(report.get("shots", ()), one.rows, strict=False):
             how = f"{BEGAN_WORDS[shot['began_by']]}, {ENDED_WORDS[shot['ended_by']]}"
+            speed = "" if shot["speed_m_s"] is None else f"{shot['speed_m_s']:.2f} m/s, "
             print(
-                f"{name}, shot {number + 1} of {len(report['shots'])}: {shot['start_us'] / 1000:.1f} to "
-                f"{shot['end_us'] / 1000:.1f} ms ({how}){speed}, "
+                f"{name}, shot {row['shot']} of {row['shots']}: {shot['start_us'] / 1000:.1f} to "
+                f"{shot['end_us'] / 1000:.1f} ms ({how}), {speed}{row['distance_m']:.2f} m from the camera, "
                 f"{shot['logo_events']} logo events"
             )
-            print(f"    {'method':<12} {'spin [rps]':>18}   {'axis x, y, z':<24}  {'+- [deg]':>8}")
+            print(f"    {'method':<12} {'spin [rps]':>18}   {'axis x, y, z':<24}  {'+- [deg]':>8}{_truth_heading(row)}")
             for method, estimate in shot["spin"].items():
-                print(f"  {'*' if method == shot['best'] else ' '} {method:<12} {_row(estimate)}")
+                print(f"  {'*' if method == shot['best'] else ' '} {method:<12} {_row(estimate)}{_errors(row, method)}")
             if shot["best"] is None:
                 print(f"    none is trusted: {shot['best_reason']}")
-    print("* = trusted; +- is 1 sigma; axis in the camera frame: x right, y down, z into the scene")
-    for report in reports:
-        for warning in report.get("warnings", []):
-            note(f"warning: {Path(report['recording']['path']).name}: {warning}")
+            elif row["topspin_rps"] is not None:
+                parts = (f"{name} {row[f'{name}_rps']:+.1f}" for name in ("topspin", "sidespin", "corkscrew"))
+                print(f"    {row['kind']}: {', '.join(parts)} rps")
+    print("* = trusted; +- is 1 sigma; axis in the camera frame: x right, y down, z into the scene; sidespin + = left")
+    for one in analyzed:
+        for warning in one.report.get("warnings", []):
+            note(f"warning: {Path(one.report['recording']['path']).name}: {warning}")
+
+
+def _truth_heading(row: ResultRow) -> str:
+    """Heading of the errors, with the truth; empty where there is none."""
+    return "" if row.get("true_magnitude_rps") is None else f"  off the truth, {row['true_magnitude_rps']:.2f} rps"
+
+
+def _errors(row: ResultRow, method: str) -> str:
+    """Errors of a method against the truth; empty where they are not known."""
+    error_rps, error_deg = row.get(f"{method}_error_rps"), row.get(f"{method}_error_deg")
+    angle = "" if error_deg is None else f", {error_deg:.1f} deg"
+    return "" if error_rps is None else f"  {error_rps:.2f} rps{angle}"
 
 
 def _row(estimate: dict[str, Any]) -> str:

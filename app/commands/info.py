@@ -6,13 +6,12 @@ import json
 from pathlib import Path
 
 import click
-from rich.console import Console
 from rich.table import Table
 
 from spinscope.pipeline.recordings import RecordingInfo, open_recording, summary
 from spinscope.pipeline.session import Progress
 
-from ..terminal import ProgressBar
+from ..terminal import ProgressBar, console
 from .options import RECORDING, sensor_option, write_text
 
 SHOWN = 60  # characters of an attribute; a simulation's scene is a page long
@@ -64,11 +63,11 @@ def print_information(info: RecordingInfo) -> None:
     for name, value in rows.items():
         if value:
             table.add_row(name, value)
-    console = Console()
-    console.print(str(info.path), highlight=False, soft_wrap=True)
-    console.print(table)
+    screen = console()
+    screen.print(str(info.path), highlight=False, soft_wrap=True)
+    screen.print(table)
     for warning in info.warnings:
-        console.print(f"warning: {warning}", style="yellow", highlight=False, soft_wrap=True)
+        screen.print(f"warning: {warning}", style="yellow", highlight=False, soft_wrap=True)
 
 
 def _shortened(text: str) -> str:

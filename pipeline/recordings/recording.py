@@ -6,6 +6,7 @@ import hashlib
 import os
 from collections.abc import Iterator
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -19,6 +20,28 @@ from .sensor import KNOWN_SENSORS, Resolution, smallest_known
 HASH_ALL_BYTES = 64 << 20
 HASH_BLOCK_BYTES = 1 << 20
 EVENT_BYTES = 13  # 8 + 2 + 2 + 1
+
+
+def file_identity(path: Path) -> str:
+    """Hash a file's bytes (BLAKE2b, 32 hexadecimal digits); raises RecordingError.
+
+    Of a file above 64 MB only size, time of change, and 1 MB each at start, middle and end are hashed.
+    """
+    digest = hashlib.blake2b(digest_size=16)
+    try:
+        with open(path, "rb") as file:
+            size = file.seek(0, 2)
+            if size <= HASH_ALL_BYTES:
+                places = list(range(0, size, HASH_BLOCK_BYTES))
+            else:
+                digest.update(f"{size} {path.stat().st_mtime_ns}".encode())
+                places = [0, size // 2, size - HASH_BLOCK_BYTES]
+            for place in places:
+                file.seek(place)
+                digest.update(file.read(HASH_BLOCK_BYTES))
+    except OSError as error:
+        raise RecordingError(f"recording can no longer be read ({error.strerror}): {path}") from error
+    return digest.hexdigest()
 
 
 def _memory_bytes() -> int:
@@ -138,25 +161,8 @@ class Recording:
         return EventBatch.concatenate(parts)
 
     def identity(self) -> str:
-        """Hash the file's bytes (BLAKE2b, 32 hexadecimal digits).
-
-        Of a file above 64 MB only size, time of change, and 1 MB each at start, middle and end are hashed.
-        """
-        digest = hashlib.blake2b(digest_size=16)
-        try:
-            with open(self.path, "rb") as file:
-                size = file.seek(0, 2)
-                if size <= HASH_ALL_BYTES:
-                    places = list(range(0, size, HASH_BLOCK_BYTES))
-                else:
-                    digest.update(f"{size} {self.path.stat().st_mtime_ns}".encode())
-                    places = [0, size // 2, size - HASH_BLOCK_BYTES]
-                for place in places:
-                    file.seek(place)
-                    digest.update(file.read(HASH_BLOCK_BYTES))
-        except OSError as error:
-            raise RecordingError(f"recording can no longer be read ({error.strerror}): {self.path}") from error
-        return digest.hexdigest()
+        """Hash of the file; see `file_identity`."""
+        return file_identity(self.path)
 
     def _scanned(self) -> ReadPass:
         if not self.scanned:

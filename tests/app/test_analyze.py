@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import copy
 import json
+import re
 import subprocess
 import sys
 import tomllib
@@ -17,8 +17,9 @@ import pytest
 from click.testing import CliRunner
 
 from spinscope.app.cli import cli
-from spinscope.app.commands.analyze import print_reports
+from spinscope.app.commands.analyze import AnalyzedRecording, print_shots
 from spinscope.pipeline import calibrate_flights
+from spinscope.pipeline.result_rows import shot_rows
 from spinscope.pipeline.session import Choices, Session
 from spinscope.pipeline.stages.logo import LogoParameters
 
@@ -162,21 +163,38 @@ def test_the_table_for_people_names_units_and_methods(samples: Path) -> None:
 
 
 def test_the_table_says_how_a_shot_began_and_ended_and_why_nothing_is_trusted(
-    reports: dict[str, dict[str, Any]], capsys: pytest.CaptureFixture[str]
+    samples: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    report = copy.deepcopy(reports["flight_side"])
+    result = Session.open(samples / "flight_side.h5").estimate("normal_flow")
+    report = result.to_dict()
     report["shots"][0] |= {"began_by": "hit", "ended_by": "bounce"}
-    print_reports([report])
+    print_shots([AnalyzedRecording(report, shot_rows(result))])
     table = capsys.readouterr().out
     assert "(from a hit, bounced)" in table
     assert f"none is trusted: {report['shots'][0]['best_reason']}" in table
+
+
+def test_the_table_shows_distance_components_and_the_error_against_the_truth(samples: Path) -> None:
+    done = CliRunner().invoke(cli, ["analyze", str(samples / "flight_back.h5"), "--method", "normal_flow"])
+    assert "1.74 m from the camera" in done.output and "off the truth, 55.22 rps" in done.output
+    row = next(line for line in done.output.splitlines() if "* normal_flow" in line)
+    assert float(row.split("rps")[0].split()[-1]) < 2 and "deg" in row
+    topspin, sidespin, corkscrew = re.findall(r"(?:topspin|sidespin|corkscrew) ([+-][0-9.]+)", done.output)
+    assert float(topspin) < -50 and abs(float(sidespin)) < 5 and abs(float(corkscrew)) < 5
+
+
+def test_a_ball_that_turns_in_place_is_recognised_and_said(samples: Path) -> None:
+    arguments = ["analyze", str(samples / "spinner_ball2_side.h5"), "--method", "contrast", "--json", "-"]
+    report = json.loads(CliRunner().invoke(cli, arguments).stdout)
+    assert report["shots"][0]["best"] == "contrast"
+    assert any("turns in place" in warning for warning in report["warnings"])
 
 
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
         (["missing.h5"], "missing.h5"),
-        (["{samples}"], "folder"),
+        (["{samples}/flight_back.h5", "{samples}/no/*.h5"], "no file fits the pattern"),
         (["{samples}/flight_back.h5", "--set", "logo.pad_px=-1"], "0 to 100 px"),
         (["{samples}/flight_back.h5", "--set", "logo.pad=1"], "did you mean pad_px"),
         (["{samples}/flight_back.h5", "--preset", "best"], "default, paper"),

@@ -1,0 +1,78 @@
+"""Analysis of one recording, as `spinscope analyze` reports it."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from pathlib import Path
+from typing import Any
+
+from spinscope.pipeline.errors import RecordingError
+from spinscope.pipeline.flight_calibration import doubt_about_up
+from spinscope.pipeline.session import Choices, Progress, Result, Session
+
+
+def analyzed(path: Path, choices: Choices, method: str = "all", on_progress: Progress | None = None) -> Result:
+    """The shots of a recording, or its ball on a spinner where there is no flight; raises SpinscopeError.
+
+    See `analyzed_session`.
+    """
+    return analyzed_session(Session.open(path, choices, on_progress), method, on_progress)
+
+
+def analyzed_session(session: Session, method: str = "all", on_progress: Progress | None = None) -> Result:
+    """The shots of an open recording, or its ball on a spinner where there is no flight.
+
+    Where no shot is trusted, and neither the user nor a sidecar fixed the ball, a ball that turns in place is looked
+    for. It counts only if its spin is trusted, and a warning says so.
+    """
+    result = _with_doubts(session.estimate(method, on_progress))
+    if session.parameters.track.ball == "fixed" or any(shot.best for shot in result.shots):
+        return result
+    in_place = dataclasses.replace(session, warnings=list(session.warnings))
+    try:
+        in_place.place_fixed_ball("auto")
+    except RecordingError:
+        return result
+    turning = in_place.estimate(method, on_progress)
+    if not any(shot.best for shot in turning.shots):
+        return result
+    in_place.warnings.append("no flight is trusted in this recording: taken as a ball that turns in place on a spinner")
+    return turning
+
+
+def report_on(
+    path: Path, choices: Choices, method: str, on_progress: Progress | None = None, *, cold: bool = True
+) -> tuple[dict[str, Any], Result]:
+    """The JSON report on one recording (tests/app/analyze.schema.json) and its result; raises SpinscopeError.
+
+    Parameters
+    ----------
+    path : Path
+        The recording.
+    choices : Choices
+        Options of the command line.
+    method : str
+        Name of a spin method, or "all".
+    on_progress : callable, optional
+        Told the share done and what is being done.
+    cold : bool
+        Whether this is the process's first; loading the kernels is then told apart from the work itself.
+    """
+    begin = time.perf_counter()
+    session = Session.open(path, choices, on_progress)
+    load_seconds = session.load_kernels(method) if cold else 0.0
+    result = analyzed_session(session, method, on_progress)
+    report = result.to_dict()
+    report["recording"]["path"] = str(path)
+    report["seconds"] |= {"load": load_seconds, "total": time.perf_counter() - begin}
+    return report, result
+
+
+def _with_doubts(result: Result) -> Result:
+    """The result, with what its flights say against the parameters among the warnings."""
+    doubt = doubt_about_up(result)
+    if doubt is None:
+        return result
+    session = dataclasses.replace(result.session, warnings=[*result.session.warnings, doubt])
+    return dataclasses.replace(result, session=session)
