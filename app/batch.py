@@ -34,7 +34,7 @@ REMEDY = "give another name, or --overwrite to begin anew"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BatchWork:
-    """What is done with every recording of a batch, and where the results go.
+    """Work of a batch on each of its recordings, and the places of the results.
 
     Attributes
     ----------

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from .errors import RecordingError
 from .registry import methods
-from .results import SpinEstimate, Vector, spin_errors
-from .session import Result
+from .results import SpinEstimate, Truth, Vector, spin_errors
+from .session import Result, Session
 from .shots import Shot
 from .spin_terms import kind_of_spin
 
@@ -80,11 +81,12 @@ def shot_rows(result: Result) -> list[ResultRow]:
     """
     session = result.session
     report = result.to_dict()
-    warnings = "; ".join(session.warnings) or None
+    truth, doubts = _simulated_truth(session)
+    warnings = "; ".join([*session.warnings, *doubts]) or None
     if not result.shots:
         return [{"shots": 0, "no_shot_reason": result.no_shot_reason, "warnings": warnings}]
     return [
-        {"shot": number, "shots": len(result.shots), **_shot_row(result, shot, written), "warnings": warnings}
+        {"shot": number, "shots": len(result.shots), **_shot_row(result, shot, written, truth), "warnings": warnings}
         for number, (shot, written) in enumerate(zip(result.shots, report["shots"], strict=True), start=1)
     ]
 
@@ -109,7 +111,15 @@ def tick_rows(result: Result) -> list[ResultRow]:
     return rows
 
 
-def _shot_row(result: Result, shot: Shot, written: dict[str, Any]) -> ResultRow:
+def _simulated_truth(session: Session) -> tuple[Truth | None, list[str]]:
+    """The simulator's truth, and a warning where it is damaged: the shots are no worse for that."""
+    try:
+        return session.truth, []
+    except RecordingError as error:
+        return None, [str(error)]
+
+
+def _shot_row(result: Result, shot: Shot, written: dict[str, Any], truth: Truth | None) -> ResultRow:
     """The row of a shot; `written` is the shot as JSON, of the methods that were asked for."""
     session, best = result.session, written["best"]
     names = ("start_us", "end_us", "began_by", "ended_by", "speed_m_s", "logo_events", "best", "best_reason")
@@ -118,7 +128,7 @@ def _shot_row(result: Result, shot: Shot, written: dict[str, Any]) -> ResultRow:
     row["distance_m"] = float(np.linalg.norm(places_m, axis=1).mean())
     row["fixed_ball"] = is_fixed = session.parameters.track.ball == "fixed"
     row["witnesses"] = " ".join(one["witness"] for one in written["witnesses"]) or None
-    true_spin, true_rps, row["truth_from"] = _truth(result, shot)
+    true_spin, true_rps, row["truth_from"] = _truth(result, shot, truth)
     if true_rps is not None:
         row |= dict(zip(_TRUE, (*((None,) * 3 if true_spin is None else true_spin.tolist()), true_rps), strict=True))
     for method in written["spin"]:
@@ -150,9 +160,9 @@ def _errors(estimate: SpinEstimate, true_spin: Vector | None, true_rps: float | 
     return dict(zip(_ERRORS, spin_errors(estimate.vector_rps, true_spin), strict=True))
 
 
-def _truth(result: Result, shot: Shot) -> tuple[Vector | None, float | None, str | None]:
+def _truth(result: Result, shot: Shot, simulated: Truth | None) -> tuple[Vector | None, float | None, str | None]:
     """True spin (3,) in rps at the middle of a shot, its magnitude, and where they are from; None where not known."""
-    stated, simulated = result.session.sidecar.truth, result.session.truth
+    stated = result.session.sidecar.truth
     if stated is not None:
         if len(result.shots) > 1:
             return None, None, None

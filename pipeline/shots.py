@@ -41,7 +41,7 @@ ENDED_WORDS: dict[EndedBy, str] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ShotTick:
-    """What the stages say of a shot at the end of one of its ticks, from all events up to there.
+    """Results of the stages for a shot at the end of one of its ticks, from all events up to there.
 
     Attributes
     ----------

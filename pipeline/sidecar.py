@@ -1,4 +1,4 @@
-"""Sidecars: what stands beside a recording about its camera, ball, truth and biases.
+"""Sidecars: statements beside a recording about its camera, ball, truth and biases.
 
 `NAME.toml` beside `NAME.raw` has the tables [camera] and [ball] (parameters), [fixed_ball] (`x_px`, `y_px`,
 `radius_px`), [truth] and [biases]; `NAME.bias` is as the camera's software writes it.
@@ -82,7 +82,7 @@ class StatedTruth:
 
 @dataclass(frozen=True, slots=True)
 class Sidecar:
-    """What stands beside a recording; empty where nothing does.
+    """Statements beside a recording about camera, ball, truth and biases; empty where there is no file.
 
     Attributes
     ----------

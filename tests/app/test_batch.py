@@ -28,7 +28,7 @@ from spinscope.pipeline.recordings.writing import write_recording
 from spinscope.pipeline.result_rows import shot_columns
 from spinscope.pipeline.session import Choices
 
-BALL = ["ball_fixed.h5", "bad.raw", "noise0.h5", "noise1.h5", "noise2.h5"]
+NAMES = ["ball_fixed.h5", "bad.raw", "noise0.h5", "noise1.h5", "noise2.h5"]
 
 
 def noise(path: Path, seed: int) -> None:
@@ -92,7 +92,7 @@ def test_a_folder_of_everything_becomes_one_table(folder: Path) -> None:
     assert (summary.recordings, summary.known) == (5, 0)
     assert [text.partition(":")[0] for text in summary.failed] == ["in/bad.raw"]
     rows = {row["recording"]: row for row in read()}
-    assert list(rows) == [f"in/{name}" for name in sorted(BALL)]
+    assert list(rows) == [f"in/{name}" for name in sorted(NAMES)]
     assert "RAW" in rows["in/bad.raw"]["error"] and not rows["in/bad.raw"]["shot"]
     assert "no ball" in rows["in/noise0.h5"]["no_shot_reason"] and not rows["in/noise0.h5"]["error"]
     ball = rows["in/ball_fixed.h5"]
@@ -142,7 +142,7 @@ def test_rows_are_on_disk_as_soon_as_they_are_known_and_a_run_goes_on_where_it_s
     with open(journal, "ab") as file:  # the line that was being written when the power failed
         file.write(b'{"recording": "in/noi')
     summary = analyze(["in"])
-    assert summary.known == 2 and sorted(calls) == sorted([*BALL, "bad.raw"]), "what failed is tried again"
+    assert summary.known == 2 and sorted(calls) == sorted([*NAMES, "bad.raw"]), "what failed is tried again"
     assert len(read()) == 5
     first = Path("out.csv").read_bytes()
     Path("out.csv").unlink()
@@ -193,7 +193,7 @@ def test_parts_of_an_array_job_make_the_same_table(folder: Path, calls: list[str
         summary = analyze(["in"], part=(part, 3))
         assert summary.recordings == (2 if part < 3 else 1)
         assert not Path("out.csv").exists()
-    assert sorted(calls[5:]) == sorted(BALL)
+    assert sorted(calls[5:]) == sorted(NAMES)
     assert analyze(["in"]).known == 4
     assert Path("out.csv").read_bytes() == Path("whole.csv").read_bytes()
 

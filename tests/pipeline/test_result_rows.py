@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -77,6 +79,16 @@ def test_a_stated_magnitude_has_no_axis_to_compare_with(spinner: Result) -> None
 def test_a_stated_truth_is_of_one_shot_only(two_balls: Result) -> None:
     session = replace(two_balls.session, sidecar=Sidecar(truth=StatedTruth(spin_rps=(40.0, 0.0, 0.0), rps=40.0)))
     assert all("error_rps" not in row for row in shot_rows(replace(two_balls, session=session)))
+
+
+def test_a_damaged_truth_costs_the_errors_only(samples: Path, tmp_path: Path) -> None:
+    recording = tmp_path / "flight.h5"
+    shutil.copy(samples / "flight_back.h5", recording)
+    with h5py.File(recording, "r+") as file:
+        del file["truth/spin_rps"]
+    (row,) = shot_rows(Session.open(recording).estimate("triplet"))
+    assert row["triplet_magnitude_rps"] is not None and "triplet_error_rps" not in row
+    assert "truth" in str(row["warnings"])
 
 
 def test_no_shot_is_a_row_with_its_reason(samples: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from spinscope.pipeline.api import estimate
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.recordings import open_recording
 from spinscope.pipeline.stages.fixed_ball import CLOSED_SHORT, _limb, find_fixed_ball
 from tests.track_runs import HEIGHT, WIDTH, merged, sample, setting
 
@@ -53,6 +55,11 @@ def test_a_dot_on_a_turning_disc_is_a_ball(path_px: float, dot_px: float, rps: f
 def test_a_flight_is_no_fixed_ball(name: str) -> None:
     with pytest.raises(RecordingError, match="passes by once"):
         find_fixed_ball(sample(name)[0], setting().camera)
+
+
+def test_a_rally_holds_no_fixed_ball(samples: Path) -> None:
+    with pytest.raises(RecordingError, match="no ball found"):
+        find_fixed_ball(open_recording(samples / "own" / "rally.h5").read(), setting().camera)
 
 
 def test_an_arc_is_no_fixed_ball() -> None:
