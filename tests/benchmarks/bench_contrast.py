@@ -16,6 +16,7 @@ from spinscope.pipeline.results import MethodResult, SpinEstimate
 from spinscope.pipeline.session import Choices, Session
 from spinscope.pipeline.spin.contrast import stage as contrast
 from spinscope.pipeline.spin.contrast.events import whole_window
+from spinscope.pipeline.spin.contrast.parameters import ContrastParameters
 from spinscope.pipeline.spin.contrast.score import score
 from spinscope.pipeline.stage import Context
 from tests.reference.contrast import dotted_ball, naive_score
@@ -43,7 +44,7 @@ def recorded(name: str) -> tuple[list[Tick], Context]:
 
 def costs_ms(ticks: list[Tick], context: Context) -> tuple[list[float], list[float]]:
     """CPU of each tick with a full estimate, and of each that follows one."""
-    parameters = contrast.ContrastParameters()
+    parameters = ContrastParameters()
     state, full, followed = contrast.start(parameters, context), [], []
     for tick in ticks:
         started = time.thread_time()

@@ -178,6 +178,11 @@ class ContrastEstimate:
     contrast: float = 0.0
     patch_rad: float = 0.0
 
+    @property
+    def turns(self) -> float:
+        """Number of turns within the stretch; 0 without a spin."""
+        return 0.0 if self.spin_rps is None else self.span_s * float(np.linalg.norm(self.spin_rps))
+
 
 @numba.njit(cache=True, nogil=True)
 def time_permuted(events: EventColumns, times_each: int) -> tuple[EventColumns, Integers]:

@@ -26,11 +26,12 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from ...kernels.arrays import Flags, Floats, Integers, Singles
+from ...kernels.arrays import Flags, Floats, Integers
 from ...kernels.rotation import axis_and_length, orthonormal_axes, rotate
 from .events import EventColumns, ScoreWindow, SphereEvents, segment_starts, shifted_normals, take_columns
 
 TURN = 2.0 * math.pi
+ONE, TWO = np.uint64(1), np.uint64(2)  # cells: an unsigned index plus a signed number would be a float
 # The quadratic B-spline's overlap with itself in two dimensions, mean over its place on the grid (11/20 each):
 # what one coinciding event adds to a density.
 COINCIDENCE = 0.55 * 0.55
@@ -69,15 +70,11 @@ def derotate(derotated: Floats, spin_rad_s: Floats, t_s: Floats, normals: Floats
 
 
 @numba.njit(cache=True, nogil=True)
-def _mean_direction(spin_rad_s: Floats, events: EventColumns) -> tuple[float, float, float]:
-    """Mean direction of the derotated normals, of about POLE_EVENTS of them."""
-    stride = max(1, events.t_s.size // POLE_EVENTS)
-    some = np.ascontiguousarray(events.normals[:, ::stride])
-    derotated = np.empty_like(some)
-    derotate(derotated, spin_rad_s, np.ascontiguousarray(events.t_s[::stride]), some)
+def _mean_direction(points: Floats) -> tuple[float, float, float]:
+    """Mean direction of unit vectors (3, n), of about POLE_EVENTS of them."""
     x, y, z = 0.0, 0.0, 1e-9
-    for k in range(derotated.shape[1]):
-        x, y, z = x + derotated[0, k], y + derotated[1, k], z + derotated[2, k]
+    for k in range(0, points.shape[1], max(1, points.shape[1] // POLE_EVENTS)):
+        x, y, z = x + points[0, k], y + points[1, k], z + points[2, k]
     length = math.sqrt(x * x + y * y + z * z)
     return x / length, y / length, z / length
 
@@ -102,9 +99,15 @@ def _spline(offset: float) -> tuple[float, float, float]:
     return 0.5 * (0.5 - offset) ** 2, 0.75 - offset * offset, 0.5 * (0.5 + offset) ** 2
 
 
+@numba.njit(cache=True, nogil=True, inline="always")
+def _first_cell(polarity: int, row: int, column: int, size: int) -> np.uint64:
+    """Index of the first of the nine cells around a place; unsigned, which spares a look for negative ones."""
+    return np.uint64((polarity * size + row - 1) * size + column - 1)
+
+
 @numba.njit(cache=True, nogil=True)
 def _splat(
-    density: Singles, places: Floats, polarity: Integers, first: int, last: int, size: int, weight: float
+    density: Floats, places: Floats, polarity: Integers, first: int, last: int, size: int, weight: float
 ) -> None:
     """Add one splat of this weight a place [first, last) to the flat maps, size x size cells a polarity."""
     for k in range(first, last):
@@ -112,12 +115,12 @@ def _splat(
         column, row = int(x + 0.5), int(y + 0.5)
         x0, x1, x2 = _spline(x - column)
         y0, y1, y2 = _spline(y - row)
-        at = (polarity[k] * size + row - 1) * size + column - 1
+        at = _first_cell(polarity[k], row, column, size)
         for part in (y0 * weight, y1 * weight, y2 * weight):
             density[at] += part * x0
-            density[at + 1] += part * x1
-            density[at + 2] += part * x2
-            at += size
+            density[at + ONE] += part * x1
+            density[at + TWO] += part * x2
+            at += np.uint64(size)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -140,10 +143,10 @@ def score(log_ratios: Floats, spin_rad_s: Floats, window: ScoreWindow, cell_rad:
     places, permuted_places = np.empty_like(events.normals), np.empty_like(permuted.normals)
     derotate(places, spin_rad_s, events.t_s, events.normals)
     derotate(permuted_places, spin_rad_s, permuted.t_s, permuted.normals)
-    pole = _mean_direction(spin_rad_s, events)
+    pole = _mean_direction(places)
     _to_map(places, pole, 1.0 / cell_rad, middle)
     _to_map(permuted_places, pole, 1.0 / cell_rad, middle)
-    sharp, blurred = np.zeros(2 * size * size, np.float32), np.zeros(2 * size * size, np.float32)
+    sharp, blurred = np.zeros(2 * size * size), np.zeros(2 * size * size)
     total = 0.0
     for segment in range(events.starts.size - 1):
         first, last = events.starts[segment], events.starts[segment + 1]
@@ -160,13 +163,13 @@ def score(log_ratios: Floats, spin_rad_s: Floats, window: ScoreWindow, cell_rad:
             column, row = int(x + 0.5), int(y + 0.5)
             x0, x1, x2 = _spline(x - column)
             y0, y1, y2 = _spline(y - row)
-            at = (events.polarity[i] * size + row - 1) * size + column - 1
+            at = _first_cell(events.polarity[i], row, column, size)
             density = -(x0 * x0 + x1 * x1 + x2 * x2) * (y0 * y0 + y1 * y1 + y2 * y2)
             expected = 0.0
             for part in (y0, y1, y2):
-                density += part * (x0 * sharp[at] + x1 * sharp[at + 1] + x2 * sharp[at + 2])
-                expected += part * (x0 * blurred[at] + x1 * blurred[at + 1] + x2 * blurred[at + 2])
-                at += size
+                density += part * (x0 * sharp[at] + x1 * sharp[at + ONE] + x2 * sharp[at + TWO])
+                expected += part * (x0 * blurred[at] + x1 * blurred[at + ONE] + x2 * blurred[at + TWO])
+                at += np.uint64(size)
             log_ratios[i] = math.log((max(density, 0.0) + added) / (expected + added))
             total += log_ratios[i]
     return total

@@ -12,25 +12,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 import numpy as np
 
 from ...kernels.arrays import Floats
-from ...parameters import ParameterGroup, switch, tunable
 from ...results import MethodResult, Packet, SpinEstimate
-from ...spin_terms import vector_words
 from ...stage import Context, SpinMethod
 from ...stages.logo import LogoResult
 from ...stages.rate import RateResult
-from ...stages.rate_period import FEWEST_SIGMAS
 from ...stages.track_result import BallTrack
 from .estimate import ScoreMap, estimate_spin, follow_spin, score_map
 from .events import BallUncertainty, ContrastEstimate, ContrastSettings, SphereEvents
+from .parameters import FLOW_METHOD, METHOD, ContrastParameters
 from .result import ContrastResult
-
-METHOD, FLOW_METHOD = "contrast", "normal_flow"
-
+from .trust import RETURNED_TURNS, doubt, judged, misses_rhythm, sigmas_apart
 
 # Full estimates when the shot is so old, then each time it is half as old again; in between the last answer is
 # followed, which costs a tenth.
@@ -46,53 +41,9 @@ SETTLED_TURNS, SETTLED = 2.0, 3.0
 # A spin that is off by one turn between the logo's visits fits those seen, not the next one: where following loses so
 # much of the contrast that it had, a full estimate is due at once, with a scan.
 LOST = 0.85
-# So it is when the logo has come back for the first time: before, the magnitude rested on how far it moved.
-RETURNED_TURNS = 1.2
 # ON and OFF, bright and dark pixels report 25 us sooner or later than the mean latency: what the ball flies meanwhile
 # is an error of its place that the tracker, which sees the outline, does not know of.
 LATENCY_SPREAD_S = 25e-6
-# Edges that come and go give both polarities; what pixels of a slow sensor still report of the ball's outline when it
-# is far ahead has one. Of 134 right answers on simulated shots none has less than a tenth of the rarer polarity.
-LEAST_OF_POLARITY = 0.05
-# The rhythm of the logo's visits follows the spin to this share, and the line of sight's own turn while the ball passes
-# (0.7 rps at 9 m/s and 2 m); farther off than so many of these is another spin.
-RHYTHM_SHARE, SIGHT_RPS, RHYTHM_SIGMAS = 0.015, 0.7, 3.0
-RHYTHM_EXCLUDED = -8.0  # log likelihood below which, four sigma, a magnitude is no rhythm's
-
-
-@dataclass(frozen=True, kw_only=True)
-class ContrastParameters(ParameterGroup):
-    """Kernel, window, and what is trusted."""
-
-    renamed: ClassVar[dict[str, str]] = {"weakest": "min_gain"}
-
-    kernel_rad: float = tunable(
-        0.04, 0.01, 0.3, 0.005, "rad", "how near on the ball events must come to count as one (1 sigma)"
-    )
-    floor_events: float = tunable(1.5, 0.1, 100.0, 0.1, "events", "density below which differences mean little")
-    window_us: int = tunable(500_000, 5000, 10_000_000, 5000, "us", "how far back in time events may lie")
-    fewest_events: int = tunable(40, 10, 10_000, 10, "events", "logo events needed for an answer")
-    min_gain: float = tunable(
-        0.25, 0.0, 5.0, 0.05, "", "contrast that an event must gain over permuted times (natural log), on average"
-    )
-    rival_sigmas: float = tunable(1.2, 0.0, 20.0, 0.1, "sigma", "lead that the best spin must have over any other")
-    # On 110 simulated flights that contrast answers rightly one in a hundred is farther away than 5.7.
-    flow_sigmas: float = tunable(
-        6.0,
-        0.0,
-        100.0,
-        0.5,
-        "sigma",
-        "distance from the normal flow's spin that puts it in doubt, unless it is settled",
-    )
-    smallest_patch_rad: float = tunable(
-        0.18, 0.0, 1.5, 0.01, "rad", "spread of the logo's events over the ball (rms) below which it is not seen"
-    )
-    axis_std_deg: float = tunable(12.0, 0.1, 180.0, 0.5, "deg", "largest stated error of the axis (1 sigma)")
-    magnitude_std_rps: float = tunable(
-        3.0, 0.01, 1000.0, 0.1, "rps", "largest stated error of the magnitude (1 sigma); a tenth of it if that is more"
-    )
-    curves: bool = switch(True, "score over magnitude and over axis directions, for the viewer")
 
 
 @dataclass(slots=True)
@@ -163,10 +114,10 @@ def step(
     events = _joined(state)
     if not full and state.answer is not None and state.reason is None:
         state.answer = follow_spin(events, _uncertainty(state), settings, state.answer)
-        state.reason = _doubt(parameters, state.answer)
+        state.reason = doubt(parameters, state.answer)
         full = state.answer.contrast < LOST * state.followed_contrast
-        full = full or state.scanned_turns < RETURNED_TURNS <= _turns(state.answer)
-        full = full or (count >= MORE * state.tried and _misses_rhythm(rate, state.answer))
+        full = full or state.scanned_turns < RETURNED_TURNS <= state.answer.turns
+        full = full or (count >= MORE * state.tried and misses_rhythm(rate, state.answer))
         state.followed_contrast = max(state.followed_contrast, state.answer.contrast)
     if full:
         _estimate(parameters, state, events, settings, rate.period_spins_rps, normal_flow.estimate)
@@ -253,13 +204,8 @@ def _estimate(
         state.searched, scanning = len(events), True
         answer = estimate_spin(events, ball, settings, starts_rps=starts_rps, rhythms_rps=rhythms_rps)
     if scanning:
-        state.scanned_turns = _turns(answer)
-    state.answer, state.reason = answer, _doubt(parameters, answer)
-
-
-def _turns(answer: ContrastEstimate) -> float:
-    """Number of turns that an answer's events saw; 0 without one."""
-    return 0.0 if answer.spin_rps is None else answer.span_s * float(np.linalg.norm(answer.spin_rps))
+        state.scanned_turns = answer.turns
+    state.answer, state.reason = answer, doubt(parameters, answer)
 
 
 def _settled(parameters: ContrastParameters, state: ContrastState) -> bool:
@@ -279,45 +225,7 @@ def _settled(parameters: ContrastParameters, state: ContrastState) -> bool:
 def _convinces(parameters: ContrastParameters, answer: ContrastEstimate, normal_flow: SpinEstimate) -> bool:
     """Whether nothing speaks against an answer, neither its own events nor the normal flow."""
     estimate = SpinEstimate(METHOD, answer.spin_rps, answer.covariance_rps2, None)
-    return _doubt(parameters, answer) is None and _apart(estimate, normal_flow) <= parameters.flow_sigmas
-
-
-def _doubt(parameters: ContrastParameters, answer: ContrastEstimate) -> str | None:
-    """Reason why an answer is not to be trusted, in words; None if it is."""
-    if answer.spin_rps is None:
-        return f"the logo was not seen: {answer.events} logo events, {parameters.fewest_events} are needed"
-    if answer.contrast < parameters.min_gain:
-        return (
-            f"no pattern turns with the ball: the best spin gains {answer.contrast:.2f} an event over chance, "
-            f"{parameters.min_gain:g} are needed"
-        )
-    if answer.patch_rad < parameters.smallest_patch_rad:
-        return (
-            f"the logo is hardly seen: its events spread over {math.degrees(answer.patch_rad):.0f} degrees, "
-            f"{math.degrees(parameters.smallest_patch_rad):.0f} are needed"
-        )
-    estimate = SpinEstimate(METHOD, answer.spin_rps, answer.covariance_rps2, None)
-    magnitude, std, axis_std = estimate.magnitude_rps, estimate.magnitude_std_rps, estimate.axis_std_deg
-    if magnitude is None or std is None or axis_std is None:
-        return "the ball does not turn"
-    if answer.margins.size and answer.margins.min() < parameters.rival_sigmas:
-        rival = answer.rivals_rps[int(np.argmin(answer.margins))]
-        return f"another spin explains the logo about as well: {vector_words(answer.spin_rps)} or {vector_words(rival)}"
-    if std > max(parameters.magnitude_std_rps, 0.1 * magnitude):
-        return f"the magnitude is too uncertain: {magnitude:.1f} +- {std:.1f} rps"
-    if axis_std > parameters.axis_std_deg:
-        return f"the axis is too uncertain: +- {axis_std:.0f} degrees"
-    return None
-
-
-def _apart(one: SpinEstimate, other: SpinEstimate) -> float:
-    """By how many standard deviations two estimates differ; 0 where one says nothing."""
-    if one.vector_rps is None or one.covariance_rps2 is None:
-        return 0.0
-    if other.vector_rps is None or other.covariance_rps2 is None:
-        return 0.0
-    off = one.vector_rps - other.vector_rps
-    return math.sqrt(max(float(off @ np.linalg.solve(one.covariance_rps2 + other.covariance_rps2, off)), 0.0))
+    return doubt(parameters, answer) is None and sigmas_apart(estimate, normal_flow) <= parameters.flow_sigmas
 
 
 def _rarer_polarity(state: ContrastState) -> float:
@@ -326,47 +234,15 @@ def _rarer_polarity(state: ContrastState) -> float:
     return min(share, 1.0 - share)
 
 
-def _misses_rhythm(rate: RateResult, answer: ContrastEstimate) -> bool:
-    """Whether the logo's pattern comes back, but by none of its possible magnitudes with this answer's.
-
-    A magnitude too slow to come back is not one of them: none of 134 right answers on simulated shots is refused for
-    that, but one with half of the true spin about a wrong axis.
-    """
-    estimate = SpinEstimate(METHOD, answer.spin_rps, answer.covariance_rps2, None)
-    magnitude, std = estimate.magnitude_rps, estimate.magnitude_std_rps
-    if magnitude is None or std is None or rate.period_sigmas < FEWEST_SIGMAS:
-        return False
-    off_rps = np.abs(rate.period_spins_rps[rate.period_log_likelihoods > RHYTHM_EXCLUDED] - magnitude)
-    return bool(np.all(off_rps > RHYTHM_SIGMAS * math.hypot(std, RHYTHM_SHARE * magnitude, SIGHT_RPS)))
-
-
 def _result(
     parameters: ContrastParameters, state: ContrastState, count: int, full: bool, rate: RateResult, flow: SpinEstimate
 ) -> ContrastResult:
     answer = state.answer
     if answer is None or answer.spin_rps is None or answer.covariance_rps2 is None:
         return ContrastResult.nothing(SpinEstimate.refused(METHOD, state.reason or "no estimate yet", count))
-    estimate = SpinEstimate(METHOD, answer.spin_rps.copy(), answer.covariance_rps2.copy(), None, count)
-    may_be_outline = _turns(answer) < RETURNED_TURNS and _rarer_polarity(state) < LEAST_OF_POLARITY
-    misses_rhythm = _misses_rhythm(rate, answer) and not _settled(parameters, state)
-    turns_seen = answer.contrast >= parameters.min_gain and not may_be_outline and not misses_rhythm
-    if state.reason is not None:
-        # Where nothing turns, the normal flow has seen no pattern either, but noise.
-        estimate = SpinEstimate.refused(METHOD, state.reason, count, None if turns_seen else FLOW_METHOD)
-    elif may_be_outline:
-        reason = (
-            "nearly all logo events have one polarity and have not come back: a slow sensor's outline does that too"
-        )
-        estimate = SpinEstimate.refused(METHOD, reason, count)
-    elif (sigmas := _apart(estimate, flow)) > parameters.flow_sigmas and not _settled(parameters, state):
-        best, other = vector_words(answer.spin_rps), vector_words(flow.vector_rps)
-        reason = f"the normal flow says {other}, {sigmas:.0f} sigma from {best}"
-        estimate = SpinEstimate.refused(METHOD, reason, count, against=FLOW_METHOD)
-    elif misses_rhythm:
-        reason = (
-            f"the logo comes back with {rate.period_spins_rps[0]:.1f} rps, not with {vector_words(answer.spin_rps)}"
-        )
-        estimate = SpinEstimate.refused(METHOD, reason, count)
+    estimate, turns_seen = judged(
+        parameters, answer, state.reason, _settled(parameters, state), _rarer_polarity(state), rate, flow, count
+    )
     middle_us, half_us = answer.reference_s * 1e6, 0.5e6 * answer.span_s
     return ContrastResult(
         estimate=estimate,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import os
 import subprocess
 import sys
@@ -212,16 +213,55 @@ def test_the_stated_error_grows_with_what_is_not_known() -> None:
     assert spreads[2] > spreads[0]
 
 
-def test_a_drifting_track_makes_the_axis_less_certain_and_not_the_turn_about_the_line_of_sight() -> None:
-    events = dotted_ball(SPIN, duration_s=0.01, events=300)
+DRIFT_PX_S = 30.0
+
+
+def drift_covariance(events: SphereEvents, **rising: float) -> np.ndarray:
+    """What a drifting track adds to the stated covariance; rps^2."""
     steady = answer_of(events).covariance_rps2
+    drifting = answer_of(events, BallUncertainty(centre_std_px=0.2, radius_std_px=0.2, **rising)).covariance_rps2
+    return drifting - steady
+
+
+def test_a_drifting_track_looks_like_a_turn_in_the_image_across_the_spins_axis() -> None:
+    events = dotted_ball(SPIN, duration_s=0.01, events=300)
+    axis = answer_of(events).spin_rps
+    across = np.eye(3) - np.outer(axis, axis) / (axis @ axis)
     for rising in (
-        {"drift_std_px_s": 30.0, "track_std_px": 9.0},
-        {"drift_std_px_s": 9e9, "track_std_px": 30e-2 / 12**0.5},
+        {"drift_std_px_s": DRIFT_PX_S, "track_std_px": 9.0},
+        {"drift_std_px_s": 9e9, "track_std_px": DRIFT_PX_S / 100 / 12**0.5},  # events span 9.9 ms
     ):
-        drifting = answer_of(events, BallUncertainty(centre_std_px=0.2, radius_std_px=0.2, **rising)).covariance_rps2
-        expected = (30.0 / 17.0 / (2 * np.pi)) ** 2 * np.diag([1.0, 1.0, 0.0])
-        np.testing.assert_allclose(drifting - steady, expected, rtol=0.05, atol=1e-6)  # events span 9.9 ms
+        in_image = (DRIFT_PX_S / 17.0 / (2 * np.pi)) ** 2 * np.diag([1.0, 1.0, 0.0])
+        added = across @ drift_covariance(events, **rising) @ across
+        np.testing.assert_allclose(added, across @ in_image @ across, rtol=0.05, atol=1e-6)
+
+
+def test_a_drifting_track_changes_the_magnitude_as_much_as_is_stated() -> None:
+    events = dotted_ball(SPIN, duration_s=0.06, events=900)  # three turns: the axis takes none of it
+    slopes = offset_slopes(events.normals, events.facing, events.radius_px)
+    since_s = events.t_s - events.t_s.mean()
+    plain = answer_of(events).spin_rps
+    axis = plain / np.linalg.norm(plain)
+    changes = []
+    for shift in np.eye(2):
+        shifted = events.normals + DRIFT_PX_S * since_s * np.einsum("k,kin->in", shift, slopes[:2])
+        drifting = replace(events, normals=shifted / np.linalg.norm(shifted, axis=0))
+        changes.append(axis @ (answer_of(drifting).spin_rps - plain))
+    stated = axis @ drift_covariance(events, drift_std_px_s=DRIFT_PX_S, track_std_px=9.0) @ axis
+    assert math.sqrt(stated) == pytest.approx(math.hypot(*changes), rel=0.3)
+
+
+def test_a_logo_near_the_axis_tells_the_magnitude_less_well() -> None:
+    """The same errors on the ball are a turn that many times larger."""
+    events = dotted_ball(np.array([0.0, 0.0, 40.0]), duration_s=0.02, events=900)
+    from_axis = np.degrees(np.arccos(-events.normals[2]))
+    stds = []
+    for near in (from_axis < 25, from_axis > 45):
+        some = events.at(near)
+        model = answer_of(some)
+        assert model.spin_rps is not None
+        stds.append(math.sqrt(model.covariance_rps2[2, 2]))
+    assert stds[0] > 1.5 * stds[1]
 
 
 def test_margins_are_in_sigmas_of_independent_events() -> None:

@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinscope.pipeline.spin.contrast import stage
+from spinscope.pipeline.spin.contrast import stage, trust
 from spinscope.pipeline.spin.contrast.events import ContrastEstimate
+from spinscope.pipeline.spin.contrast.parameters import ContrastParameters
 from spinscope.pipeline.stages import rate
 from spinscope.pipeline.stages.rate import RateResult
 from tests.reference.contrast import dotted_ball
 
-PARAMETERS = stage.ContrastParameters(
+PARAMETERS = ContrastParameters(
     min_gain=0.25,
     smallest_patch_rad=0.18,
     rival_sigmas=1.2,
@@ -54,8 +55,8 @@ RIVALS = {"rivals_rps": np.array([[0.0, 30.0, 0.0], [0.0, 0.0, 9.0]])}
 def test_each_threshold_is_where_its_parameter_says(
     trusted: ContrastEstimate, doubted: ContrastEstimate, reason: str
 ) -> None:
-    assert stage._doubt(PARAMETERS, trusted) is None
-    assert re.search(reason, stage._doubt(PARAMETERS, doubted) or "")
+    assert trust.doubt(PARAMETERS, trusted) is None
+    assert re.search(reason, trust.doubt(PARAMETERS, doubted) or "")
 
 
 def rhythm(*spins_rps: float, sigmas: float = 9.0) -> RateResult:
@@ -81,7 +82,7 @@ def rhythm(*spins_rps: float, sigmas: float = 9.0) -> RateResult:
     ],
 )
 def test_an_answer_has_one_of_the_rhythms_magnitudes(told: RateResult, misses: bool) -> None:
-    assert stage._misses_rhythm(told, SURE) == misses
+    assert trust.misses_rhythm(told, SURE) == misses
 
 
 @pytest.mark.parametrize(("off", "share"), [(0, 0.0), (3, 0.03), (50, 0.5), (98, 0.02)])

@@ -14,6 +14,7 @@ from spinscope.pipeline.registry import trusted_method
 from spinscope.pipeline.results import MethodResult, SpinEstimate
 from spinscope.pipeline.session import Choices, Session
 from spinscope.pipeline.spin.contrast import stage as contrast
+from spinscope.pipeline.spin.contrast.parameters import ContrastParameters
 from spinscope.pipeline.spin.contrast.result import ContrastResult
 from spinscope.pipeline.stages.logo import LogoResult
 from tests.spinning_ball import CONTEXT, after_track, known_track, packets
@@ -26,7 +27,7 @@ def results(
 ) -> tuple[list[ContrastResult], np.ndarray]:
     """The results of the ticks with a ball in view, and the true spin in rps."""
     session = Session.open(samples / f"{name}.h5", Choices(fixed_ball=BALLS.get(name)))
-    parameters = contrast.ContrastParameters()
+    parameters = ContrastParameters()
     state = session.chain.start(session.parameters, contrast.STAGE)
     found = []
     for tick in session.ticks(("logo", "rate", "normal_flow"), forget=("surface",)):
@@ -114,7 +115,7 @@ def test_too_few_events_are_refused(samples: Path) -> None:
 
 def test_a_sure_normal_flow_that_says_otherwise_is_heard_until_the_logo_has_come_back_twice(samples: Path) -> None:
     session = Session.open(samples / "spinner_ball2_side.h5", Choices(fixed_ball=BALLS["spinner_ball2_side"]))
-    parameters = contrast.ContrastParameters()
+    parameters = ContrastParameters()
     state = session.chain.start(session.parameters, contrast.STAGE)
     other = SpinEstimate("normal_flow", np.array([0.0, 0.0, 70.0]), np.eye(3), None)
     ticks = list(session.ticks(forget=("surface",)))
@@ -136,7 +137,7 @@ def test_noise_on_a_ball_is_no_spin_for_any_trusted_method(seed: int) -> None:
     x, y = random.integers(628, 652, 3000), random.integers(348, 372, 3000)
     events = EventBatch.checked(t, x, y, random.random(3000) < 0.5, width_px=1280, height_px=720)
     ticks = [(packet, known_track(packet.end_us)) for packet in packets(events)]
-    parameters = contrast.ContrastParameters()
+    parameters = ContrastParameters()
     state = contrast.start(parameters, CONTEXT)
     for (packet, track), (logo, rhythm, _, spin) in zip(ticks, after_track(ticks), strict=True):
         assert track.ball is not None
