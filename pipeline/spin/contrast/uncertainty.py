@@ -14,9 +14,8 @@ from .search import LocalModel
 
 # What the model lacks (the logo's blurred edges look different from each side) leaves errors that more events do not
 # lessen, as parts of the kernel: of the axis, and of the place on the ball over the stretch's spread in time, which is
-# a larger turn the nearer the logo is to the axis. From the errors of two simulators' balls with exact tracks; the
-# axis' from those of 240 shots with Spinscope's own tracks (78 and 97 % within one and two sigma; 83 and 97 with 0.3).
-AXIS_FLOOR, TURN_FLOOR = 0.2, 0.036
+# a larger turn the nearer the logo is to the axis. From the errors of two simulators' balls with exact tracks.
+AXIS_FLOOR, TURN_FLOOR = 0.3, 0.036
 # Where the camera looks at the surface at less than this cosine (60 degrees, 2.2 px inside a 16.5 px ball's outline) a
 # blurred edge is that much farther off on the ball, and its axis is stated as less certain, at most by MOST_OBLIQUE.
 RIM_COSINE, MOST_OBLIQUE = 0.5, 5.0
