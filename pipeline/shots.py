@@ -15,7 +15,7 @@ from .chain import BallTick, Tick
 from .errors import ParameterError
 from .registry import distrust_reason, trusted_method
 from .results import SpinEstimate, Truth, spin_errors
-from .spin.combined import CombinedResult
+from .spin.combined.result import CombinedResult
 from .spin.trajectory.motion import FittedMotion
 from .stages.track_result import BallTrack, BeganBy, EndedBy, ShotEnd
 from .track_evidence import TrackEvidence

@@ -9,8 +9,8 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from spinscope.pipeline.registry import STAGES
-from spinscope.pipeline.spin import combined
-from spinscope.pipeline.spin.combined import CombinedResult, Witness
+from spinscope.pipeline.spin.combined.result import CombinedResult, Witness
+from spinscope.pipeline.spin.combined.stage import METHOD as COMBINED
 from spinscope.pipeline.stage import SpinMethod
 
 from . import entities as at
@@ -28,14 +28,14 @@ MAX_RPS, GRID_RPS = 150.0, 50.0
 SIGMAS = 2.0
 ELLIPSE_POINTS = 49
 # Every witness that there may be, in the order of the chain, the combined answer last; the truth below all.
-NAMES = ("rate", "normal_flow", "contrast", "trajectory", combined.METHOD)
+NAMES = ("rate", "normal_flow", "contrast", "trajectory", COMBINED)
 TRUTH = "truth"
 Strips = list[Floats]
 
 
 def witness_chunks(run: ViewedRun) -> list[Chunk]:
     """Ellipses and bars at every tick; empty where a witness tells nothing."""
-    results = run.results(combined.METHOD)
+    results = run.results(COMBINED)
     if not results:
         return []
     chunks = [*_frame()]
@@ -55,7 +55,7 @@ def witness_chunks(run: ViewedRun) -> list[Chunk]:
 def _said(result: CombinedResult, name: str) -> Witness | None:
     """Evidence of one witness by itself, or the combined answer; None where it says nothing."""
     estimate = result.estimate
-    if name != combined.METHOD:
+    if name != COMBINED:
         return next((one for one in result.witnesses if one.name == name), None)
     if estimate.vector_rps is None:
         return None

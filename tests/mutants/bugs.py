@@ -158,13 +158,13 @@ VALUES = [
         "tests/pipeline/test_track_evidence.py",
     ),
     Mutant(
-        "pipeline/spin/combined.py",
+        "pipeline/spin/combined/stage.py",
         "if odds < (parameters.odds if by_logo else parameters.rhythm_odds):",
         "if odds < 1.0:",
         "tests/pipeline/spin/test_combined.py",
     ),
     Mutant(
-        "pipeline/spin/combined.py",
+        "pipeline/spin/combined/stage.py",
         "apart @ apart > (NEAR * np.linalg.norm(alone.vector_rps)) ** 2",
         "apart @ apart > 0.0",
         "tests/pipeline/spin/test_combined.py",

@@ -10,8 +10,8 @@ import pytest
 
 from spinscope.pipeline.registry import Parameters, trusted_method
 from spinscope.pipeline.results import MethodResult, SpinEstimate
-from spinscope.pipeline.spin import combined
-from spinscope.pipeline.spin.combined import CombinedResult
+from spinscope.pipeline.spin.combined import stage as combined
+from spinscope.pipeline.spin.combined.result import CombinedResult
 from spinscope.pipeline.spin.contrast.result import ContrastResult
 from spinscope.pipeline.spin.trajectory.stage import TrajectoryResult
 from spinscope.pipeline.stages import rate

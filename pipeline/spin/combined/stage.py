@@ -1,0 +1,218 @@
+"""Combined answer: the most likely of the candidates by all witnesses together, and whether it is to be trusted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...kernels.arrays import Floats, Integers
+from ...parameters import ParameterGroup, tunable
+from ...results import MethodResult, SpinEstimate
+from ...spin_terms import vector_words
+from ...stage import Context, SpinMethod
+from ...stages.rate import RateResult
+from ..contrast.result import ContrastResult
+from ..trajectory.stage import TrajectoryResult
+from .candidates import by_pattern, by_rhythm
+from .likelihoods import BLUNDER, by_flight, by_flow, by_rate, fallible, log_mean, rhythms_of
+from .result import CombinedResult, Witness
+
+METHOD = "combined"
+
+# A spin less likely than this is excluded by the flight (3 sigma).
+EXCLUDED = -4.5
+# Candidates this near to each other, as a part of the spin, are one spin.
+NEAR = 0.1
+LABELS = {"rate": "the rhythm", "normal_flow": "the normal flow", "contrast": "the pattern", "trajectory": "the flight"}
+# A witness that makes one spin three times as likely as the next speaks for it.
+SPEAKS = math.log(3.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CombinedParameters(ParameterGroup):
+    """Limits of the combined answer."""
+
+    odds: float = tunable(
+        100.0, 1.0, 1e6, 1.0, "", "how many times more likely the spin must be than all others together"
+    )
+    rhythm_odds: float = tunable(20.0, 1.0, 1e6, 1.0, "", "the same where only rhythm and flight speak")
+    axis_std_deg: float = tunable(12.0, 0.1, 180.0, 0.5, "deg", "largest stated error of an axis by the logo (1 sigma)")
+    flight_axis_std_deg: float = tunable(
+        20.0, 0.1, 180.0, 0.5, "deg", "largest stated error of an axis by the flight alone (1 sigma)"
+    )
+    magnitude_std_rps: float = tunable(
+        3.0, 0.01, 1000.0, 0.1, "rps", "largest stated error of the magnitude (1 sigma); a tenth of it if that is more"
+    )
+
+
+def start(parameters: CombinedParameters, context: Context) -> Context:
+    """The state is the context alone: the witnesses remember."""
+    return context
+
+
+def absent(parameters: CombinedParameters, reason: str) -> CombinedResult:
+    """Refusal, because there is no ball."""
+    return CombinedResult(SpinEstimate.refused(METHOD, reason))
+
+
+def step(
+    parameters: CombinedParameters,
+    state: Context,
+    rate: RateResult,
+    normal_flow: MethodResult,
+    contrast: ContrastResult,
+    trajectory: TrajectoryResult,
+) -> CombinedResult:
+    """The estimate that all witnesses together give at the end of this tick."""
+    by_logo = contrast.turns_seen
+    candidates = by_pattern(contrast) if by_logo else by_rhythm(rate, trajectory, state["trajectory.gyro_std_deg"])
+    witnesses = _witnesses(rate, normal_flow.estimate, contrast, trajectory)
+    if not candidates:
+        reason = contrast.estimate.reason or "the logo is not seen"
+        return CombinedResult(SpinEstimate.refused(METHOD, reason), witnesses)
+    spins_rps = np.stack([candidate.spins_rps for candidate in candidates])
+    bend = by_flight(trajectory, spins_rps)
+    logs = {"trajectory": bend}
+    if by_logo:
+        logs = {"trajectory": fallible(bend, BLUNDER["trajectory"])}
+        logs |= {"normal_flow": by_flow(normal_flow.estimate, spins_rps), "rate": by_rate(rate, spins_rps)}
+    own = np.array([candidate.log_likelihood for candidate in candidates])
+    drawn = np.stack([candidate.log_weights for candidate in candidates])
+    evidence = own + log_mean(sum(logs.values(), drawn))
+    best = int(np.argmax(evidence))
+    # Flow and rhythm are of the same events as the pattern: they choose among its spins, but make none more certain.
+    # Neither does a flight that excludes them all.
+    weights = drawn + np.where(bend.max(axis=1) > EXCLUDED, bend.T, 0.0).T
+    estimate, rivals = _estimate(parameters, spins_rps, weights, evidence, best, by_logo, contrast.estimate.events)
+    if not by_logo and log_mean(bend)[0] <= EXCLUDED:
+        # The rhythm's spin is partly along the flight, or comes back more than once a turn.
+        reason = f"no spin of {np.linalg.norm(spins_rps[0][0]):.0f} rps across the flight bends it like this one"
+        estimate = SpinEstimate.refused(METHOD, reason, contrast.estimate.events)
+    by_witness = {name: log_mean(values) for name, values in logs.items()}
+    by_witness["contrast" if by_logo else "rate"] = own
+    rival = max(rivals, key=lambda k: evidence[k], default=best)
+    witnesses = tuple(
+        replace(one, log_odds=float(by_witness[one.name][best] - by_witness[one.name][rival]))
+        for one in witnesses
+        if one.name in by_witness
+    )
+    return CombinedResult(estimate, witnesses, _summary(by_logo, witnesses) if estimate.status == "ok" else "")
+
+
+def _estimate(
+    parameters: CombinedParameters,
+    spins_rps: Floats,
+    weights: Floats,
+    evidence: Floats,
+    best: int,
+    by_logo: bool,
+    events: int,
+) -> tuple[SpinEstimate, list[int]]:
+    """The most likely spin with its covariance, or a refusal; and the candidates that are other spins."""
+    shares = np.exp(weights - np.max(weights, axis=1)[:, None])
+    shares /= shares.sum(axis=1)[:, None]
+    means = np.einsum("ks,ksi->ki", shares, spins_rps)
+    apart = np.linalg.norm(means - means[best], axis=1)
+    others = np.flatnonzero(apart > NEAR * np.linalg.norm(means[best]))
+    near = np.flatnonzero(apart <= NEAR * np.linalg.norm(means[best]))
+    probabilities = np.exp(evidence - np.logaddexp.reduce(evidence))
+    share = probabilities[near, None] * shares[near] / probabilities[near].sum()
+    mean = np.einsum("ks,ksi->i", share, spins_rps[near])
+    axis, magnitudes = mean / np.linalg.norm(mean), np.linalg.norm(spins_rps[near], axis=2)
+    magnitude = float(np.sum(share * magnitudes))  # scattered axes have a mean that is shorter than they are
+    mean = magnitude * axis
+    across = (spins_rps[near] - mean) @ (np.eye(3) - np.outer(axis, axis))
+    covariance = np.einsum("ks,ksi,ksj->ij", share, across, across)
+    covariance += float(np.sum(share * (magnitudes - magnitude) ** 2)) * np.outer(axis, axis)
+    # Few samples that count make the spread look too small.
+    covariance *= 1.0 + 3.0 * float(np.sum(share**2))
+    estimate = SpinEstimate(METHOD, mean, covariance, None, events)
+    odds = probabilities[near].sum() / max(probabilities[others].sum(), 1e-300)
+    reason = _doubt(parameters, estimate, float(odds), means, evidence, others, by_logo)
+    return (SpinEstimate.refused(METHOD, reason, events) if reason else estimate), others.tolist()
+
+
+def _doubt(
+    parameters: CombinedParameters,
+    estimate: SpinEstimate,
+    odds: float,
+    means: Floats,
+    evidence: Floats,
+    others: Integers,
+    by_logo: bool,
+) -> str | None:
+    """Reason why the combined spin is not to be trusted; None if it is."""
+    magnitude, std, axis_std = estimate.magnitude_rps, estimate.magnitude_std_rps, estimate.axis_std_deg
+    if magnitude is None or std is None or axis_std is None:
+        return "the ball does not turn"
+    if odds < (parameters.odds if by_logo else parameters.rhythm_odds):
+        rival = means[others[np.argmax(evidence[others])]]
+        return (
+            f"all witnesses together leave two spins open: {vector_words(estimate.vector_rps)} is only "
+            f"{odds:.0f} times as likely as {vector_words(rival)}"
+        )
+    if std > max(parameters.magnitude_std_rps, 0.1 * magnitude):
+        return f"the magnitude is too uncertain: {magnitude:.1f} +- {std:.1f} rps"
+    if axis_std > (parameters.axis_std_deg if by_logo else parameters.flight_axis_std_deg):
+        return f"the axis is too uncertain: +- {axis_std:.0f} degrees"
+    return None
+
+
+def _witnesses(
+    rate: RateResult, flow: SpinEstimate, contrast: ContrastResult, trajectory: TrajectoryResult
+) -> tuple[Witness, ...]:
+    """Evidence of each witness by itself, of those that have any."""
+    said = []
+    for magnitude, std, _ in rhythms_of(rate)[:1]:
+        said.append(Witness("rate", None, None, float(magnitude), std))
+    spins = {"normal_flow": (flow.vector_rps, flow.covariance_rps2)}
+    if not math.isnan(contrast.best_rps[0]):
+        spins["contrast"] = contrast.best_rps, contrast.covariance_rps2
+    spins["trajectory"] = trajectory.estimate.vector_rps, trajectory.estimate.covariance_rps2
+    for name, (spin_rps, covariance_rps2) in spins.items():
+        if spin_rps is not None:
+            one = SpinEstimate(name, spin_rps, covariance_rps2, None)
+            said.append(Witness(name, spin_rps, covariance_rps2, one.magnitude_rps, one.magnitude_std_rps))
+    return tuple(said)
+
+
+def _summary(by_logo: bool, witnesses: tuple[Witness, ...]) -> str:
+    """Contributions of the witnesses, in words."""
+    if not by_logo:
+        return "magnitude from the rhythm of the logo's visits, axis from the flight"
+    words = ["magnitude and axis from the logo's pattern"]
+    deciding = [LABELS[one.name] for one in witnesses if one.name != "contrast" and one.log_odds > SPEAKS]
+    against = [LABELS[one.name] for one in witnesses if one.log_odds < -SPEAKS]
+    if deciding:
+        words.append(f"chosen among several spins by {' and '.join(deciding)}")
+    if against:
+        words.append(f"against {' and '.join(against)}")
+    return "; ".join(words)
+
+
+def is_trusted(estimates: Mapping[str, SpinEstimate]) -> bool:
+    """Whether the witnesses answer together where the pattern alone is not enough, or tells another spin."""
+    estimate, alone = estimates[METHOD], estimates["contrast"]
+    if estimate.vector_rps is None or alone.vector_rps is None:
+        return estimate.vector_rps is not None
+    apart = estimate.vector_rps - alone.vector_rps
+    return bool(apart @ apart > (NEAR * np.linalg.norm(alone.vector_rps)) ** 2)
+
+
+STAGE = SpinMethod(
+    name=METHOD,
+    label="Combined",
+    help="One spin from the logo's pattern and motion, the rhythm of its visits and the bend of the flight.",
+    inputs=("rate", "normal_flow", "contrast", "trajectory"),
+    parameters=CombinedParameters,
+    reads=("trajectory.gyro_std_deg",),
+    start=start,
+    step=step,
+    absent=absent,
+    is_slow=True,
+    colour=(255, 255, 255),
+    is_trusted=is_trusted,
+)
