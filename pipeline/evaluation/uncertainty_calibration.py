@@ -10,10 +10,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..results import SpinEstimate
 from .tables import Cell, ResultTable, Row, share, where
 
 GROSS_RPS, GROSS_DEG = 10.0, 20.0  # an error beyond one of these is gross
 RIGHT_SHARE, RIGHT_DEG = 0.1, 20.0  # largest errors of an answer that counts as right
+# A flight alone tells the magnitude to a share only: its answer is right within so many of its stated errors, if the
+# magnitude is stated to a third and the axis to RIGHT_DEG.
+STATED_SIGMAS, STATED_SHARE = 2.0, 1.0 / 3.0
+FLIGHT_NOTE = (
+    f"Where the program answers by the flight alone: within {STATED_SIGMAS:g} of the stated errors, which are a third "
+    f"of the magnitude and {RIGHT_DEG:g} degrees at most."
+)
 RIGHT_NOTE = f"Right: within {RIGHT_SHARE:.0%} of the magnitude and {RIGHT_DEG:g} degrees of the axis."
 ERRORS = ("magnitude_error_rps", "axis_error_deg")  # columns of the rows
 STATED = ("magnitude_std_rps", "axis_std_deg")
@@ -36,6 +44,15 @@ def is_right(row: Row) -> bool:
     if not (isinstance(magnitude, float) and isinstance(axis, float) and isinstance(rps, float)):
         return False
     return magnitude <= RIGHT_SHARE * rps and axis <= RIGHT_DEG
+
+
+def is_within_stated(estimate: SpinEstimate, magnitude_error_rps: float, axis_error_deg: float) -> bool:
+    """Whether the stated errors of an estimate are small enough to be of use, and hold."""
+    magnitude, std, axis_std = estimate.magnitude_rps, estimate.magnitude_std_rps, estimate.axis_std_deg
+    if magnitude is None or std is None or axis_std is None:
+        return False
+    is_narrow = std <= STATED_SHARE * magnitude and axis_std <= RIGHT_DEG
+    return is_narrow and magnitude_error_rps <= STATED_SIGMAS * std and axis_error_deg <= STATED_SIGMAS * axis_std
 
 
 def calibration_table(groups: Sequence[tuple[str, Sequence[Row]]], methods: Sequence[str]) -> ResultTable:

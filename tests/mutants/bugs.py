@@ -159,7 +159,7 @@ VALUES = [
     ),
     Mutant(
         "pipeline/spin/combined/stage.py",
-        "if odds < (parameters.odds if by_logo else parameters.rhythm_odds):",
+        "if odds < parameters.odds:",
         "if odds < 1.0:",
         "tests/pipeline/spin/test_combined.py",
     ),

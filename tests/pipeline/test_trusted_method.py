@@ -96,7 +96,10 @@ def test_the_trajectory_is_trusted_only_where_no_logo_tells_the_spin() -> None:
     assert trusted_method({**sure, "normal_flow": estimate("normal_flow", 1.0)}) == "normal_flow"
     assert trusted_method({**sure, "normal_flow": estimate("normal_flow", 6.0)}) == "trajectory"
     assert trusted_method({**sure, "contrast": estimate("contrast", None)}) == "trajectory"
-    assert trusted_method({"trajectory": estimate("trajectory", 8.0)}) is None, "50 +- 8 rps is too wide"
+    assert trusted_method({"trajectory": estimate("trajectory", 13.0)}) is None, "an axis of 21 degrees is too wide"
+    for std_rps, trusted in ((16.0, "trajectory"), (17.0, None)):
+        wide = SpinEstimate("trajectory", np.array([50.0, 0.0, 0.0]), np.diag([std_rps**2, 1.0, 1.0]), None)
+        assert trusted_method({"trajectory": wide}) == trusted, "a third of 50 rps"
 
 
 def test_where_none_is_trusted_the_reason_is_the_tracks_or_the_methods_own() -> None:

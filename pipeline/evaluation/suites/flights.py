@@ -26,6 +26,7 @@ from ..tables import Cell, ResultTable, Row, distinct, share, summary, where
 from ..tasks import Task, TaskContext
 from ..uncertainty_calibration import (
     ERRORS,
+    FLIGHT_NOTE,
     GROSS_DEG,
     GROSS_RPS,
     RIGHT_NOTE,
@@ -146,7 +147,7 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
 
 COLUMNS = ("n", "answered", "right", "wrong", "gross", "magnitude error [rps]", "axis error [deg]")
 NOTE = (
-    f"{RIGHT_NOTE} Shares of all flights of the class. Gross: share of the answers that are more than "
+    f"{RIGHT_NOTE} {FLIGHT_NOTE} Shares of all flights of the class. Gross: share of the answers that are more than "
     f"{GROSS_RPS:g} rps or {GROSS_DEG:g} degrees off."
 )
 

@@ -18,7 +18,7 @@ from ..rendering import render
 from ..segment_matching import INVENTED, MISSED, MIXED, OUTCOMES, RIGHT, WRONG, segment_rows
 from ..tables import Cell, ResultTable, Row, distinct, share, summary, where
 from ..tasks import Task, TaskContext
-from ..uncertainty_calibration import ERRORS, RIGHT_NOTE, calibration_table, refusals
+from ..uncertainty_calibration import ERRORS, FLIGHT_NOTE, RIGHT_NOTE, calibration_table, refusals
 
 LABEL = "Real scenes"
 HELP = "Every flight in scenes like a lab's or a club's: backgrounds, clutter, bounces, several balls, sensors."
@@ -100,9 +100,9 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
 
 
 NOTE = (
-    f"Free flights of at least 20 ms in the image. {RIGHT_NOTE} Two spins for one: an answer from events on both sides "
-    "of a contact, or of two balls. Shares of all flights; the time to find counts from where the ball's centre comes "
-    "into the image."
+    f"Free flights of at least 20 ms in the image. {RIGHT_NOTE} {FLIGHT_NOTE} Two spins for one: "
+    "an answer from events on both sides of a contact, or of two balls. Shares of all flights; the time to find "
+    "counts from where the ball's centre comes into the image."
 )
 
 

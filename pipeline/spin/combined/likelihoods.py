@@ -1,4 +1,4 @@
-"""Likelihoods of spins by the witnesses beside the logo's pattern: normal flow, rhythm and flight."""
+"""Likelihoods of spins by the witnesses beside the logo's pattern: normal flow, rhythm, flight and sightings."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from ...kernels.arrays import Floats
 from ...results import SpinEstimate
 from ...stages.rate import RateResult
 from ..trajectory.stage import TrajectoryResult
+from .sightings import Sightings
 
 # Probability that a witness is wrong altogether: normal flow that saw the outline, a period of something else than the
-# logo's visits, a flight of another ball or other air.
-BLUNDER = {"normal_flow": 0.2, "rate": 0.1, "trajectory": 0.03}
+# logo's visits, a flight of another ball or other air, sightings of a seam or of dirt.
+BLUNDER = {"normal_flow": 0.2, "rate": 0.1, "trajectory": 0.03, "logo": 0.1}
 # The line of sight's own turn while the ball passes (0.7 rps at 9 m/s and 2 m), and the share to which the visits'
 # rhythm follows the spin: both are in the difference between the rhythm and the spin.
 SIGHT_RPS, RHYTHM_SHARE = 0.7, 0.01
@@ -58,6 +59,12 @@ def by_flight(trajectory: TrajectoryResult, spins_rps: Floats) -> Floats:
     highest = float(trajectory.log_likelihood(across.magnitude_rps * across.axis)[0])
     relative: Floats = logs - max(highest, float(logs.max()))
     return relative
+
+
+def by_sightings(sightings: Sightings, spins_rps: Floats) -> Floats:
+    """(candidates, samples) logarithmic likelihood of when the logo was seen and when not."""
+    logs = sightings.log_likelihood(spins_rps.reshape(-1, 3)).reshape(spins_rps.shape[:2])
+    return fallible(logs - logs.max(), BLUNDER["logo"])
 
 
 def fallible(logs: Floats, blunder: float) -> Floats:

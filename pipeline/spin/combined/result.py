@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from ...kernels.arrays import Floats
 from ...results import ReadOnlyArrays, SpinEstimate
+
+Basis = Literal["pattern", "rhythm", "flight"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,8 +60,12 @@ class CombinedResult:
         Those that say something, in the order of the chain.
     summary : str
         Who told what, in words; empty without an answer.
+    basis : str, optional
+        What names the spins to choose from: the logo's pattern, its rhythm with the flight's axis, or the flight alone;
+        None where nothing does.
     """
 
     estimate: SpinEstimate
     witnesses: tuple[Witness, ...] = ()
     summary: str = ""
+    basis: Basis | None = None

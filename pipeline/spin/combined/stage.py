@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ...kernels.arrays import Floats, Integers
 from ...parameters import ParameterGroup, tunable
-from ...results import MethodResult, SpinEstimate
+from ...results import MethodResult, Packet, SpinEstimate
 from ...spin_terms import vector_words
 from ...stage import Context, SpinMethod
+from ...stages.logo import LogoResult
 from ...stages.rate import RateResult
+from ...stages.track_result import BallTrack
 from ..contrast.result import ContrastResult
-from ..trajectory.stage import TrajectoryResult
-from .candidates import by_pattern, by_rhythm
-from .likelihoods import BLUNDER, by_flight, by_flow, by_rate, fallible, log_mean, rhythms_of
-from .result import CombinedResult, Witness
+from ..trajectory.stage import TRUSTED_AXIS_DEG, TRUSTED_SHARE, TrajectoryResult
+from .candidates import Candidate, flight_candidates, pattern_candidates, rhythm_candidates
+from .likelihoods import BLUNDER, by_flight, by_flow, by_rate, by_sightings, fallible, log_mean, rhythms_of
+from .result import Basis, CombinedResult, Witness
+from .sightings import Sightings
 
 METHOD = "combined"
 
@@ -26,7 +29,20 @@ METHOD = "combined"
 EXCLUDED = -4.5
 # Candidates this near to each other, as a part of the spin, are one spin.
 NEAR = 0.1
-LABELS = {"rate": "the rhythm", "normal_flow": "the normal flow", "contrast": "the pattern", "trajectory": "the flight"}
+LABELS = {
+    "logo": "the times at which the logo was seen",
+    "rate": "the rhythm",
+    "normal_flow": "the normal flow",
+    "contrast": "the pattern",
+    "trajectory": "the flight",
+}
+# The witness that names the spins to choose from, and what it contributes.
+NAMED_BY: dict[Basis, str] = {"pattern": "contrast", "rhythm": "rate", "flight": "trajectory"}
+CONTRIBUTIONS: dict[Basis, str] = {
+    "pattern": "magnitude and axis from the logo's pattern",
+    "rhythm": "magnitude from the rhythm of the logo's visits, axis from the flight",
+    "flight": "magnitude and axis from the bend of the flight",
+}
 # A witness that makes one spin three times as likely as the next speaks for it.
 SPEAKS = math.log(3.0)
 
@@ -36,21 +52,32 @@ class CombinedParameters(ParameterGroup):
     """Limits of the combined answer."""
 
     odds: float = tunable(
-        100.0, 1.0, 1e6, 1.0, "", "how many times more likely the spin must be than all others together"
+        20.0, 1.0, 1e6, 1.0, "", "how many times more likely the spin must be than all others together"
     )
-    rhythm_odds: float = tunable(20.0, 1.0, 1e6, 1.0, "", "the same where only rhythm and flight speak")
     axis_std_deg: float = tunable(12.0, 0.1, 180.0, 0.5, "deg", "largest stated error of an axis by the logo (1 sigma)")
     flight_axis_std_deg: float = tunable(
-        20.0, 0.1, 180.0, 0.5, "deg", "largest stated error of an axis by the flight alone (1 sigma)"
+        TRUSTED_AXIS_DEG, 0.1, 180.0, 0.5, "deg", "largest stated error of an axis by the flight alone (1 sigma)"
+    )
+    # Lift is known to 12 % and saturates: a flight tells the magnitude of most shots no better.
+    flight_share: float = tunable(
+        TRUSTED_SHARE, 0.01, 1.0, 0.01, "", "largest stated error (1 sigma) of a magnitude by the flight alone, over it"
     )
     magnitude_std_rps: float = tunable(
         3.0, 0.01, 1000.0, 0.1, "rps", "largest stated error of the magnitude (1 sigma); a tenth of it if that is more"
     )
 
 
-def start(parameters: CombinedParameters, context: Context) -> Context:
-    """The state is the context alone: the witnesses remember."""
-    return context
+@dataclass(slots=True)
+class CombinedState:
+    """When the logo was seen in the shot so far; the other witnesses remember by themselves."""
+
+    context: Context
+    sightings: Sightings = field(default_factory=Sightings)
+
+
+def start(parameters: CombinedParameters, context: Context) -> CombinedState:
+    """No sightings yet."""
+    return CombinedState(context)
 
 
 def absent(parameters: CombinedParameters, reason: str) -> CombinedResult:
@@ -60,46 +87,70 @@ def absent(parameters: CombinedParameters, reason: str) -> CombinedResult:
 
 def step(
     parameters: CombinedParameters,
-    state: Context,
+    state: CombinedState,
+    packet: Packet,
+    ball: BallTrack,
+    logo: LogoResult,
     rate: RateResult,
     normal_flow: MethodResult,
     contrast: ContrastResult,
     trajectory: TrajectoryResult,
 ) -> CombinedResult:
     """The estimate that all witnesses together give at the end of this tick."""
-    by_logo = contrast.turns_seen
-    candidates = by_pattern(contrast) if by_logo else by_rhythm(rate, trajectory, state["trajectory.gyro_std_deg"])
+    state.sightings.add(packet, ball, logo, state.context.camera, state.context["contrast.window_us"])
+    basis, candidates = _candidates(state.context, rate, contrast, trajectory)
     witnesses = _witnesses(rate, normal_flow.estimate, contrast, trajectory)
-    if not candidates:
+    if basis is None:
         reason = contrast.estimate.reason or "the logo is not seen"
         return CombinedResult(SpinEstimate.refused(METHOD, reason), witnesses)
     spins_rps = np.stack([candidate.spins_rps for candidate in candidates])
     bend = by_flight(trajectory, spins_rps)
     logs = {"trajectory": bend}
-    if by_logo:
+    if basis == "pattern":
         logs = {"trajectory": fallible(bend, BLUNDER["trajectory"])}
         logs |= {"normal_flow": by_flow(normal_flow.estimate, spins_rps), "rate": by_rate(rate, spins_rps)}
     own = np.array([candidate.log_likelihood for candidate in candidates])
     drawn = np.stack([candidate.log_weights for candidate in candidates])
+    # Flow, rhythm and sightings are of the same events as the pattern: they choose among its spins, but make none more
+    # certain. Neither does a flight that excludes them all.
+    weights = drawn + np.where(bend.max(axis=1) > EXCLUDED, bend.T, 0.0).T
+    if basis == "flight":
+        logs["logo"] = by_sightings(state.sightings, spins_rps)
+        weights += logs["logo"]
+    else:
+        logs["logo"] = by_sightings(state.sightings, spins_rps.mean(axis=1, keepdims=True))
     evidence = own + log_mean(sum(logs.values(), drawn))
     best = int(np.argmax(evidence))
-    # Flow and rhythm are of the same events as the pattern: they choose among its spins, but make none more certain.
-    # Neither does a flight that excludes them all.
-    weights = drawn + np.where(bend.max(axis=1) > EXCLUDED, bend.T, 0.0).T
-    estimate, rivals = _estimate(parameters, spins_rps, weights, evidence, best, by_logo, contrast.estimate.events)
-    if not by_logo and log_mean(bend)[0] <= EXCLUDED:
+    estimate, rivals = _estimate(parameters, spins_rps, weights, evidence, best, basis, contrast.estimate.events)
+    if basis == "rhythm" and log_mean(bend)[0] <= EXCLUDED:
         # The rhythm's spin is partly along the flight, or comes back more than once a turn.
         reason = f"no spin of {np.linalg.norm(spins_rps[0][0]):.0f} rps across the flight bends it like this one"
         estimate = SpinEstimate.refused(METHOD, reason, contrast.estimate.events)
     by_witness = {name: log_mean(values) for name, values in logs.items()}
-    by_witness["contrast" if by_logo else "rate"] = own
+    if basis != "flight":
+        by_witness[NAMED_BY[basis]] = own
     rival = max(rivals, key=lambda k: evidence[k], default=best)
     witnesses = tuple(
         replace(one, log_odds=float(by_witness[one.name][best] - by_witness[one.name][rival]))
-        for one in witnesses
+        for one in (*witnesses, Witness("logo", None, None, None, None))
         if one.name in by_witness
     )
-    return CombinedResult(estimate, witnesses, _summary(by_logo, witnesses) if estimate.status == "ok" else "")
+    summary = _summary(basis, witnesses) if estimate.status == "ok" else ""
+    return CombinedResult(estimate, witnesses, summary, basis)
+
+
+def _candidates(
+    context: Context, rate: RateResult, contrast: ContrastResult, trajectory: TrajectoryResult
+) -> tuple[Basis | None, list[Candidate]]:
+    """The spins to choose from by the most precise witness that names any, and which it is."""
+    gyro_std_deg = context["trajectory.gyro_std_deg"]
+    if contrast.turns_seen:
+        return "pattern", pattern_candidates(contrast)
+    if candidates := rhythm_candidates(rate, trajectory, gyro_std_deg):
+        return "rhythm", candidates
+    if candidates := flight_candidates(trajectory, gyro_std_deg, context["spin.max_spin_rps"]):
+        return "flight", candidates
+    return None, []
 
 
 def _estimate(
@@ -108,7 +159,7 @@ def _estimate(
     weights: Floats,
     evidence: Floats,
     best: int,
-    by_logo: bool,
+    basis: Basis,
     events: int,
 ) -> tuple[SpinEstimate, list[int]]:
     """The most likely spin with its covariance, or a refusal; and the candidates that are other spins."""
@@ -122,16 +173,19 @@ def _estimate(
     share = probabilities[near, None] * shares[near] / probabilities[near].sum()
     mean = np.einsum("ks,ksi->i", share, spins_rps[near])
     axis, magnitudes = mean / np.linalg.norm(mean), np.linalg.norm(spins_rps[near], axis=2)
-    magnitude = float(np.sum(share * magnitudes))  # scattered axes have a mean that is shorter than they are
+    # Scattered axes have a mean that is shorter than they are; a magnitude known to a share has no symmetric error.
+    logs = np.log(magnitudes)
+    log_magnitude = float(np.sum(share * logs))
+    magnitude = math.exp(log_magnitude)
     mean = magnitude * axis
     across = (spins_rps[near] - mean) @ (np.eye(3) - np.outer(axis, axis))
     covariance = np.einsum("ks,ksi,ksj->ij", share, across, across)
-    covariance += float(np.sum(share * (magnitudes - magnitude) ** 2)) * np.outer(axis, axis)
+    covariance += float(np.sum(share * (logs - log_magnitude) ** 2)) * np.outer(mean, mean)
     # Few samples that count make the spread look too small.
     covariance *= 1.0 + 3.0 * float(np.sum(share**2))
     estimate = SpinEstimate(METHOD, mean, covariance, None, events)
     odds = probabilities[near].sum() / max(probabilities[others].sum(), 1e-300)
-    reason = _doubt(parameters, estimate, float(odds), means, evidence, others, by_logo)
+    reason = _doubt(parameters, estimate, float(odds), means, evidence, others, basis)
     return (SpinEstimate.refused(METHOD, reason, events) if reason else estimate), others.tolist()
 
 
@@ -142,21 +196,22 @@ def _doubt(
     means: Floats,
     evidence: Floats,
     others: Integers,
-    by_logo: bool,
+    basis: Basis,
 ) -> str | None:
     """Reason why the combined spin is not to be trusted; None if it is."""
     magnitude, std, axis_std = estimate.magnitude_rps, estimate.magnitude_std_rps, estimate.axis_std_deg
     if magnitude is None or std is None or axis_std is None:
         return "the ball does not turn"
-    if odds < (parameters.odds if by_logo else parameters.rhythm_odds):
+    if odds < parameters.odds:
         rival = means[others[np.argmax(evidence[others])]]
         return (
             f"all witnesses together leave two spins open: {vector_words(estimate.vector_rps)} is only "
             f"{odds:.0f} times as likely as {vector_words(rival)}"
         )
-    if std > max(parameters.magnitude_std_rps, 0.1 * magnitude):
+    widest_rps = max(parameters.magnitude_std_rps, 0.1 * magnitude)
+    if std > (parameters.flight_share * magnitude if basis == "flight" else widest_rps):
         return f"the magnitude is too uncertain: {magnitude:.1f} +- {std:.1f} rps"
-    if axis_std > (parameters.axis_std_deg if by_logo else parameters.flight_axis_std_deg):
+    if axis_std > (parameters.axis_std_deg if basis == "pattern" else parameters.flight_axis_std_deg):
         return f"the axis is too uncertain: +- {axis_std:.0f} degrees"
     return None
 
@@ -179,11 +234,11 @@ def _witnesses(
     return tuple(said)
 
 
-def _summary(by_logo: bool, witnesses: tuple[Witness, ...]) -> str:
+def _summary(basis: Basis, witnesses: tuple[Witness, ...]) -> str:
     """Contributions of the witnesses, in words."""
-    if not by_logo:
-        return "magnitude from the rhythm of the logo's visits, axis from the flight"
-    words = ["magnitude and axis from the logo's pattern"]
+    words = [CONTRIBUTIONS[basis]]
+    if basis != "pattern":
+        return words[0]
     deciding = [LABELS[one.name] for one in witnesses if one.name != "contrast" and one.log_odds > SPEAKS]
     against = [LABELS[one.name] for one in witnesses if one.log_odds < -SPEAKS]
     if deciding:
@@ -206,9 +261,9 @@ STAGE = SpinMethod(
     name=METHOD,
     label="Combined",
     help="One spin from the logo's pattern and motion, the rhythm of its visits and the bend of the flight.",
-    inputs=("rate", "normal_flow", "contrast", "trajectory"),
+    inputs=("packet", "ball", "logo", "rate", "normal_flow", "contrast", "trajectory"),
     parameters=CombinedParameters,
-    reads=("trajectory.gyro_std_deg",),
+    reads=("spin.max_spin_rps", "trajectory.gyro_std_deg", "contrast.window_us"),
     start=start,
     step=step,
     absent=absent,

@@ -263,8 +263,9 @@ def _result(
 
 
 def is_trusted(estimates: Mapping[str, SpinEstimate]) -> bool:
-    """Whether contrast answers: it has trust rules of its own."""
-    return estimates[METHOD].status == "ok"
+    """Whether contrast answers, and no other witness leaves another spin open: one limit of the odds for both."""
+    combined = estimates.get("combined")
+    return estimates[METHOD].status == "ok" and (combined is None or combined.status == "ok")
 
 
 STAGE = SpinMethod(

@@ -133,7 +133,7 @@ class SpinAcross(ReadOnlyArrays):
     along : (3,) float64
         Unit vector of the flight.
     magnitude_rps, magnitude_std_rps : float
-        Mean and standard deviation.
+        Geometric mean and standard deviation: the flight tells the magnitude to a share.
     axis_std_rad : float
         Of the direction, within the plane across the flight.
     least_rps, most_rps : float
@@ -177,12 +177,14 @@ def spin_across(likelihood: FlightLikelihood, max_spin_rps: float) -> SpinAcross
     of_angle, of_magnitude = weights.sum(axis=1), weights.sum(axis=0)
     cosine, sine = float(of_angle @ np.cos(angles)), float(of_angle @ np.sin(angles))
     length = min(math.hypot(cosine, sine), 1.0)
-    middle, summed = float(of_magnitude @ magnitudes), np.cumsum(of_magnitude)
+    logs, summed = np.log(magnitudes), np.cumsum(of_magnitude)
+    middle = float(of_magnitude @ logs)
+    share = math.sqrt(float(of_magnitude @ (logs - middle) ** 2) + step**2 / 12)
     return SpinAcross(
         (cosine * np.array(first) + sine * np.array(second)) / length,
         np.array(along),
-        middle,
-        math.sqrt(float(of_magnitude @ (magnitudes - middle) ** 2) + (step * middle) ** 2 / 12),
+        math.exp(middle),
+        share * math.exp(middle),
         math.sqrt(-2 * math.log(length) + turn**2 / 12) if length > 1e-6 else math.pi,
         float(magnitudes[np.searchsorted(summed, 0.025)]) * math.exp(-step / 2),
         float(magnitudes[np.searchsorted(summed, 0.975)]) * math.exp(step / 2),

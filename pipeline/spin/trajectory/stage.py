@@ -184,8 +184,8 @@ def _estimate(parameters: TrajectoryParameters, across: SpinAcross, count: int) 
 
 
 # Trusted where the axis is known to 20 degrees (1 sigma), the error up to which the paper's tables count an answer as
-# right, and the magnitude to 5 rps or a tenth: where lift saturates, 150 rps at the most would else look known to 15 %.
-TRUSTED_AXIS_DEG, TRUSTED_RPS, TRUSTED_SHARE = 20.0, 5.0, 0.1
+# right, and the magnitude to a third: three sigma from no spin at all.
+TRUSTED_AXIS_DEG, TRUSTED_SHARE = 20.0, 0.333
 
 
 def is_trusted(estimates: Mapping[str, SpinEstimate]) -> bool:
@@ -194,7 +194,7 @@ def is_trusted(estimates: Mapping[str, SpinEstimate]) -> bool:
     magnitude, std, axis_std = estimate.magnitude_rps, estimate.magnitude_std_rps, estimate.axis_std_deg
     if magnitude is None or std is None or axis_std is None:
         return False
-    return axis_std <= TRUSTED_AXIS_DEG and std <= max(TRUSTED_RPS, TRUSTED_SHARE * magnitude)
+    return axis_std <= TRUSTED_AXIS_DEG and std <= TRUSTED_SHARE * magnitude
 
 
 STAGE = SpinMethod(

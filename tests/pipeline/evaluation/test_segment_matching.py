@@ -16,6 +16,7 @@ from spinscope.pipeline.simulator import SimulatedRecording
 from spinscope.pipeline.simulator.real_scenes import real_scene
 from spinscope.pipeline.simulator.segments import Segment
 from spinscope.pipeline.simulator.simulation import truth_of
+from spinscope.pipeline.spin.combined.result import CombinedResult
 
 
 class ResultOf:
@@ -119,3 +120,20 @@ def test_right_means_ten_percent_and_twenty_degrees(bounce):
         (np.cos(np.radians(21)) * spin + np.sin(np.radians(21)) * across, "wrong"),
     ):
         assert outcomes(bounce, shot_of(bounce, before, answer))[0] == outcome
+
+
+def test_a_flights_own_answer_is_right_within_its_stated_errors(bounce):
+    before, _ = bounce.segments
+    spin = np.array(before.spin_rps)
+    magnitude = float(np.linalg.norm(spin))
+    for share, factor, outcome in ((0.3, 1.5, "right"), (0.3, 2.6, "wrong"), (0.36, 1.1, "wrong")):
+        answer = factor * spin
+        covariance = (share * factor) ** 2 * np.outer(spin, spin) + 0.01 * magnitude**2 * factor**2 * np.eye(3) / 9
+        estimate = SpinEstimate("combined", answer, covariance, None, 0)
+        combined = CombinedResult(estimate, basis="flight")
+        shot = replace(
+            shot_of(bounce, before, None), estimates={"combined": estimate}, best="combined", combined=combined
+        )
+        assert outcomes(bounce, shot)[0] == outcome
+        by_logo = replace(shot, combined=replace(combined, basis="pattern"))
+        assert outcomes(bounce, by_logo)[0] == "wrong", "no other witness is asked for less"

@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.registry import Parameters, trusted_method
-from spinscope.pipeline.results import MethodResult, SpinEstimate
+from spinscope.pipeline.results import MethodResult, Packet, SpinEstimate
 from spinscope.pipeline.spin.combined import stage as combined
 from spinscope.pipeline.spin.combined.result import CombinedResult
 from spinscope.pipeline.spin.contrast.result import ContrastResult
 from spinscope.pipeline.spin.trajectory.stage import TrajectoryResult
-from spinscope.pipeline.stages import rate
+from spinscope.pipeline.stages import logo, rate
+from spinscope.pipeline.stages.logo import TurningEvents
+from tests.flown_circles import CAMERA, ball_at, context
 
 TOP, SLOW, OTHER = np.array([60.0, 5.0, 0.0]), np.array([1.0, 0.0, 1.0]), np.array([0.0, 45.0, 40.0])
 PARAMETERS = Parameters().group("combined")
-READS = {"trajectory.gyro_std_deg": 11.0}
+READS = {"trajectory.gyro_std_deg": 11.0, "contrast.window_us": 500_000}
 REFUSED = SpinEstimate.refused("contrast", "another spin explains the logo about as well")
 
 
@@ -52,7 +56,7 @@ class _Flight:
     def __init__(self, spin: np.ndarray, std_deg: float) -> None:
         self.axis, self.std = spin / np.linalg.norm(spin), math.radians(std_deg)
         self.along = np.array([0.0, 0.0, 1.0])
-        self.magnitude_rps, self.axis_std_rad = 60.0, self.std
+        self.magnitude_rps, self.magnitude_std_rps, self.axis_std_rad = 60.0, 30.0, self.std
 
     def log_likelihood(self, spins: np.ndarray) -> np.ndarray:
         spins = np.asarray(spins, float).reshape(-1, 3)
@@ -92,10 +96,29 @@ def answered(
     trajectory: TrajectoryResult | None = None,
     period: rate.RateResult | None = None,
     normal_flow: MethodResult | None = None,
+    seen_ms: Sequence[int] = (),
 ) -> CombinedResult:
+    """The answer at the end of a shot of 100 ms in the image's middle, in which the logo is seen in some ms."""
+    state = combined.start(PARAMETERS, context(**READS))
+    ball = ball_at(100_000.0, np.array([CAMERA.principal_x_px, CAMERA.principal_y_px, 17.0]))
+    events = TurningEvents.empty()
+    if seen_ms:
+        t_us = np.repeat(1000 * np.array(seen_ms) + 500, 20)
+        nothing = np.zeros(t_us.size)
+        events = TurningEvents(t_us, nothing > 0, np.zeros((t_us.size, 3)), nothing, nothing)
+    seen = replace(logo.absent(Parameters().logo, "no ball"), turning=events)
+    packet = Packet(0, 0, 100_000, EventBatch.empty())
     return combined.step(
-        PARAMETERS, READS, period or rhythm([]), normal_flow or flow(None), contrast, trajectory or flight(None)
-    )  # type: ignore[arg-type]
+        PARAMETERS,
+        state,
+        packet,
+        ball,
+        seen,
+        period or rhythm([]),
+        normal_flow or flow(None),
+        contrast,
+        trajectory or flight(None),
+    )
 
 
 def angle_deg(one: np.ndarray, other: np.ndarray) -> float:
@@ -156,6 +179,8 @@ def test_it_is_trusted_where_contrast_alone_is_not_or_tells_another_spin() -> No
     together = SpinEstimate("combined", TOP, np.eye(3), None)
     alone = SpinEstimate("contrast", TOP + 0.5, np.eye(3), None)
     assert trusted_method({"combined": together, "contrast": alone}) == "contrast"
+    open_ = SpinEstimate.refused("combined", "two spins open")
+    assert trusted_method({"combined": open_, "contrast": alone}) is None, "one limit of the odds for both"
     assert trusted_method({"combined": together, "contrast": REFUSED}) == "combined"
     assert trusted_method({"combined": together, "contrast": replace(alone, vector_rps=OTHER)}) == "combined"
 
@@ -182,3 +207,36 @@ def test_a_seam_that_comes_back_twice_a_turn_is_not_taken_for_twice_the_spin() -
     hidden = ContrastResult.nothing(SpinEstimate.refused("contrast", "the logo was not seen"))
     fast = answered(hidden, flight(TOP), rhythm([115.0])).estimate
     assert "two spins open" in (fast.reason or ""), "half of it is as usual as it is rare"
+
+
+def test_the_bend_of_the_flight_alone_answers_where_it_tells_the_magnitude_to_a_third() -> None:
+    hidden = ContrastResult.nothing(SpinEstimate.refused("contrast", "the logo was not seen"))
+    wide = answered(hidden, flight(TOP))
+    assert wide.basis == "flight" and "the magnitude is too uncertain" in (wide.estimate.reason or "")
+    bent = _BentFlight(TOP, 8.0)
+    narrow = answered(hidden, replace(flight(TOP), likelihood=bent, across=bent))  # type: ignore[arg-type]
+    estimate = narrow.estimate
+    assert estimate.vector_rps is not None and estimate.axis_std_deg is not None
+    assert estimate.magnitude_rps == pytest.approx(60.0, rel=0.1) and 10.0 < (estimate.magnitude_std_rps or 0) < 20.0
+    assert angle_deg(estimate.vector_rps, TOP) < 4.0 and 8.0 < estimate.axis_std_deg < 20.0
+    assert narrow.summary == "magnitude and axis from the bend of the flight"
+    assert trusted_method({"combined": estimate, "contrast": hidden.estimate}) == "combined"
+
+
+class _BentFlight(_Flight):
+    """Flight that tells the magnitude to a quarter as well."""
+
+    def log_likelihood(self, spins: np.ndarray) -> np.ndarray:
+        magnitudes = np.linalg.norm(np.asarray(spins, float).reshape(-1, 3), axis=1)
+        return super().log_likelihood(spins) - 0.5 * (np.log(magnitudes / 60.0) / 0.25) ** 2
+
+
+def test_a_logo_that_was_not_seen_when_a_spin_would_have_shown_it_speaks_against_the_spin() -> None:
+    """Visits every 25 ms, of which each second one would be missing with twice the spin."""
+    slow, fast = np.array([40.0, 0.0, 0.0]), np.array([80.0, 0.0, 0.0])
+    visits = [ms for ms in range(100) if ms % 25 < 8]
+    result = answered(pattern(fast, [slow], [0.2]), period=rhythm([40.0]), seen_ms=visits)
+    (seen,) = (one for one in result.witnesses if one.name == "logo")
+    assert 1.5 < seen.log_odds < 2.5, "dirt or a seam may have been seen instead"
+    assert result.estimate.magnitude_rps == pytest.approx(40.0, abs=0.5)
+    assert "the times at which the logo was seen" in result.summary
