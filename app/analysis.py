@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from spinscope.pipeline.errors import RecordingError
-from spinscope.pipeline.flight_calibration import doubt_about_up
+from spinscope.pipeline.flight_calibration import estimate_with_measured_up
 from spinscope.pipeline.session import Choices, Progress, Result, Session
 
 
@@ -26,7 +26,7 @@ def analyzed_session(session: Session, method: str = "all", on_progress: Progres
     Where no shot is trusted, and neither the user nor a sidecar fixed the ball, a ball that turns in place is looked
     for. It counts only if its spin is trusted, and a warning says so.
     """
-    result = _with_doubts(session.estimate(method, on_progress))
+    result = estimate_with_measured_up(session, method, on_progress)
     if session.parameters.track.ball == "fixed" or any(shot.best for shot in result.shots):
         return result
     in_place = dataclasses.replace(session, warnings=list(session.warnings))
@@ -67,12 +67,3 @@ def report_on(
     report["recording"]["path"] = str(path)
     report["seconds"] |= {"load": load_seconds, "total": time.perf_counter() - begin}
     return report, result
-
-
-def _with_doubts(result: Result) -> Result:
-    """The result, with what its flights say against the parameters among the warnings."""
-    doubt = doubt_about_up(result)
-    if doubt is None:
-        return result
-    session = dataclasses.replace(result.session, warnings=[*result.session.warnings, doubt])
-    return dataclasses.replace(result, session=session)

@@ -13,8 +13,9 @@ import tomli_w
 
 from .errors import RecordingError
 from .files import atomic_file
+from .kernels.arrays import Floats
 from .registry import STAGES, Parameters
-from .session import Result
+from .session import Progress, Result, Session
 from .shots import Shot
 from .spin.trajectory.calibration import KnownFlight, calibrate, up_from_flights
 from .spin.trajectory.likelihood import SetUp
@@ -93,8 +94,61 @@ def known_flights(shots: Iterable[Shot]) -> list[KnownFlight]:
     ]
 
 
-def doubt_about_up(result: Result) -> str | None:
-    """Sentence on camera.up where the flights of a result contradict it; None where they do not or cannot."""
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredUp:
+    """Direction against which the balls of a recording fall, where it is not camera.up.
+
+    Attributes
+    ----------
+    up : (3,) float64
+        Unit vector, camera frame.
+    std_deg : float
+        1 sigma in each direction.
+    believed : (3,) float64
+        The unit vector of camera.up.
+    """
+
+    up: Floats
+    std_deg: float
+    believed: Floats
+
+    @property
+    def values(self) -> dict[str, dict[str, Any]]:
+        """Parameters by group and field: the direction, and its error for the trajectory."""
+        return {
+            "trajectory": {"plumb_std_deg": min(max(self.std_deg, 0.01), 45.0)},
+            "camera": {"up": tuple(self.up.tolist())},
+        }
+
+    def warning(self, is_stated: bool) -> str:
+        """Sentence for people, who stated camera.up themselves or did not."""
+        off_deg = math.degrees(math.acos(float(np.clip(self.up @ self.believed, -1.0, 1.0))))
+        words = ",".join(f"{value:.2f}" for value in self.up)
+        said = f"their flights say {words} +- {self.std_deg:.0f} degrees, {off_deg:.0f} degrees off"
+        if not is_stated:
+            return f"camera.up is not given and taken from how the balls fall: {said} a camera that looks down"
+        believed = ",".join(f"{value:g}" for value in self.believed)
+        return f"the balls do not fall against camera.up = {believed}: {said}; if so give --set camera.up={words}"
+
+
+def estimate_with_measured_up(session: Session, method: str = "all", on_progress: Progress | None = None) -> Result:
+    """Estimate the spin of every shot, with camera.up from the flights where nobody states it and they contradict it.
+
+    The session's warnings say so, as where a stated direction is contradicted, which stands.
+    """
+    result = session.estimate(method, on_progress)
+    measured = measured_up(result)
+    if measured is None:
+        return result
+    session.warnings.append(measured.warning(session.states_up))
+    if session.states_up:
+        return result
+    session.parameters = session.parameters.with_values(measured.values)
+    return session.estimate(method, on_progress)
+
+
+def measured_up(result: Result) -> MeasuredUp | None:
+    """Up by the shots whose logo tells the spin; None where they agree with camera.up or tell nothing."""
     flights = known_flights(result.shots)
     if not flights:
         return None
@@ -104,15 +158,12 @@ def doubt_about_up(result: Result) -> str | None:
     off = across @ (up / np.linalg.norm(up) - set_up.up)
     spread = across @ covariance @ across + math.radians(set_up.plumb_std_deg) ** 2 * np.eye(3)
     sigmas = math.sqrt(float(off @ np.linalg.solve(spread, off)))
-    angle_deg = math.degrees(math.acos(float(np.clip(up @ set_up.up / np.linalg.norm(up), -1.0, 1.0))))
-    if sigmas < DOUBT_SIGMAS or angle_deg < DOUBT_DEG:
+    length = float(np.linalg.norm(up))
+    up = up / length
+    if sigmas < DOUBT_SIGMAS or math.degrees(math.acos(float(np.clip(up @ set_up.up, -1.0, 1.0)))) < DOUBT_DEG:
         return None
-    std_deg = math.degrees(math.sqrt(float(np.trace(covariance))))
-    words = ",".join(f"{value:.2f}" for value in up / np.linalg.norm(up))
-    return (
-        f"the balls do not fall against camera.up = {','.join(f'{value:g}' for value in set_up.up)}: their flights say "
-        f"{words} +- {std_deg:.0f} degrees, {angle_deg:.0f} degrees off; if so give --set camera.up={words}"
-    )
+    leaning = (float(np.trace(covariance)) - float(up @ covariance @ up)) / 2
+    return MeasuredUp(up, math.degrees(math.sqrt(leaning) / length), set_up.up)
 
 
 def _set_up(parameters: Parameters) -> SetUp:

@@ -76,7 +76,10 @@ class Choices:
 
 @dataclass(slots=True)
 class Session:
-    """An open recording, its events of the window, the parameters, and the chain that runs over them."""
+    """An open recording, its events of the window, the parameters, and the chain that runs over them.
+
+    `states_up` is whether the recording or the user gives camera.up.
+    """
 
     recording: AnyRecording
     source: EventsInMemory
@@ -85,6 +88,7 @@ class Session:
     warnings: list[str] = field(default_factory=list)
     read_seconds: float = 0.0
     sidecar: Sidecar = Sidecar()
+    states_up: bool = False
 
     @classmethod
     def open(
@@ -115,7 +119,9 @@ class Session:
         sidecar = Sidecar.beside(recording.path) if isinstance(recording, Recording) else Sidecar()
         parameters = _with_attributes(parameters, {**recording.attributes, **sidecar.parameters}, choices)
         warnings += recording.warnings
-        session = cls(recording, source, parameters, _timed(source), warnings, read_seconds, sidecar)
+        states_up = "camera.up" in {**recording.attributes, **sidecar.parameters}
+        states_up |= parameters.camera.up != GROUPS["camera"]().up or "camera.up" in _assigned(choices)
+        session = cls(recording, source, parameters, _timed(source), warnings, read_seconds, sidecar, states_up)
         session.place_fixed_ball(choices.fixed_ball or sidecar.fixed_ball)
         return session
 
@@ -346,7 +352,7 @@ def _timed(source: EventsInMemory, **options: Any) -> Chain:
 
 def _with_attributes(parameters: Parameters, attributes: dict[str, Any], choices: Choices) -> Parameters:
     """Take values of camera and ball that the recording or its sidecar states, unless the user set them."""
-    chosen = {text.partition("=")[0].strip() for text in choices.assignments}
+    chosen = _assigned(choices)
     for group, made in GROUPS.items():
         own = parameters.group(group)
         stated = {
@@ -358,6 +364,11 @@ def _with_attributes(parameters: Parameters, attributes: dict[str, Any], choices
             stated = {name: value for name, value in stated.items() if getattr(own, name) == getattr(made(), name)}
         parameters = parameters.with_groups(**{group: own.with_values(stated)})
     return parameters
+
+
+def _assigned(choices: Choices) -> set[str]:
+    """The parameters (`group.field`) that the options set one by one."""
+    return {text.partition("=")[0].strip() for text in choices.assignments}
 
 
 def _no_events(window_us: tuple[int, int] | None, path: Path) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -19,6 +20,7 @@ from click.testing import CliRunner
 from spinscope.app.cli import cli
 from spinscope.app.commands.analyze import AnalyzedRecording, print_shots
 from spinscope.pipeline import calibrate_flights
+from spinscope.pipeline.flight_calibration import estimate_with_measured_up
 from spinscope.pipeline.result_rows import shot_rows
 from spinscope.pipeline.session import Choices, Session
 from spinscope.pipeline.stages.logo import LogoParameters
@@ -265,3 +267,21 @@ def test_flights_that_contradict_the_up_direction_are_said(samples: Path, up: st
     for warning in warnings:
         words = warning.rpartition("--set camera.up=")[2]
         assert np.array([float(word) for word in words.split(",")]) == pytest.approx([0, 0, -1], abs=0.1)
+
+
+def test_up_that_nobody_states_is_taken_from_how_the_balls_fall(samples: Path, tmp_path: Path) -> None:
+    sample = samples / "own" / "shot_slow_top.h5"
+    assert Session.open(sample).states_up
+    shutil.copy(sample, tmp_path / "silent.h5")
+    with h5py.File(tmp_path / "silent.h5", "r+") as file:
+        del file.attrs["camera.up"]
+    assert Session.open(tmp_path / "silent.h5", Choices(assignments=["camera.up=0,0,-1"])).states_up
+    session = Session.open(tmp_path / "silent.h5")
+    assert not session.states_up
+    session.parameters = session.parameters.with_values({"camera": {"up": (0.0, -0.6, -0.8)}})
+    result = estimate_with_measured_up(session)
+    assert session.parameters.camera.up == pytest.approx((0, 0, -1), abs=0.1)
+    assert 0.0 < session.parameters.trajectory.plumb_std_deg < 10.0
+    assert result.session is session and result.shots[0].estimates["trajectory"].status == "ok"
+    (warning,) = (one for one in session.warnings if "camera.up" in one)
+    assert "not given" in warning and "+-" in warning
