@@ -69,7 +69,7 @@ class CombinedParameters(ParameterGroup):
 
 @dataclass(slots=True)
 class CombinedState:
-    """When the logo was seen in the shot so far; the other witnesses remember by themselves."""
+    """Sightings of the logo in the shot so far; the other witnesses remember by themselves."""
 
     context: Context
     sightings: Sightings = field(default_factory=Sightings)

@@ -167,6 +167,6 @@ def test_flights(cache: Path) -> None:
     assert [row["visible"] for row in best] == [True, False, True]
     assert best[0]["outcome"] == "right" and best[0]["by"] == "contrast"
     if best[1]["outcome"] != "refused":  # the flight alone tells of a hidden logo, with an error of its own
-        assert best[1]["by"] == "trajectory"
+        assert best[1]["by"] == "combined"
         for error, std in (("magnitude_error_rps", "magnitude_std_rps"), ("axis_error_deg", "axis_std_deg")):
             assert float(str(best[1][error])) < 3 * float(str(best[1][std]))
