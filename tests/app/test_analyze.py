@@ -271,12 +271,12 @@ def test_flights_that_contradict_the_up_direction_are_said(samples: Path, up: st
 
 def test_up_that_nobody_states_is_taken_from_how_the_balls_fall(samples: Path, tmp_path: Path) -> None:
     sample = samples / "own" / "shot_slow_top.h5"
-    assert Session.open(sample).states_up
-    shutil.copy(sample, tmp_path / "silent.h5")
-    with h5py.File(tmp_path / "silent.h5", "r+") as file:
-        del file.attrs["camera.up"]
-    assert Session.open(tmp_path / "silent.h5", Choices(assignments=["camera.up=0,0,-1"])).states_up
-    session = Session.open(tmp_path / "silent.h5")
+    shutil.copy(sample, tmp_path / "stating.h5")
+    with h5py.File(tmp_path / "stating.h5", "r+") as file:
+        file.attrs["camera.up"] = "0,0,-1"
+    assert Session.open(tmp_path / "stating.h5").states_up
+    assert Session.open(sample, Choices(assignments=["camera.up=0,0,-1"])).states_up
+    session = Session.open(sample)
     assert not session.states_up
     session.parameters = session.parameters.with_values({"camera": {"up": (0.0, -0.6, -0.8)}})
     result = estimate_with_measured_up(session)

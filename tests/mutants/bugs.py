@@ -164,6 +164,18 @@ VALUES = [
         "tests/pipeline/spin/test_combined.py",
     ),
     Mutant(
+        "pipeline/kernels/sightings.py",
+        "counts[zone] * math.log(1.0 - chance) + counts[3 + zone] * math.log(chance)",
+        "counts[3 + zone] * math.log(chance)",
+        "tests/pipeline/kernels/test_sightings.py",
+    ),
+    Mutant(
+        "pipeline/spin/combined/sightings.py",
+        "seen = counts >= max(",
+        "seen = counts > -max(",
+        "tests/pipeline/spin/test_combined.py",
+    ),
+    Mutant(
         "pipeline/spin/combined/stage.py",
         "apart @ apart > (NEAR * np.linalg.norm(alone.vector_rps)) ** 2",
         "apart @ apart > 0.0",

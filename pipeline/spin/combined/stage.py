@@ -36,8 +36,8 @@ LABELS = {
     "contrast": "the pattern",
     "trajectory": "the flight",
 }
-# The witness that names the spins to choose from, and what it contributes.
-NAMED_BY: dict[Basis, str] = {"pattern": "contrast", "rhythm": "rate", "flight": "trajectory"}
+# The witness whose own likelihoods the candidates carry.
+NAMED_BY: dict[Basis, str] = {"pattern": "contrast", "rhythm": "rate"}
 CONTRIBUTIONS: dict[Basis, str] = {
     "pattern": "magnitude and axis from the logo's pattern",
     "rhythm": "magnitude from the rhythm of the logo's visits, axis from the flight",
@@ -127,7 +127,7 @@ def step(
         reason = f"no spin of {np.linalg.norm(spins_rps[0][0]):.0f} rps across the flight bends it like this one"
         estimate = SpinEstimate.refused(METHOD, reason, contrast.estimate.events)
     by_witness = {name: log_mean(values) for name, values in logs.items()}
-    if basis != "flight":
+    if basis in NAMED_BY:
         by_witness[NAMED_BY[basis]] = own
     rival = max(rivals, key=lambda k: evidence[k], default=best)
     witnesses = tuple(
@@ -260,7 +260,7 @@ def is_trusted(estimates: Mapping[str, SpinEstimate]) -> bool:
 STAGE = SpinMethod(
     name=METHOD,
     label="Combined",
-    help="One spin from the logo's pattern and motion, the rhythm of its visits and the bend of the flight.",
+    help="One spin from the logo's pattern and motion, the rhythm and times of its visits and the bend of the flight.",
     inputs=("packet", "ball", "logo", "rate", "normal_flow", "contrast", "trajectory"),
     parameters=CombinedParameters,
     reads=("spin.max_spin_rps", "trajectory.gyro_std_deg", "contrast.window_us"),
