@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from .camera import Camera
+from .camera import Camera, CameraParameters
 from .chain import Chain, EventsInMemory, Tick
 from .errors import ParameterError, RecordingError
 from .presets import preset
@@ -120,7 +120,7 @@ class Session:
         parameters = _with_attributes(parameters, {**recording.attributes, **sidecar.parameters}, choices)
         warnings += recording.warnings
         states_up = "camera.up" in {**recording.attributes, **sidecar.parameters}
-        states_up |= parameters.camera.up != GROUPS["camera"]().up or "camera.up" in _assigned(choices)
+        states_up |= parameters.camera.up != CameraParameters().up or "camera.up" in _assigned(choices)
         session = cls(recording, source, parameters, _timed(source), warnings, read_seconds, sidecar, states_up)
         session.place_fixed_ball(choices.fixed_ball or sidecar.fixed_ball)
         return session
