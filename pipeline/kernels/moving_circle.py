@@ -15,17 +15,22 @@ from numba import njit
 
 from .arrays import Events, Flags, Floats, Integers, Pixels
 
+# Parts of an outline: all of it, the half that moves outwards, or the events of both halves as a disc brighter or
+# darker than the ground gives them (ON where a bright one moves outwards and OFF where it moves inwards).
+WHOLE, HALF_AHEAD, OF_BRIGHT, OF_DARK = range(4)
+
 
 @njit(cache=True, nogil=True)
 def near_outline(
-    circle: Floats, events: Events, reference_us: int, gate_px: float, most_events: int, ahead_only: bool
+    circle: Floats, events: Events, reference_us: int, gate_px: float, most_events: int, part: int
 ) -> Integers:
-    """Indices (m,) int64 of events within gate_px of the moving outline, thinned evenly to most_events.
+    """Indices (m,) int64 of events within gate_px of a part of the moving outline, thinned evenly to most_events.
 
-    With ahead_only, only those on the half of the outline that moves outwards.
+    The parts are WHOLE, HALF_AHEAD, OF_BRIGHT and OF_DARK.
     """
-    t_us, x_px, y_px, _ = events
+    t_us, x_px, y_px, on = events
     x0, y0, vx, vy = circle[0], circle[1], circle[2], circle[3]
+    is_whole, is_half, of_bright = part == WHOLE, part == HALF_AHEAD, part == OF_BRIGHT
     inner = max(circle[4] - gate_px, 0.0) ** 2
     outer = (circle[4] + gate_px) ** 2
     near = np.empty(t_us.size, np.bool_)
@@ -35,7 +40,9 @@ def near_outline(
         tau = np.int32(t_us[i] - reference_us) * 1e-6
         dx, dy = x_px[i] - (x0 + vx * tau), y_px[i] - (y0 + vy * tau)
         square = dx * dx + dy * dy
-        near[i] = (inner <= square) & (square <= outer) & ((not ahead_only) | (dx * vx + dy * vy >= 0.0))
+        outwards = dx * vx + dy * vy >= 0.0
+        is_part = is_whole | (outwards if is_half else ((outwards == on[i]) == of_bright))
+        near[i] = (inner <= square) & (square <= outer) & is_part
     chosen = _set_rows(near)
     stride = max(1, -(-chosen.size // max(most_events, 1))) | 1  # odd: symmetric motion brings events in pairs
     return chosen[::stride].copy()

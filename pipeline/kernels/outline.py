@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from .arrays import Events, Flags, Floats
-from .moving_circle import fit_circle, in_square, near_outline, relative_events, residuals
+from .moving_circle import WHOLE, fit_circle, in_square, near_outline, relative_events, residuals
 
 # Events used for a fit: beyond this the pixels' common errors outweigh the statistical, 0.1 px / sqrt(n).
 MOST_EVENTS = 200
@@ -196,10 +196,11 @@ def fit_outline(
     events: Events,
     reference_us: int,
     gate_px: float,
+    part: int,
     width_px: int,
     height_px: int,
 ) -> tuple[Floats, Floats, float, Floats]:
-    """Fit the half of the outline ahead near an expected circle, and count what supports the fit.
+    """Fit a part of the outline near an expected circle, and count what supports the fit.
 
     Parameters
     ----------
@@ -207,6 +208,8 @@ def fit_outline(
         As for `fit_circle`.
     reference_us, gate_px : float
         Time of the expected circle; events within the gate of its outline take part.
+    part : int
+        Part of the outline that is fitted, see `near_outline`.
     width_px, height_px : int
         Size of the image.
 
@@ -219,7 +222,7 @@ def fit_outline(
     support : (8,) float64
         See `support`.
     """
-    chosen = near_outline(expected, events, reference_us, gate_px, MOST_EVENTS, True)
+    chosen = near_outline(expected, events, reference_us, gate_px, MOST_EVENTS, part)
     nothing = np.full(5, np.nan), np.zeros((5, 5)), 0.0, np.zeros(8)
     if chosen.size < LEAST_EVENTS:
         return nothing
@@ -228,7 +231,7 @@ def fit_outline(
     if not (np.all(np.isfinite(circle)) and circle[4] > 1.0 and weight >= LEAST_WEIGHT and scatter <= MOST_SCATTER_PX):
         return nothing
     around_px = max(4.0 * ON_OUTLINE_PX, EARLY_SHARE * circle[4])
-    around = near_outline(circle, events, reference_us, around_px, MOST_AROUND, False)
+    around = near_outline(circle, events, reference_us, around_px, MOST_AROUND, WHOLE)
     tau_s, x, y = relative_events(around, events, reference_us)
     on = events[3][around]
     return circle, covariance, scatter, support(circle, ellipticity, tau_s, x, y, on, width_px, height_px)

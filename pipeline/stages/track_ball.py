@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from ..camera import Camera
 from ..events import EventBatch
 from ..kernels import crossing
+from ..kernels.moving_circle import HALF_AHEAD
 from ..kernels.outline import ON_OUTLINE_PX
 from ..kernels.take_events import take_events
 from ..results import Circle, Packet
 from .track_contact import PATH_US, Contact
 from .track_kalman import OBSERVED, OBSERVED_BLOCK, BallFilter
-from .track_outline import Edge, Sighting, measure
+from .track_outline import FREE, LEAST_ARC, Edge, Sighting, measure
 from .track_path import PathPoint
 from .track_result import BeganBy
 
@@ -25,6 +26,8 @@ Floats = NDArray[np.float64]
 
 # Share of the half outline ahead that a tracked ball must show to be measured: a third pins down its circle.
 LEAST_AHEAD = 0.3
+# Arcs of both halves lag behind the ball by so much more, 1 sigma: in low contrast the pixels answer late.
+ARCS_LAG_STD_PX = 0.5
 # Squared Mahalanobis distance (three degrees of freedom) beyond which an outline is not the ball's: 5 sigma.
 MOST_SURPRISE = 25.0
 # Scatter of an outline's centre and radius from tick to tick beyond the statistical one, on the samples.
@@ -54,7 +57,6 @@ APART_PX = 5.0
 HIDDEN_ERROR = 0.3
 # A ball that turned is taken for one that flies on for up to so long: paths are compared from so long before.
 MEETING_US = 10_000
-FREE = np.full(5, 1e9)
 # 1 sigma of a state just after a contact, of place and radius: what a few circles leave open.
 AFTER_CONTACT_COVARIANCE = np.diag([0.3**2, 0.3**2, 0.0, 0.0, 0.3**2])
 
@@ -119,6 +121,8 @@ class TrackedBall:
         Whether it is taken for a flight: until it is seen to roll, or to be another's shadow.
     contrast, clutter : float
         Of its outline when it was last measured (see `Sighting`).
+    part : int
+        Part of the outline that it is measured by.
     """
 
     shot: int
@@ -131,6 +135,7 @@ class TrackedBall:
     is_shot: bool = True
     contrast: float = 0.0
     clutter: float = 0.0
+    part: int = HALF_AHEAD
 
     @classmethod
     def at(cls, sighting: Sighting, measuring: Measuring, shot: int, packet: Packet, began_by: BeganBy) -> TrackedBall:
@@ -145,7 +150,9 @@ class TrackedBall:
         first_us = next(point.end_us for point in self.path if point.end_us > contact.time_us)
         state = contact.path.state(first_us)
         new = measuring.filter_at(state, AFTER_CONTACT_COVARIANCE)
-        return TrackedBall(shot, contact.time_us, contact.kind, new, first_us, state, contrast=self.contrast)
+        return TrackedBall(
+            shot, contact.time_us, contact.kind, new, first_us, state, contrast=self.contrast, part=self.part
+        )
 
     def follow(self, path: list[PathPoint], measuring: Measuring) -> Iterator[PathPoint]:
         """Go along the rest of a path from the shot's first tick on, with the circles that show no other shot."""
@@ -193,8 +200,8 @@ class TrackedBall:
         # ball wholly in view, and it keeps the fit sane on short arcs.
         loose = np.array([1e9, 1e9, 10 * expected[4] + spread[2], 10 * expected[4] + spread[3], 0.5])
         gate = 2.0 + 3.0 * max(spread[0], spread[1])
-        sighting = measure(events, end_us, measuring.camera, expected, gate, loose)
-        if sighting is None or sighting.ahead < LEAST_AHEAD:
+        sighting = measure(events, end_us, measuring.camera, expected, gate, loose, self.part)
+        if sighting is None or not self._is_pinned(sighting):
             return None
         noise = self._noise(measuring, sighting, start_us, end_us)
         if not self.filter.update(measuring.edge.ball(sighting.ring)[OBSERVED], noise, MOST_SURPRISE):
@@ -219,6 +226,12 @@ class TrackedBall:
         """Start the filter anew at a sighting of the ball off its path."""
         self.filter = measuring.filter_at(measuring.edge.ball(sighting.ring), sighting.covariance)
         self._see(measuring, sighting, self._noise(measuring, sighting, start_us, end_us), end_us)
+
+    def _is_pinned(self, sighting: Sighting) -> bool:
+        """Whether enough of the outline is seen to pin down its circle."""
+        if sighting.part == HALF_AHEAD:
+            return sighting.ahead >= LEAST_AHEAD
+        return min(sighting.ahead, sighting.behind) >= LEAST_ARC
 
     def coast(self, end_us: int) -> None:
         """Note a tick in which it was not measured."""
@@ -254,9 +267,13 @@ class TrackedBall:
 
     def total_covariance(self) -> Floats:
         """(5, 5) float64: the filter's covariance plus the errors that every tick has in common."""
-        late = self.filter.mean[2:4] * LATENCY_STD_US * 1e-6
+        velocity = self.filter.mean[2:4]
+        late = velocity * LATENCY_STD_US * 1e-6
         covariance = self.filter.covariance + COMMON_COVARIANCE
         covariance[:2, :2] += late[:, None] * late
+        if self.part != HALF_AHEAD:
+            lag = velocity / np.hypot(*velocity) * ARCS_LAG_STD_PX
+            covariance[:2, :2] += lag[:, None] * lag
         covariance[4, 4] += (OUTSIDE_PX * self.clutter / (1.0 + self.clutter)) ** 2
         return covariance
 
@@ -268,7 +285,7 @@ class TrackedBall:
 
     def _see(self, measuring: Measuring, sighting: Sighting, noise: Floats, end_us: int) -> None:
         self.seen_us, self.seen = end_us, self.filter.mean
-        self.contrast, self.clutter = sighting.contrast, sighting.clutter
+        self.contrast, self.clutter, self.part = sighting.contrast, sighting.clutter, sighting.part
         hidden = HIDDEN_ERROR * (1.0 - sighting.visible) * sighting.ring[4]
         self._add(PathPoint(end_us, measuring.circle(sighting), noise + hidden**2 * np.eye(3)))
 

@@ -1,8 +1,9 @@
 """The ball's outline measured in the events, to sub-pixel: the refinement of the tracker's Hough circles.
 
-Only the half of the outline that moves outwards is fitted, the background-to-ball edge: it is as sharp as the
+The half of the outline that moves outwards is fitted, the background-to-ball edge: it is as sharp as the
 pixels allow whatever the light. At the other half the ball's own shading fires before the edge comes, by up
-to 0.8 px on the samples, which differs from shot to shot.
+to 0.8 px on the samples, which differs from shot to shot. Where the ground is as bright as the lit side of the ball,
+only arcs of its shaded side show: those of both halves are fitted, by their polarity (`sight_arcs`).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from ..camera import Camera
 from ..events import EventBatch
 from ..kernels import outline as kernels
+from ..kernels.moving_circle import HALF_AHEAD, OF_BRIGHT, OF_DARK
 from ..results import Circle
 
 Floats = NDArray[np.float64]
@@ -23,8 +25,14 @@ Floats = NDArray[np.float64]
 # Share of an outline that has events, less the events around it for each one on it. In low contrast on our simulator
 # (seeds 901-926) it is 0.7 to 1 on balls, 0.4 to 0.67 on circles that marks and shading draw inside them.
 LEAST_EXPLAINED = 0.7
+# Least share of either half of an outline that shows in arcs, error of its radius, and events just outside for each one
+# on it. On white walls of our simulator (seeds 41000-41011) balls show 0.2 to 0.6 of each half and hardly an event
+# outside; circles that a logo draws have a tenth and more there.
+LEAST_ARC, MOST_RADIUS_ERROR, MOST_OUTSIDE = 0.2, 0.03, 0.02
 # The velocity vote looks this far back in time; longer bends the test, shorter leaves too few events.
 VOTE_US = 1500
+# 1 sigma (5,) of an expected ring that holds nothing.
+FREE = np.full(5, 1e9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +83,8 @@ class Sighting:
         Share of the outline that is in the image.
     clutter : float
         Events just outside the outline, for each one on it.
+    part : int
+        Part of the outline that was fitted, see `kernels.moving_circle.near_outline`.
     """
 
     ring: Floats
@@ -87,6 +97,7 @@ class Sighting:
     ahead_on: float
     visible: float
     clutter: float
+    part: int = HALF_AHEAD
 
     @property
     def speed_px_s(self) -> float:
@@ -137,6 +148,16 @@ class Sighting:
         return self.ahead >= 0.5 and self.clutter <= 0.1 and self._is_velocity_known
 
     @property
+    def in_arcs(self) -> bool:
+        """Whether an arc of each half is there, they alone fix the circle, and next to nothing lies around it."""
+        return (
+            min(self.ahead, self.behind) >= LEAST_ARC
+            and self.clutter <= MOST_OUTSIDE
+            and self.covariance[4, 4] <= (MOST_RADIUS_ERROR * self.ring[4]) ** 2
+            and self._is_velocity_known
+        )
+
+    @property
     def _is_velocity_known(self) -> bool:
         """Whether the speed is known to a tenth."""
         return bool(self.covariance[2, 2] + self.covariance[3, 3] <= (0.1 * self.speed_px_s) ** 2)
@@ -169,6 +190,7 @@ def measure(
     expected: Floats,
     gate_px: float,
     prior_std: Floats,
+    part: int = HALF_AHEAD,
 ) -> Sighting | None:
     """Fit the outline near an expected ring (5,) at end_us; None with too few events or without a result.
 
@@ -178,6 +200,8 @@ def measure(
         Events this near the expected outline take part.
     prior_std : (5,)
         How firmly the expectation holds.
+    part : int
+        Part of the outline that is fitted, see `kernels.moving_circle.near_outline`.
     """
     ring, covariance, scatter, found = kernels.fit_outline(
         expected,
@@ -186,6 +210,7 @@ def measure(
         events.columns,
         end_us,
         gate_px,
+        part,
         camera.width_px,
         camera.height_px,
     )
@@ -203,6 +228,7 @@ def measure(
         ahead_on,
         visible,
         outside / max(events_on, 1.0),
+        part,
     )
 
 
@@ -214,23 +240,48 @@ def sight(
     The fastest velocity voted for is given in radii a second. Signed: events vote by their polarity, as a ball brighter
     or darker than all around it gives them.
     """
-    radius = circle.radius_px
-    fastest = fastest_radii_s * radius
     recent = events.between(end_us - VOTE_US, end_us)
-    ring, gate = kernels.find_moving_circle(
+    ring, gate = _voted(recent, end_us, circle, fastest_radii_s, signed=signed)
+    if math.isnan(ring[0]):
+        return None
+    first = measure(recent, end_us, camera, ring, 1.5 * gate, FREE)
+    if first is None or first.ahead < 0.3:
+        return None
+    return measure(events, end_us, camera, first.ring, 3.0, FREE)
+
+
+def sight_arcs(
+    events: EventBatch, end_us: int, camera: Camera, circle: Circle, fastest_radii_s: float
+) -> Sighting | None:
+    """The moving outline behind a Hough circle of which only arcs show; None when there is none.
+
+    As `sight`, but fitted to the events of both halves that a darker or a brighter disc gives: it takes the arcs' whole
+    span to fix the circle, and a logo beside them gives events of the other polarity as well.
+    """
+    recent = events.between(end_us - VOTE_US, end_us)
+    ring, gate = _voted(recent, end_us, circle, fastest_radii_s, signed=True)
+    if math.isnan(ring[0]):
+        return None
+    for part in (OF_DARK, OF_BRIGHT):
+        first = measure(recent, end_us, camera, ring, 1.5 * gate, FREE, part)
+        sighting = None if first is None else measure(events, end_us, camera, first.ring, 3.0, FREE, part)
+        if sighting is not None and sighting.in_arcs:
+            return sighting
+    return None
+
+
+def _voted(
+    recent: EventBatch, end_us: int, circle: Circle, fastest_radii_s: float, *, signed: bool
+) -> tuple[Floats, float]:
+    """The ring (5,) of a Hough circle that moves as most events say, NaN with too few, and the width of the vote."""
+    radius = circle.radius_px
+    return kernels.find_moving_circle(
         circle.x_px,
         circle.y_px,
         radius,
         recent.columns,
         end_us,
         VOTE_US * 1e-6,
-        fastest,
+        fastest_radii_s * radius,
         signed,
     )
-    if math.isnan(ring[0]):
-        return None
-    free = np.full(5, 1e9)
-    first = measure(recent, end_us, camera, ring, 1.5 * gate, free)
-    if first is None or first.ahead < 0.3:
-        return None
-    return measure(events, end_us, camera, first.ring, 3.0, free)

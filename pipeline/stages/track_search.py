@@ -17,7 +17,7 @@ from ..results import Circle
 from .surface import OrdinalSurface, SurfaceParameters, SurfaceResult
 from .track_hough import candidates
 from .track_limits import Limits
-from .track_outline import Sighting, disc_share, sight
+from .track_outline import Sighting, disc_share, sight, sight_arcs
 
 # Circles of the full-frame vote looked at in one tick, without a track and beside one.
 MOST_CANDIDATES, MOST_RIVALS = 4, 2
@@ -99,8 +99,8 @@ class _Searching:
             if any(_is_same(circle, other) for other in tried):
                 continue
             tried.append(circle)
-            sighting = sight(events, self.end_us, self.camera, circle, self.limits.speed_max_radii_s, signed=signed)
-            if sighting is None or not self._is_likely(sighting, events, signed=signed):
+            sighting = self._sighting(circle, events, signed=signed)
+            if sighting is None:
                 continue
             reason = self.limits.excluding(sighting)
             if reason is None:
@@ -109,6 +109,16 @@ class _Searching:
                 excluded = excluded or reason
         found.sort(key=lambda one: (one[0].trusted, one[0].speed_px_s), reverse=True)
         return tried[0] if tried else None, found, excluded
+
+    def _sighting(self, circle: Circle, events: EventBatch, *, signed: bool) -> Sighting | None:
+        """The outline behind a circle that may be a ball's, None if there is none."""
+        fastest_radii_s = self.limits.speed_max_radii_s
+        sighting = sight(events, self.end_us, self.camera, circle, fastest_radii_s, signed=signed)
+        if sighting is not None and self._is_likely(sighting, events, signed=signed):
+            return sighting
+        arcs = None if signed else sight_arcs(events, self.end_us, self.camera, circle, fastest_radii_s)
+        is_likely = arcs is not None and disc_share(arcs.ring, events, self.end_us) >= ISOLATED_SHARE
+        return arcs if is_likely else None
 
     def _is_likely(self, sighting: Sighting, events: EventBatch, *, signed: bool) -> bool:
         """Whether an outline may be a ball's: trusted, or one that alone explains the events around it."""

@@ -73,7 +73,9 @@ def test_fit_of_an_outline(benchmark: Any) -> None:
     packet, filtered, _ = rows[TICK]
     ring = tracked(NAME)[TICK].mean.copy()
     events = filtered.contour_events
-    chosen = moving_circle.near_outline(ring, events.columns, packet.end_us, 3.0, outline.MOST_EVENTS, True)
+    chosen = moving_circle.near_outline(
+        ring, events.columns, packet.end_us, 3.0, outline.MOST_EVENTS, moving_circle.HALF_AHEAD
+    )
     columns = (
         (events.t_us[chosen] - packet.end_us) * 1e-6,
         events.x_px[chosen].astype(np.float64),

@@ -7,6 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from spinscope.pipeline.kernels.moving_circle import HALF_AHEAD, OF_BRIGHT, OF_DARK, WHOLE
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -70,13 +72,21 @@ def residuals(circle: Floats, ellipticity: Floats, tau_s: Floats, x_px: Floats, 
 
 
 def near_outline(
-    circle: Floats, tau_s: Floats, x_px: Floats, y_px: Floats, gate_px: float, most_events: int, ahead_only: bool
+    circle: Floats,
+    tau_s: Floats,
+    x_px: Floats,
+    y_px: Floats,
+    on: NDArray[np.bool_],
+    gate_px: float,
+    most_events: int,
+    part: int,
 ) -> Ints:
     """Indices by mask, then every so many-th."""
     dx, dy = from_centre(circle, tau_s, x_px, y_px)
-    near = np.abs(np.hypot(dx, dy) - circle[4]) <= gate_px
-    if ahead_only:
-        near &= dx * circle[2] + dy * circle[3] >= 0
+    outwards = dx * circle[2] + dy * circle[3] >= 0
+    anything = np.ones(on.size, np.bool_)
+    masks = {WHOLE: anything, HALF_AHEAD: outwards, OF_BRIGHT: outwards == on, OF_DARK: outwards != on}
+    near = (np.abs(np.hypot(dx, dy) - circle[4]) <= gate_px) & masks[part]
     chosen = np.flatnonzero(near)
     return chosen[:: max(1, math.ceil(chosen.size / most_events)) | 1]
 

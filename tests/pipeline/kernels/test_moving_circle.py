@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from spinscope.pipeline.kernels import moving_circle, outline
+from spinscope.pipeline.kernels.moving_circle import HALF_AHEAD, OF_BRIGHT, OF_DARK, WHOLE
 from tests.columns import read_only
 from tests.reference import hough as reference
 
@@ -78,17 +79,17 @@ def test_measures_equal_the_twins(seed: int, oval: tuple[float, float]) -> None:
     seed=st.integers(0, 2**32 - 1),
     gate=st.floats(0.5, 12),
     most=st.integers(1, 200),
-    ahead_only=st.booleans(),
+    part=st.sampled_from((WHOLE, HALF_AHEAD, OF_BRIGHT, OF_DARK)),
     margin=st.floats(0, 20),
 )
-def test_choices_of_events_equal_the_twins(seed: int, gate: float, most: int, ahead_only: bool, margin: float) -> None:
+def test_choices_of_events_equal_the_twins(seed: int, gate: float, most: int, part: int, margin: float) -> None:
     ring, tau, x, y, on = scene(seed)
     t_us = np.rint(tau * 1e6).astype(np.int64) + 7_000_000
     columns = [np.clip(np.rint(column), 0, 1000).astype(np.uint16) for column in (x, y)]
     exact = [(t_us - 7_000_000) * 1e-6, *(column.astype(np.float64) for column in columns)]
     events = read_only(t_us, *columns, on)
-    near = moving_circle.near_outline(ring, events, 7_000_000, gate, most, ahead_only)
-    assert np.array_equal(near, reference.near_outline(ring, *exact, gate, most, ahead_only))
+    near = moving_circle.near_outline(ring, events, 7_000_000, gate, most, part)
+    assert np.array_equal(near, reference.near_outline(ring, *exact, on, gate, most, part))
     rings, margins = np.array([ring, ring + np.array([40, -30, 500, 0, -2])]), np.array([margin, 0.5 * margin])
     for count in (1, 2):
         clear = moving_circle.outside_circles(rings[:count], events, 7_000_000, margins[:count])
@@ -184,13 +185,15 @@ def test_a_moving_ring_is_measured_from_a_place_alone(bright: bool) -> None:
     events = read_only(*(column[recent] for column in columns), (on if bright else ~on)[recent])
     start, gate = outline.find_moving_circle(60.8, 49.0, 15.5, events, 0, 1.5e-3, 12_000.0, True)
     assert np.hypot(*(start - ring)[2:4]) < 1500
-    fitted, covariance, scatter, found = outline.fit_outline(start, FREE, ROUND, events, 0, 1.5 * gate, 1280, 720)
+    fitted, covariance, scatter, found = outline.fit_outline(
+        start, FREE, ROUND, events, 0, 1.5 * gate, HALF_AHEAD, 1280, 720
+    )
     assert np.allclose(fitted[:2], ring[:2], atol=0.3) and abs(fitted[4] - 16) < 0.2
     assert np.hypot(*(fitted - ring)[2:4]) < 300 and scatter < 0.6 and np.all(np.diag(covariance) > 0)
     assert min(found[3], found[4]) > 0.8 and np.allclose(found[1:3], [bright, not bright], atol=0.03)
     nothing = tuple(column[:5] for column in events)
     assert np.isnan(outline.find_moving_circle(60.8, 49.0, 15.5, nothing, 0, 1.5e-3, 12_000.0, True)[0][0])
-    assert np.isnan(outline.fit_outline(start, FREE, ROUND, nothing, 0, 3.0, 1280, 720)[0][0])
+    assert np.isnan(outline.fit_outline(start, FREE, ROUND, nothing, 0, 3.0, HALF_AHEAD, 1280, 720)[0][0])
 
 
 def test_polarity_does_not_matter_to_an_unsigned_vote() -> None:
