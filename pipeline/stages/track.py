@@ -23,6 +23,7 @@ from ..results import Circle, Packet
 from ..stage import Context, Stage
 from .filter import FilterResult
 from .surface import SurfaceResult
+from .track_background import SHAKING_US, background_moves
 from .track_ball import Measuring, TrackedBall
 from .track_contact import ROLLING_M_S, Contact, find_contact, rolls
 from .track_hough import hough_near
@@ -52,6 +53,9 @@ class TrackParameters(ParameterGroup):
     contour_us: int = tunable(3000, 500, 50_000, 100, "us", "how far back in time the outline's events are taken")
     acceleration_m_s2: float = tunable(15.0, 0.1, 1000.0, 1.0, "m/s^2", "Kalman: 1 sigma of the acceleration")
     approach_m_s: float = tunable(3.0, 0.1, 100.0, 0.5, "m/s", "Kalman: 1 sigma of the speed towards the camera")
+    shake_px: float = tunable(
+        1.0, 0.0, 20.0, 0.1, "px", "1 sigma by which a shaking camera moves the ball while most of the background moves"
+    )
     coast_us: int = tunable(20_000, 0, 1_000_000, 1000, "us", "how long an unseen ball is kept")
     fixed_x_px: float | None = tunable(None, 0.0, 10_000.0, 0.1, "px", "fixed ball: column of the centre")
     fixed_y_px: float | None = tunable(None, 0.0, 10_000.0, 0.1, "px", "fixed ball: row of the centre")
@@ -87,6 +91,7 @@ class TrackState:
     pending: list[tuple[int, Sighting]] = field(default_factory=list)
     first_us: int | None = None
     looked_us: int = 0
+    shaken_us: int | None = None  # when most of the background was last seen to move
     shots: int = 0
     excluded: str | None = None  # the setting that excluded a circle since the last ball, in words
 
@@ -163,6 +168,9 @@ def _step_flying(
     if _is_search_due(state, packet):
         anywhere, waiting = _search(parameters, state, packet, surface)
         hough = hough or anywhere
+    if _is_shaking(parameters, state, packet.end_us):
+        for ball in state.balls:
+            ball.add_shake(parameters.shake_px)
     contacts, earlier = _announce_contacts(parameters, state)
     for ball in state.balls:
         if ball.is_shot:
@@ -243,6 +251,17 @@ def _announce_contacts(
         state.balls[place] = after
         state.shots += 1
     return ended, earlier
+
+
+def _is_shaking(parameters: TrackParameters, state: TrackState, end_us: int) -> bool:
+    """Whether the camera shakes, or did a moment ago."""
+    if (
+        state.balls
+        and parameters.shake_px > 0.0
+        and background_moves(state.contour, state.last_us, state.context.camera)
+    ):
+        state.shaken_us = end_us
+    return state.shaken_us is not None and end_us - state.shaken_us < SHAKING_US
 
 
 def _rolls(state: TrackState, ball: TrackedBall) -> bool:

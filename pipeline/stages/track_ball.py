@@ -233,6 +233,11 @@ class TrackedBall:
             return sighting.ahead >= LEAST_AHEAD
         return min(sighting.ahead, sighting.behind) >= LEAST_ARC
 
+    def add_shake(self, std_px: float) -> None:
+        """Note that a shaking camera moved the last circle by so much, 1 sigma: so much of a bend is no contact."""
+        last = self.path[-1]
+        self.path[-1] = PathPoint(last.end_us, last.circle, last.noise + std_px**2 * np.diag([1.0, 1.0, 0.0]))
+
     def coast(self, end_us: int) -> None:
         """Note a tick in which it was not measured."""
         self._add(PathPoint(end_us, None, np.zeros((3, 3))))
