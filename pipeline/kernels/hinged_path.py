@@ -47,7 +47,7 @@ def edge_channels(times_s: Floats, circles: Floats, noises: Floats, errors_px2: 
     ----------
     noises : (n, 3, 3) float64
         Covariances of the circles, px^2.
-    errors_px2 : (3,) float64
+    errors_px2 : (n, 3) float64
         Variance of each channel beyond these.
 
     Returns
@@ -68,7 +68,7 @@ def edge_channels(times_s: Floats, circles: Floats, noises: Floats, errors_px2: 
         if i > 0:
             way_px += math.hypot(circles[i, 0] - circles[i - 1, 0], circles[i, 1] - circles[i - 1, 1])
         for channel in range(3):
-            variance = errors_px2[channel]
+            variance = errors_px2[i, channel]
             for j in range(3):
                 values[i, channel] += channels[channel, j] * circles[i, j]
                 for k in range(3):

@@ -54,7 +54,7 @@ class TrackParameters(ParameterGroup):
     acceleration_m_s2: float = tunable(15.0, 0.1, 1000.0, 1.0, "m/s^2", "Kalman: 1 sigma of the acceleration")
     approach_m_s: float = tunable(3.0, 0.1, 100.0, 0.5, "m/s", "Kalman: 1 sigma of the speed towards the camera")
     shake_px: float = tunable(
-        1.0, 0.0, 20.0, 0.1, "px", "1 sigma by which a shaking camera moves the ball while most of the background moves"
+        0.4, 0.0, 20.0, 0.1, "px", "1 sigma by which a shaking camera moves the ball while most of the background moves"
     )
     coast_us: int = tunable(20_000, 0, 1_000_000, 1000, "us", "how long an unseen ball is kept")
     fixed_x_px: float | None = tunable(None, 0.0, 10_000.0, 0.1, "px", "fixed ball: column of the centre")

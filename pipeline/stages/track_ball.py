@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -166,7 +166,7 @@ class TrackedBall:
                 observed = np.array([circle.x_px, circle.y_px, circle.radius_px])
                 self.filter.update(observed, point.noise, math.inf)
                 self.seen_us, self.seen = point.end_us, self.filter.mean
-            self._add(PathPoint(point.end_us, circle, point.noise))
+            self._add(replace(point, circle=circle))
             yield point
 
     def speed_m_s(self, ball_radius_m: float) -> float:
@@ -235,8 +235,7 @@ class TrackedBall:
 
     def add_shake(self, std_px: float) -> None:
         """Note that a shaking camera moved the last circle by so much, 1 sigma: so much of a bend is no contact."""
-        last = self.path[-1]
-        self.path[-1] = PathPoint(last.end_us, last.circle, last.noise + std_px**2 * np.diag([1.0, 1.0, 0.0]))
+        self.path[-1] = replace(self.path[-1], shake_px=std_px)
 
     def coast(self, end_us: int) -> None:
         """Note a tick in which it was not measured."""

@@ -123,7 +123,10 @@ class _PathFit:
         self._times_s = np.array([(point.end_us - self.origin_us) * 1e-6 for point in points])
         circles = np.array([(c.x_px, c.y_px, c.radius_px) for point in points if (c := point.circle)])
         noises = np.array([point.noise for point in points])
-        self._values, self._weights, speed_px_s = kernels.edge_channels(self._times_s, circles, noises, ERRORS_PX2)
+        shakes_px2 = np.array([point.shake_px for point in points])[:, None] ** 2 * [1.0, 1.0, 0.0]
+        self._values, self._weights, speed_px_s = kernels.edge_channels(
+            self._times_s, circles, noises, ERRORS_PX2 + shakes_px2
+        )
         self._precisions = _precisions(speed_px_s, float(circles[-1, 2]), camera, ball_radius_m)
         self.smooth_cost = float(self._costs(np.empty(0))[0])
 

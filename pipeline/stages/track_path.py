@@ -38,11 +38,14 @@ class PathPoint:
         The measured circle, None if none was.
     noise : (3, 3) float64
         Covariance of its x, y and radius, px^2.
+    shake_px : float
+        1 sigma by which a shaking camera moved it across the view, along either axis.
     """
 
     end_us: int
     circle: Circle | None
     noise: Floats
+    shake_px: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +77,8 @@ class Places:
         """
         times_us = np.array([point.end_us for point in points], np.float64)
         circles = np.array([[c.x_px, c.y_px, c.radius_px] for point in points if (c := point.circle)])
-        centres_m, weights = _located(circles, camera, ball_radius_m)
+        shakes_px = np.array([point.shake_px for point in points])
+        centres_m, weights = _located(circles, shakes_px, camera, ball_radius_m)
         straddles = (times_us >= straddling_us[0]) & (times_us < straddling_us[1])
         weights[straddles] *= (CLEAN_EDGE_STD_PX / STRADDLING_STD_PX) ** 2
         span_s = (times_us[-1] - times_us[0]) * 1e-6
@@ -146,14 +150,16 @@ class HingedPath:
         return np.array([x[0], y[0], (x[1] - x[0]) * 1e6, (y[1] - y[0]) * 1e6, radius[0]])
 
 
-def _located(circles: Floats, camera: Camera, ball_radius_m: float) -> tuple[Floats, Floats]:
+def _located(circles: Floats, shakes_px: Floats, camera: Camera, ball_radius_m: float) -> tuple[Floats, Floats]:
     """Centres (n, 3) of balls in m, camera frame, and the inverses (n, 3, 3) of their covariances."""
     steps = circles[-1, :2] - circles[0, :2]
     ux, uy = steps / (math.hypot(*steps) or 1.0)
     # Errors of the edge ahead, of the place across the flight, and of the radius, which the centre makes up for.
-    edge, size = CLEAN_EDGE_STD_PX, CLEAN_RADIUS_STD_PX
-    modes_px = np.array([[edge * ux, edge * uy, 0.0], [-edge * uy, edge * ux, 0.0], [-size * ux, -size * uy, size]])
-    changed = (circles[:, None] + np.vstack([np.zeros(3), modes_px])).reshape(-1, 3)
+    edges, size = np.hypot(CLEAN_EDGE_STD_PX, shakes_px)[:, None], CLEAN_RADIUS_STD_PX
+    modes_px = np.zeros((len(circles), 4, 3))
+    modes_px[:, 1, :2], modes_px[:, 2, :2] = edges * [ux, uy], edges * [-uy, ux]
+    modes_px[:, 3] = -size * ux, -size * uy, size
+    changed = (circles[:, None] + modes_px).reshape(-1, 3)
     centres_m = camera.ball_centre_m(changed[:, 0], changed[:, 1], changed[:, 2], ball_radius_m).reshape(-1, 4, 3)
     errors_m = centres_m[:, 1:] - centres_m[:, :1]
     return centres_m[:, 0], np.asarray(np.linalg.inv(np.swapaxes(errors_m, 1, 2) @ errors_m))

@@ -36,7 +36,7 @@ def test_channels_equal_the_twins(seed: int, count: int, stays: bool) -> None:
     circles = rng.uniform(-300, 300, (count, 3))
     circles[-1, :2] = circles[0, :2] if stays else circles[-1, :2]
     roots = rng.normal(size=(count, 3, 3))
-    given_to = times_s, circles, roots @ np.swapaxes(roots, 1, 2), rng.uniform(0.01, 0.1, 3)
+    given_to = times_s, circles, roots @ np.swapaxes(roots, 1, 2), rng.uniform(0.01, 0.1, (count, 3))
     for found, expected in zip(hinged_path.edge_channels(*given_to), reference.edge_channels(*given_to), strict=True):
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
 
