@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.kernels.moving_circle import HALF_AHEAD, OF_DARK
 from spinscope.pipeline.results import Packet
 from spinscope.pipeline.stages import track, track_ball
 from spinscope.pipeline.stages.track import TrackParameters
@@ -34,6 +35,11 @@ def speed_known_to(share: float) -> np.ndarray:
     return np.diag([0.01, 0.01, 0.5 * (share * 5000.0) ** 2, 0.5 * (share * 5000.0) ** 2, 0.01])
 
 
+def radius_known_to(share: float) -> np.ndarray:
+    """Covariance with this standard deviation of the radius, as a share of it."""
+    return np.diag([0.01, 0.01, 100.0**2, 100.0**2, (share * RING[4]) ** 2])
+
+
 @pytest.mark.parametrize(
     ("enough", "too_little"),
     [
@@ -51,6 +57,36 @@ def test_one_outline_is_trusted_only_with_every_sign_of_a_ball(
 ) -> None:
     assert sighting().trusted
     assert sighting(**enough).trusted and not sighting(**too_little).trusted
+
+
+@pytest.mark.parametrize(
+    ("enough", "too_little"),
+    [
+        ({"ahead": 0.21}, {"ahead": 0.19}),
+        ({"behind": 0.21}, {"behind": 0.19}),
+        ({"clutter": 0.019}, {"clutter": 0.021}),
+        ({"covariance": speed_known_to(0.099)}, {"covariance": speed_known_to(0.101)}),
+        ({"covariance": radius_known_to(0.029)}, {"covariance": radius_known_to(0.031)}),
+    ],
+)
+def test_arcs_are_an_outline_only_with_every_sign_of_one(
+    enough: dict[str, object], too_little: dict[str, object]
+) -> None:
+    base = {"ahead": 0.33, "behind": 0.33, "clutter": 0.0}
+    assert sighting(**base).in_arcs and not sighting(**base).trusted
+    assert sighting(**base | enough).in_arcs and not sighting(**base | too_little).in_arcs
+
+
+def test_a_ball_seen_in_arcs_is_less_certain_along_its_motion() -> None:
+    packet = Packet(0, 0, 5000, EventBatch.empty())
+    half, whole = (
+        TrackedBall.at(sighting(part=part), MEASURING, 0, packet, "found").total_covariance()[:2, :2]
+        for part in (HALF_AHEAD, OF_DARK)
+    )
+    along = RING[2:4] / 5000.0
+    across = np.array([-along[1], along[0]])
+    assert math.isclose(along @ (whole - half) @ along, track_ball.ARCS_LAG_STD_PX**2)
+    assert abs(across @ (whole - half) @ across) < 1e-12
 
 
 @pytest.mark.parametrize(
