@@ -16,9 +16,12 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable, Collection, Hashable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from .camera import Camera
 from .errors import ParameterError
@@ -186,6 +189,19 @@ class EventsInMemory:
     def between(self, start_us: int, end_us: int) -> EventBatch:
         """The events of [start_us, end_us)."""
         return self.events.between(max(start_us, self.start_us), min(end_us, self.end_us))
+
+    @property
+    def event_count(self) -> int:
+        """Number of events."""
+        return len(self.events)
+
+    def rate(self, edges_us: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(n,) int64 numbers of events between n + 1 times."""
+        return np.diff(np.searchsorted(self.events.t_us, edges_us))
+
+    def part(self, identity: Hashable, start_us: int, end_us: int) -> EventsInMemory:
+        """The events of [start_us, end_us) as a source of its own."""
+        return replace(self, identity=identity, events=self.between(start_us, end_us), start_us=start_us, end_us=end_us)
 
 
 @dataclass(slots=True, eq=False)

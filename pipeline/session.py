@@ -13,9 +13,11 @@ from typing import Any
 from .camera import Camera, CameraParameters
 from .chain import Chain, EventsInMemory, Tick
 from .errors import ParameterError, RecordingError
+from .events import EventBatch
 from .presets import preset
 from .recordings import Recording, open_recording
 from .recordings.in_memory import RecordingInMemory
+from .recordings.streamed import RecordingPieces, StreamedEvents, events_of
 from .registry import STAGES, Parameters, methods
 from .results import Truth
 from .shots import Shot, ShotLog
@@ -28,9 +30,11 @@ SCHEMA = 1
 FRAMES_BYTES = 1_500_000_000  # full frames held for the viewer: 8 s of the paper's sensor at 200 Hz
 WARM_UP_TICKS = 4  # with flow, until the spin has been solved for and solved again
 TICKS_TOGETHER = 4  # ticks that a stage works through at a time: tracking costs a quarter less; more surfaces cost more
+FIXED_BALL_US = 10_000_000  # a ball on a spinner is looked for in the first 10 s: hundreds of turns
 MARGIN_US = 50_000  # shown before and after a shot of a long recording
 
 AnyRecording = Recording | RecordingInMemory
+RecordedEvents = EventsInMemory | StreamedEvents
 Progress = Callable[[float, str], None]  # share done (0..1) and what is being done
 
 
@@ -79,10 +83,11 @@ class Session:
     """An open recording, its events of the window, the parameters, and the chain that runs over them.
 
     `states_up` is whether the recording or the user gives camera.up.
+    The events of a long recording stay on disk and are read when they are needed.
     """
 
     recording: AnyRecording
-    source: EventsInMemory
+    source: RecordedEvents
     parameters: Parameters
     chain: Chain
     warnings: list[str] = field(default_factory=list)
@@ -97,24 +102,13 @@ class Session:
         choices: Choices = Choices(),  # frozen
         on_progress: Progress | None = None,
     ) -> Session:
-        """Open and read a recording; raises SpinscopeError with a remedy for whatever is wrong with it."""
+        """Open a recording and read it, or index a long one; raises SpinscopeError with a remedy for what is wrong."""
         warnings: list[str] = []
         parameters = choices.parameters(warnings.append)
         begin = time.perf_counter()
         if isinstance(recording, (str, Path)):
             recording = open_recording(Path(recording), sensor=choices.sensor_px)
-        start_us, end_us = choices.window_us or (None, None)
-        events = recording.read(
-            start_us,
-            end_us,
-            on_progress=(lambda share: on_progress(share, "reading")) if on_progress else None,
-        )
-        if not len(events):
-            raise RecordingError(_no_events(choices.window_us, recording.path))
-        window_us = choices.window_us or (int(events.t_us[0]), int(events.t_us[-1]) + 1)
-        source = EventsInMemory(
-            (recording.identity(), window_us), events, recording.width_px, recording.height_px, *window_us
-        )
+        source = _source(recording, choices.window_us, on_progress)
         read_seconds = time.perf_counter() - begin
         sidecar = Sidecar.beside(recording.path) if isinstance(recording, Recording) else Sidecar()
         parameters = _with_attributes(parameters, {**recording.attributes, **sidecar.parameters}, choices)
@@ -210,12 +204,9 @@ class Session:
 
     def clip(self, start_us: int, end_us: int, **chain_options: Any) -> Session:
         """A session of the part [start_us, end_us), with a chain of its own (`chain_options`: see `Chain`)."""
-        whole = self.source
-        source = whole
-        if (start_us, end_us) != (whole.start_us, whole.end_us):
-            identity = (self.recording.identity(), (start_us, end_us))
-            part = whole.events.between(start_us, end_us)
-            source = EventsInMemory(identity, part, whole.width_px, whole.height_px, start_us, end_us)
+        source = self.source
+        if (start_us, end_us) != (source.start_us, source.end_us):
+            source = source.part((self.recording.identity(), (start_us, end_us)), start_us, end_us)
         return dataclasses.replace(self, source=source, chain=_timed(source, **chain_options))
 
     def place_fixed_ball(self, fixed_ball: tuple[float, float, float] | str | None) -> None:
@@ -225,7 +216,8 @@ class Session:
         values: dict[str, Any] = {"ball": "fixed"}
         if fixed_ball == "auto":
             track = self.parameters.track
-            circle, std_px = find_fixed_ball(self.source.events, self.camera, track.radius_min_px, track.radius_max_px)
+            events = self.source.between(self.source.start_us, self.source.start_us + FIXED_BALL_US)
+            circle, std_px = find_fixed_ball(events, self.camera, track.radius_min_px, track.radius_max_px)
             values |= {
                 "fixed_x_px": circle.x_px,
                 "fixed_y_px": circle.y_px,
@@ -312,7 +304,7 @@ class Result:
             "schema": SCHEMA,
             "recording": {
                 "path": str(session.recording.path),
-                "events": len(session.source.events),
+                "events": session.source.event_count,
                 "duration_us": session.source.end_us - session.source.start_us,
                 "width": session.source.width_px,
                 "height": session.source.height_px,
@@ -346,7 +338,25 @@ def check_method(method: str) -> str:
     return method
 
 
-def _timed(source: EventsInMemory, **options: Any) -> Chain:
+def _source(recording: AnyRecording, window_us: tuple[int, int] | None, on_progress: Progress | None) -> RecordedEvents:
+    """The events of the window as a source; raises RecordingError where there are none."""
+    start_us, end_us = window_us or (None, None)
+    report = (lambda share: on_progress(share, "reading")) if on_progress else None
+    if isinstance(recording, RecordingInMemory):
+        events: EventBatch | RecordingPieces = recording.read(start_us, end_us)
+    else:
+        events = events_of(recording, start_us, end_us, report)
+    size_px = recording.width_px, recording.height_px
+    if isinstance(events, RecordingPieces):
+        window_us = window_us or (events.index.first_us, events.index.last_us + 1)
+        return StreamedEvents((recording.identity(), window_us), events, *size_px, *window_us)
+    if not len(events):
+        raise RecordingError(_no_events(window_us, recording.path))
+    window_us = window_us or (int(events.t_us[0]), int(events.t_us[-1]) + 1)
+    return EventsInMemory((recording.identity(), window_us), events, *size_px, *window_us)
+
+
+def _timed(source: RecordedEvents, **options: Any) -> Chain:
     return Chain(source, clock=time.perf_counter, **options)
 
 

@@ -252,7 +252,7 @@ def measure_folder(
             found.append(BiasSweepPoint(recording=path.name, error=str(error)))
             continue
         seconds = (clip.source.end_us - clip.source.start_us) * 1e-6
-        rates = _rates(clip.source.events, is_ball, ~is_ball, seconds)
+        rates = _rates(clip.source.between(clip.source.start_us, clip.source.end_us), is_ball, ~is_ball, seconds)
         found.append(BiasSweepPoint(recording=path.name, biases=biases.as_dict(), **rates))
         report(BiasSweep(None, len(known), list(found)))
     return BiasSweep(None, len(known), found)

@@ -142,7 +142,7 @@ class OpenRecording:
         """(n,) int64 events in bins of equal length and (n + 1,) int64 edges in us."""
         start_us, end_us = self.window_us
         edges = np.linspace(start_us, end_us, min(bins, end_us - start_us) + 1).round().astype(np.int64)
-        return np.diff(np.searchsorted(self.session.source.events.t_us, edges)), edges
+        return self.session.source.rate(edges), edges
 
     def note_costs(self, clip: Session, parameters: Parameters, seconds: Mapping[str, float]) -> None:
         """Add what the stages of a run took, by what their results are made from."""

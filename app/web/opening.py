@@ -65,7 +65,7 @@ def recording_description(recording: OpenRecording) -> RecordingDescription:
     start_us, end_us = recording.window_us
     return RecordingDescription(
         name=recording.original.name,
-        events=len(session.source.events),
+        events=session.source.event_count,
         width_px=session.source.width_px,
         height_px=session.source.height_px,
         start_us=start_us,

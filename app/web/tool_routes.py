@@ -109,7 +109,8 @@ def _add_ball(app: FastAPI, session_of: SessionOf) -> None:
     @app.get("/api/sessions/{session_id}/events.png")
     async def events_picture(session_id: str, start_us: int, end_us: int) -> Response:
         source = session_of(session_id).runner.recording.clip(start_us, end_us).source
-        made = await run_in_threadpool(exports.event_picture, source.events, source.width_px, source.height_px)
+        events = await run_in_threadpool(source.between, start_us, end_us)
+        made = await run_in_threadpool(exports.event_picture, events, source.width_px, source.height_px)
         return Response(made, media_type="image/png", headers={"cache-control": "no-store"})
 
     @app.post("/api/sessions/{session_id}/find_ball")
@@ -117,7 +118,8 @@ def _add_ball(app: FastAPI, session_of: SessionOf) -> None:
         clip, parameters = _clip_of(session_of(session_id), request)
         camera, track = clip.chain.camera(parameters), parameters.track
         limits = track.radius_min_px, track.radius_max_px
-        circle, std_px = await run_in_threadpool(find_fixed_ball, clip.source.events, camera, *limits)
+        events = await run_in_threadpool(clip.source.between, clip.source.start_us, clip.source.end_us)
+        circle, std_px = await run_in_threadpool(find_fixed_ball, events, camera, *limits)
         found = {"x": circle.x_px, "y": circle.y_px, "radius": circle.radius_px, "std": std_px}
         return {f"fixed_{name}_px": round(float(value), 2) for name, value in found.items() if math.isfinite(value)}
 

@@ -10,6 +10,8 @@ import numpy as np
 from ..errors import RecordingError
 from .reader import MAX_DISORDER_US, ReadPass, UncheckedEvents
 
+NO_TIME_US = -(2**63)  # before all times
+
 
 class TimeOrder:
     """Stable sort of a stream of events by time.
@@ -17,55 +19,64 @@ class TimeOrder:
     An event may come up to 10 ms behind the latest one before it (readout of several event buffers, a wrong
     time word): so the last 10 ms are held back until more has come. Events further behind are refused
     (RecordingError) if `strict`, and dropped and counted in `reading` otherwise, because earlier events are handed on.
+
+    Attributes
+    ----------
+    latest_us : int
+        Latest time of all events so far, those before the pass among them.
     """
 
-    def __init__(self, path: Path, reading: ReadPass, strict: bool) -> None:
+    def __init__(self, path: Path, reading: ReadPass, strict: bool, latest_us: int = NO_TIME_US) -> None:
         self._path, self._reading, self._strict = path, reading, strict
         self._events = 0  # pushed so far
         self._held: list[UncheckedEvents] = []
         self._held_in_order = True
         self._first_us = 2**63 - 1  # of those held
-        self._latest_us = -(2**63)  # of all events so far
-        self._before_us = -(2**63)  # of the event just before, in file order
+        self.latest_us = latest_us
+        self._before_us = NO_TIME_US  # of the event just before, in file order
 
     def sorted(self, parts: Iterable[UncheckedEvents]) -> Iterator[UncheckedEvents]:
         """Yield the events of all parts in order of time, in parts that are not empty."""
         for part in parts:
-            if sure := self._push(part):
-                yield sure
-        if any(map(len, self._held)):
-            yield self._joined()
+            yield from self._push(part)
+        yield from self._ordered()
 
-    def _push(self, new: UncheckedEvents) -> UncheckedEvents | None:
-        """Take the next events; returns those that no later event can precede, None when there are none."""
+    def _push(self, new: UncheckedEvents) -> Iterator[UncheckedEvents]:
+        """Take the next events; yields those that no later event can precede."""
         t_us = new.t_us
         backward = int(np.count_nonzero(t_us[1:] < t_us[:-1])) + (int(t_us[0]) < self._before_us)
-        in_order = not backward and int(t_us[0]) >= self._latest_us
+        in_order = not backward and int(t_us[0]) >= self.latest_us
         if not in_order:
             new = self._without_late(new)
         self._reading.damage.backward_steps += backward
         self._before_us = int(t_us[-1])
-        self._latest_us = int(t_us[-1]) if in_order else max(self._latest_us, int(t_us.max()))
+        self.latest_us = int(t_us[-1]) if in_order else max(self.latest_us, int(t_us.max()))
         self._events += t_us.size
         if len(new):
             self._held.append(new)
             self._held_in_order &= in_order
-            self._first_us = min(self._first_us, int(new.t_us.min()))
-        if self._first_us > self._latest_us - MAX_DISORDER_US:
-            return None
-        known = self._joined()
-        sure = int(np.searchsorted(known.t_us, self._latest_us - MAX_DISORDER_US, side="right"))
-        self._held, self._held_in_order = [known[sure:]], True
-        self._first_us = int(known.t_us[sure]) if sure < len(known) else 2**63 - 1
-        return known[:sure]
+            self._first_us = min(self._first_us, int(t_us[0]) if in_order else int(new.t_us.min()))
+        sure_us = self.latest_us - MAX_DISORDER_US
+        if self._first_us > sure_us:
+            return
+        known, self._held, self._held_in_order = self._ordered(), [], True
+        for part in known:
+            sure = int(np.searchsorted(part.t_us, sure_us, side="right"))
+            if sure < len(part):
+                self._held.append(part[sure:])
+            if sure:
+                yield part[:sure]
+        self._first_us = int(self._held[0].t_us[0]) if self._held else 2**63 - 1
 
-    def _joined(self) -> UncheckedEvents:
-        """The events held back, in order of time."""
+    def _ordered(self) -> list[UncheckedEvents]:
+        """The events held back, in parts in order of time."""
+        if self._held_in_order:
+            return self._held
         known = UncheckedEvents.concatenate(self._held)
-        return known if self._held_in_order else known[np.argsort(known.t_us, kind="stable")]
+        return [known[np.argsort(known.t_us, kind="stable")]]
 
     def _without_late(self, new: UncheckedEvents) -> UncheckedEvents:
-        latest_us = np.maximum(np.maximum.accumulate(new.t_us), self._latest_us)
+        latest_us = np.maximum(np.maximum.accumulate(new.t_us), self.latest_us)
         late = new.t_us < latest_us - MAX_DISORDER_US
         if not late.any():
             return new

@@ -13,11 +13,12 @@ import numpy as np
 from ..errors import RecordingError
 from ..events import EventBatch
 from ..results import Truth
-from .order import TimeOrder
-from .reader import CHUNK_EVENTS, Damage, FormatReader, Progress, ReadPass, Triggers, UncheckedEvents
+from .index import IndexBuilder, RecordingIndex
+from .order import NO_TIME_US, TimeOrder
+from .reader import CHUNK_EVENTS, Damage, FormatReader, Place, Progress, ReadPass, Triggers, UncheckedEvents
 from .sensor import KNOWN_SENSORS, Resolution, smallest_known
 
-HASH_ALL_BYTES = 64 << 20
+HASH_ALL_BYTES = 64 << 20  # larger files are large: half a second and more to read
 HASH_BLOCK_BYTES = 1 << 20
 EVENT_BYTES = 13  # 8 + 2 + 2 + 1
 
@@ -67,8 +68,8 @@ class Recording:
         Origin of this size: "file", "command line", "system_ID 49" or "guess".
     attributes : dict of str to str or float
         Root attributes or header lines of the file; `camera.focal_length_mm` and the like among them.
-    scanned : bool
-        Whether a pass over the whole file was made.
+    seeks : bool
+        Whether reading can begin anywhere in the file, once there is an index.
     t_offset_us : int or None
         DSEC's offset of the file's time; reported, never added.
     events : int or None
@@ -80,12 +81,13 @@ class Recording:
     ) -> None:
         self._reader = reader
         self._asked = asked
-        self._sensor_warnings: list[str] = []
         self._pass: ReadPass | None = None
-        self.scanned = False
-        sensor = self._chosen_sensor(on_progress)
-        self.width_px, self.height_px, self.sensor_from = sensor.width_px, sensor.height_px, sensor.origin
-        self.path, self.format = reader.path, reader.format
+        self._index: RecordingIndex | None = None
+        self.path, self.format, self.seeks = reader.path, reader.format, reader.seeks
+        self._sensor_warning = ""
+        self._sensor = self._chosen_sensor(on_progress)
+        self.width_px, self.height_px = self._sensor.width_px, self._sensor.height_px
+        self.sensor_from = self._sensor.origin
         self.attributes = dict(reader.attributes)
         self.t_offset_us, self.events = reader.t_offset_us, reader.events
 
@@ -102,32 +104,76 @@ class Recording:
 
     @property
     def warnings(self) -> list[str]:
-        """Assumptions made on opening, then the damage the last pass met, in sentences."""
-        damage = self._pass.damage.sentences() if self._pass is not None else []
-        return [*self._reader.warnings, *self._sensor_warnings, *damage]
+        """Assumptions made on opening, then the damage met so far, in sentences."""
+        met = self._index or self._pass
+        damage = met.damage.sentences() if met is not None else []
+        return [*self._reader.warnings, *filter(None, [self._sensor_warning]), *damage]
 
     @property
     def damage(self) -> Damage:
         """Counts of what is wrong in the whole file; makes a pass over it unless there was one."""
-        return self._scanned().damage
+        return self.index().damage
 
     @property
     def triggers(self) -> Triggers:
         """Edges on the trigger input in the whole file; makes a pass over it unless there was one."""
-        return Triggers.concatenate(self._scanned().triggers)
+        return self.index().triggers
+
+    @cached_property
+    def is_large(self) -> bool:
+        """Whether the file is so large that its index is kept in the user's cache."""
+        return self.path.stat().st_size > HASH_ALL_BYTES
+
+    def known_index(self) -> RecordingIndex | None:
+        """The index as far as it is known without a pass: from an earlier one, or from the user's cache."""
+        if self._index is None and self.is_large:
+            self._index = RecordingIndex.load(self._index_key())
+        return self._index
+
+    def index(self, on_progress: Progress | None = None) -> RecordingIndex:
+        """The index of the whole file; makes a pass over it unless it is known."""
+        known = self.known_index()
+        if known is None:
+            self.scan(on_progress)
+            known = self._index
+        assert known is not None
+        return known
 
     def scan(self, on_progress: Progress | None = None) -> None:
-        """Read the whole file once, for `damage`, `triggers` and `warnings`."""
+        """Read the whole file once, for its index."""
         for _ in self.chunks(on_progress=on_progress):
             pass
 
-    def chunks(self, max_events: int = CHUNK_EVENTS, on_progress: Progress | None = None) -> Iterator[EventBatch]:
-        """Yield all events in order of time, in constant memory: 1 to max_events at once.
+    def chunks(
+        self,
+        start_us: int | None = None,
+        end_us: int | None = None,
+        *,
+        max_events: int = CHUNK_EVENTS,
+        on_progress: Progress | None = None,
+    ) -> Iterator[EventBatch]:
+        """Yield the events of [start_us, end_us), or all, in order of time and in constant memory.
 
-        Raises RecordingError on the way, for what cannot be repaired; `Damage` counts what can. `on_progress` is called
-        with the share done, 0..1.
+        Parameters
+        ----------
+        start_us, end_us : int, optional
+            In the file's time; from the start, or to the end, without them.
+        max_events : int
+            Most events at once.
+        on_progress : callable, optional
+            Called with the share done, 0..1.
+
+        Yields
+        ------
+        EventBatch
+            Never empty.
+
+        Raises
+        ------
+        RecordingError
+            On the way, for what cannot be repaired; `Damage` counts what can.
         """
-        return self._batches(ReadPass(max_events, on_progress=on_progress))
+        return self._batches(ReadPass(max_events, start_us, end_us, on_progress))
 
     def read(
         self, start_us: int | None = None, end_us: int | None = None, on_progress: Progress | None = None
@@ -146,11 +192,10 @@ class Recording:
         RecordingError
             The events do not fit in memory, or cannot be read.
         """
-        reading = ReadPass(CHUNK_EVENTS, start_us, end_us, on_progress)
         most_events = _memory_bytes() // (3 * EVENT_BYTES)  # twice to join them, and room for the work on them
         parts: list[EventBatch] = []
         events = 0
-        for batch in self._batches(reading):
+        for batch in self.chunks(start_us, end_us, on_progress=on_progress):
             parts.append(batch)
             events += len(batch)
             if events > most_events:
@@ -164,17 +209,15 @@ class Recording:
         """Hash of the file; see `file_identity`."""
         return file_identity(self.path)
 
-    def _scanned(self) -> ReadPass:
-        if not self.scanned:
-            self.scan()
-        assert self._pass is not None
-        return self._pass
-
     def _chosen_sensor(self, on_progress: Progress | None) -> Resolution:
         if self._asked is not None:
             return self._asked
         if self._reader.stated is not None:
             return self._reader.stated
+        known = RecordingIndex.load(self._index_key()) if self.is_large else None
+        if known is not None:
+            self._index, self._sensor_warning = known, known.sensor_warning
+            return known.sensor
         columns_px, rows_px = self._extent_px(on_progress)
         size = smallest_known(columns_px, rows_px)
         if size is None:
@@ -183,7 +226,7 @@ class Recording:
                 f"the events reach over {columns_px} x {rows_px} pixels, more than the largest known sensor "
                 f"({largest[0]} x {largest[1]}): state it with --sensor WxH"
             )
-        self._sensor_warnings.append(
+        self._sensor_warning = (
             f"the file does not state its sensor: taken as {size[0]} x {size[1]}, the smallest known one that holds "
             f"the events (they reach over {columns_px} x {rows_px} pixels); --sensor WxH states it"
         )
@@ -197,19 +240,43 @@ class Recording:
             rows_px = max(rows_px, int(block.y.max()) + 1)
         return columns_px, rows_px
 
+    def _index_key(self) -> str:
+        """Name of the index in the cache: content of the file, and size of the sensor where the user states it."""
+        asked = "" if self._asked is None else f"-{self._asked.width_px}x{self._asked.height_px}"
+        return f"{self.identity()}{asked}"
+
+    def _start(self, reading: ReadPass) -> tuple[Place | None, int]:
+        """Place to begin at, and the latest time there may be before it."""
+        if reading.start_us is None or not self.seeks:
+            return None, NO_TIME_US
+        index = self.known_index()
+        if index is None:
+            place = self._reader.place_before(reading.start_us)
+            if place is not None or not self.is_large:
+                return place, NO_TIME_US
+            index = self.index(reading.on_progress)
+        return index.place(reading.start_us)
+
     def _batches(self, reading: ReadPass) -> Iterator[EventBatch]:
-        order = TimeOrder(self.path, reading, self._reader.strict_order)
+        reading.place, latest_us = self._start(reading)
+        order = TimeOrder(self.path, reading, self._reader.strict_order, latest_us)
         whole = reading.start_us is None and reading.end_us is None
-        start_us = -(2**63) if reading.start_us is None else reading.start_us
+        start_us = NO_TIME_US if reading.start_us is None else reading.start_us
         end_us = 2**63 - 1 if reading.end_us is None else reading.end_us
-        for columns in order.sorted(self._reader.columns(reading)):
+        builder = IndexBuilder()
+        for columns in order.sorted(builder.noting_places(self._reader.columns(reading), reading, order)):
             batch = self._on_sensor(columns, reading).between(start_us, end_us)
             for first in range(0, len(batch), reading.max_events):
-                yield batch[first : first + reading.max_events]
+                part = batch[first : first + reading.max_events]
+                builder.add(part)
+                yield part
             if int(columns.t_us[-1]) >= end_us:
                 break
-        if whole or not self.scanned:
-            self._pass, self.scanned = reading, whole
+        self._pass = reading
+        if whole:
+            self._index = builder.index(reading, self._sensor, self._sensor_warning)
+            if self.is_large:
+                self._index.save(self._index_key())
 
     def _on_sensor(self, columns: UncheckedEvents, reading: ReadPass) -> EventBatch:
         """Events on the sensor; others are dropped as damage, or show that --sensor is too small."""

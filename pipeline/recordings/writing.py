@@ -105,7 +105,7 @@ def convert(
 
     def triggers() -> Triggers:
         nonlocal read_share
-        if not recording.scanned:
+        if recording.known_index() is None:
             recording.scan(lambda share: report(share / 2))
             read_share = 0.5
         return recording.triggers

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import RecordingError
 from ..prophesee_header import MAX_HEADER_BYTES, parse_header
-from ..reader import FormatReader, ReadPass, UncheckedEvents, file_errors
+from ..reader import FormatReader, Place, ReadPass, UncheckedEvents, file_errors
 from ..sensor import resolution_or_none
 from .registry import FORMATS, RecordingFormat
 
@@ -23,6 +23,7 @@ class DatReader(FormatReader):
 
     format = "DAT"
     strict_order = False
+    seeks = True
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
@@ -43,9 +44,9 @@ class DatReader(FormatReader):
 
     def columns(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
         """Yield the events; times that fall by more than half of the 32 bits have wrapped (after 71 minutes)."""
-        before, turns = 0, 0
+        start, (before, turns) = reading.place or Place(self._start, (0, 0))
         with file_errors(self.path, "DAT"), open(self.path, "rb") as file:
-            file.seek(self._start)
+            file.seek(start)
             while block := file.read(reading.max_events * EVENT_BYTES):
                 lost = len(block) % EVENT_BYTES
                 events = np.frombuffer(block[: len(block) - lost], FIELDS)
@@ -55,6 +56,7 @@ class DatReader(FormatReader):
                 t = events["t"].astype(np.int64)
                 wraps = np.cumsum(np.diff(t, prepend=before) < -(1 << 31)) + turns
                 before, turns = int(t[-1]), int(wraps[-1])
+                reading.place = Place(file.tell() - lost, (before, turns))
                 pixel = events["pixel"]
                 yield UncheckedEvents(t + (wraps << 32), pixel & 0x3FFF, (pixel >> 14) & 0x3FFF, pixel >> 28 != 0)
                 reading.report(file.tell() - self._start, self._end - self._start)

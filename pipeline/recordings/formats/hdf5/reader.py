@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ....errors import RecordingError
 from ....results import Truth
 from ...column_types import ColumnTypes, check_expansion, check_types, named_columns
-from ...reader import MAX_DISORDER_US, FormatReader, ReadPass, Triggers, UncheckedEvents, file_errors
+from ...reader import MAX_DISORDER_US, FormatReader, Place, ReadPass, Triggers, UncheckedEvents, file_errors
 from ...sensor import Resolution, geometry_or_none, resolution_or_none
 from .heap import check_heap
 
@@ -28,6 +28,8 @@ TRIGGERS = "EXT_TRIGGER/events"
 
 class Hdf5Reader(FormatReader):
     """Reader of one HDF5 recording."""
+
+    seeks = True
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
@@ -46,16 +48,17 @@ class Hdf5Reader(FormatReader):
             self.warnings.append(self._types.warning)
 
     def columns(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
-        """Yield the events; rows far outside the requested times are skipped by bisection."""
+        """Yield the events."""
         with file_errors(self.path, "HDF5"), h5py.File(self.path, "r") as file:
             table = Hdf5Table(file, self.path)
             if TRIGGERS in file:
                 reading.triggers.append(_triggers(file[TRIGGERS]))
-            first = 0 if reading.start_us is None else self._row_before(table, reading.start_us)
+            first = 0 if reading.place is None else reading.place.offset
             reading.first_row = first
             for row in range(first, table.rows, reading.max_events):
                 upto = min(row + reading.max_events, table.rows)
                 block = self._types.columns(row, *table.rows_of(row, upto))
+                reading.place = Place(upto)
                 yield block
                 reading.report(upto - first, table.rows - first)
                 if reading.is_past(int(block.t_us[-1])):
@@ -68,18 +71,20 @@ class Hdf5Reader(FormatReader):
                 return None
             return _truth(file["truth"], self.events or 0, self.path)
 
-    def _row_before(self, table: Hdf5Table, start_us: int) -> int:
-        """Row before which all events are earlier than start_us, close to the first that is not."""
-        low, high = 0, table.rows  # invariant: all rows before low are early
-        while high - low > 1:
-            middle = (low + high) // 2
-            t_us = self._types.columns(middle, *table.rows_of(middle, middle + 1)).t_us
-            # Later events may be up to 10 ms earlier than this one, earlier events up to 10 ms later.
-            if int(t_us[0]) + MAX_DISORDER_US < start_us:
-                low = middle
-            else:
-                high = middle
-        return low
+    def place_before(self, start_us: int) -> Place | None:
+        """Find the place by bisection, close to the first event that is not earlier."""
+        with file_errors(self.path, "HDF5"), h5py.File(self.path, "r") as file:
+            table = Hdf5Table(file, self.path)
+            low, high = 0, table.rows  # invariant: all rows before low are early
+            while high - low > 1:
+                middle = (low + high) // 2
+                t_us = self._types.columns(middle, *table.rows_of(middle, middle + 1)).t_us
+                # Later events may be up to 10 ms earlier than this one, earlier events up to 10 ms later.
+                if int(t_us[0]) + MAX_DISORDER_US < start_us:
+                    low = middle
+                else:
+                    high = middle
+            return Place(low)
 
 
 class Hdf5Table:

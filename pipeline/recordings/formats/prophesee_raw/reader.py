@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ....errors import RecordingError
 from ...prophesee_header import MAX_HEADER_BYTES, parse_header
-from ...reader import FormatReader, ReadPass, Triggers, UncheckedEvents, file_errors
+from ...reader import FormatReader, Place, ReadPass, Triggers, UncheckedEvents, file_errors
 from ...sensor import SENSOR_OF_SYSTEM_ID, Resolution, geometry_or_none, resolution_or_none
 from .decoding import BAD_WORDS, EVENTS, OUTSIDE, TIME_HIGH, TIME_JUMPS, TRIGGERS, UNTIMED, Decoded, initial_state
 from .evt2 import HIGH_BITS, HIGH_MASK, decode_evt2
@@ -26,6 +26,7 @@ class RawReader(FormatReader):
     """Reader of one RAW recording."""
 
     strict_order = False
+    seeks = True
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
@@ -41,11 +42,12 @@ class RawReader(FormatReader):
         self._legacy = two_halves and self._is_legacy(options.get("endianness", ""), head[self._start :])
 
     def columns(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
-        """Yield the events, decoded from the start: only the words before tell the time."""
+        """Yield the events; only the words before, or a decoder's state there, tell the time."""
+        reading.place = reading.place or Place(self._start, tuple(initial_state().tolist()))
         decoder = RawDecoder(self._encoding, self._legacy, reading)
         with file_errors(self.path, "RAW"), open(self.path, "rb") as file:
             size = file.seek(0, 2)
-            file.seek(self._start)
+            file.seek(reading.place.offset)
             while block := file.read(READ_BYTES):
                 yield from decoder.feed(block, final=False)
                 reading.report(file.tell(), size)
@@ -70,15 +72,17 @@ class RawReader(FormatReader):
 
 
 class RawDecoder:
-    """Stream decoder of EVT2, EVT2.1 or EVT3: bytes in blocks of any size in, events out.
+    """Stream decoder of EVT2, EVT2.1 or EVT3 from `reading.place` on: bytes in blocks of any size in, events out.
 
-    `legacy` is EVT2.1 with the half that holds the type first. Damage and triggers are added to `reading`.
+    `legacy` is EVT2.1 with the half that holds the type first. Damage and triggers are added to `reading`, whose place
+    goes with the events.
     """
 
     def __init__(self, encoding: str, legacy: bool, reading: ReadPass) -> None:
         self._encoding, self._legacy, self._reading = encoding, legacy, reading
         self._word_bytes = WORD_BYTES[encoding]
-        self._state = initial_state()
+        place = reading.place or Place(0, tuple(initial_state().tolist()))
+        self._offset, self._state = place.offset, np.array(place.state)
         self._rest = b""
 
     def feed(self, block: bytes, final: bool) -> Iterator[UncheckedEvents]:
@@ -89,11 +93,13 @@ class RawDecoder:
         while done < count:
             used, columns = self._decode(data[done * self._word_bytes : count * self._word_bytes], final)
             done += used
+            self._reading.place = Place(self._offset + done * self._word_bytes, tuple(self._state.tolist()))
             if len(columns):
                 yield columns
             if not used:
                 break  # the last TIME_HIGH waits for the next one
         self._rest = data[done * self._word_bytes :]
+        self._offset += done * self._word_bytes
         damage, state = self._reading.damage, self._state.tolist()
         damage.bad_words, damage.time_jumps = state[BAD_WORDS], state[TIME_JUMPS]
         damage.untimed_events = state[UNTIMED]
