@@ -374,6 +374,7 @@ class Chain:
                     one.values[stage.name] = run.result(stage, column, one.index, one.values)
             for results, flying in zip(rows, balls, strict=True):
                 yield run.tick(of_ball, results, flying)
+            run.let_go_of_ended_shots()
             self._keep_budget(run.columns_in_use)
 
     def _packet(self, tick_us: int, index: int) -> Packet:
@@ -508,6 +509,15 @@ class _Run:
                 balls[-1].append(_BallInputs(number, evidence, values))
         self._evidence = {ball.shot: rows[-1].evidence for ball, rows in zip(track.balls, balls, strict=True)}
         return balls
+
+    def let_go_of_ended_shots(self) -> None:
+        """Let the budget have the columns of shots that are over, and drop those whose results are not kept."""
+        ended = [name for name in self._columns if name[1] is not None and name[1] not in self._evidence]
+        for name in ended:
+            column = self._columns.pop(name)
+            if not column.is_kept:
+                with self._chain._lock:
+                    self._chain._columns.pop(column.key, None)
 
     def tick(self, of_ball: list[Stage], results: dict[str, Any], balls: list[list[_BallInputs]]) -> Tick:
         """The tick with all results."""

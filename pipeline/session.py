@@ -164,7 +164,7 @@ class Session:
     def estimate(self, method: str = "all", on_progress: Progress | None = None) -> Result:
         """Estimate the spin of every shot of the window.
 
-        Keeps no full frames, so that it works for recordings of any length.
+        Keeps nothing of a tick but what its shots need, so that it works for recordings of any length.
 
         Parameters
         ----------
@@ -173,7 +173,7 @@ class Session:
         on_progress : callable, optional
             Told the share done and what is being done.
         """
-        log = ShotLog.of(self.ticks(method_targets(method), on_progress, forget=("surface",)))
+        log = ShotLog.of(self.ticks(method_targets(method), on_progress, forget=STAGES.names))
         return Result(self, tuple(log.shots), log.no_shot_reason, method=method)
 
     def estimate_keeping_ticks(self, on_progress: Progress | None = None) -> Result:

@@ -207,6 +207,10 @@ class ShotLog:
         for shot, rows in list(self._flying.items()):
             self._end(ShotEnd(shot, rows[-1].end_us, "end"))
 
+    def __len__(self) -> int:
+        """Number of the shots that have ended."""
+        return len(self._ended)
+
     @property
     def shots(self) -> list[Shot]:
         """The shots that have ended, in order of their start."""

@@ -201,7 +201,8 @@ class OpenRecording:
         self.found_us = []
         for index, tick in enumerate(chain.run(parameters, ("track",), forget=STAGES.names)):
             log.add(tick)
-            self.found_us = [(shot.start_us, shot.end_us) for shot in log.shots]
+            if len(log) != len(self.found_us):
+                self.found_us = [(shot.start_us, shot.end_us) for shot in log.shots]
             yield (index + 1) / count
         log.close()
         self.found_us = [(shot.start_us, shot.end_us) for shot in log.shots]

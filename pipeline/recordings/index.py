@@ -101,7 +101,7 @@ class RecordingIndex:
     @classmethod
     def load(cls, key: str) -> RecordingIndex | None:
         """The index kept under this key, None where there is none that can be read."""
-        with suppress(*FILE_ERRORS), np.load(_file(key), allow_pickle=False) as kept:
+        with suppress(*FILE_ERRORS), open(_file(key), "rb") as file, np.load(file, allow_pickle=False) as kept:
             events, first_us, last_us, *damage = kept["numbers"].tolist()
             (width_px, height_px), (origin, warning) = kept["sensor"].tolist(), kept["texts"].tolist()
             return cls(
