@@ -11,13 +11,13 @@ from tempfile import TemporaryDirectory
 from spinscope.app.viewer.drawing_cache import DrawingCache
 from spinscope.pipeline.errors import ParameterError, RecordingError
 from spinscope.pipeline.recordings import readable_suffixes
-from spinscope.pipeline.session import Choices
+from spinscope.pipeline.session import Choices, Progress
 
 from .client_session import ClientSession
 from .open_recording import VIEW_FRAMES_BYTES, OpenRecording
 from .shot_detection_job import ShotDetectionJob
 
-RECORDINGS_KEPT = 2  # each holds its events: 20 s of a rally are 260 MB
+RECORDINGS_KEPT = 2  # each holds up to 110 MB of events
 SESSIONS_MOST = 16
 ALONE_S = 20.0  # a session without its browser for so long is closed; a reload takes less
 
@@ -58,7 +58,7 @@ class AppState:
         self.sessions: dict[str, ClientSession] = {}
         self._lock = threading.Lock()
 
-    def recording(self, name: str | None = None) -> OpenRecording:
+    def recording(self, name: str | None = None, on_progress: Progress | None = None) -> OpenRecording:
         """The recording of that name in the folder, opened when it is not yet; raises SpinscopeError."""
         path = self.path if name is None else self._inside(name)
         with self._lock:
@@ -66,7 +66,7 @@ class AppState:
             if recording is None:
                 choices = self._choices if path == self.path else self._choices.for_others
                 frames_bytes = None if self.tools else VIEW_FRAMES_BYTES
-                recording = OpenRecording.open(path, choices, frames_bytes=frames_bytes)
+                recording = OpenRecording.open(path, choices, frames_bytes=frames_bytes, on_progress=on_progress)
             self._recordings[path] = recording
             while len(self._recordings) > RECORDINGS_KEPT:
                 detection = self._detections.pop(self._recordings.popitem(last=False)[0], None)

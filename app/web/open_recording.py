@@ -18,7 +18,7 @@ from spinscope.app.tuning.clip_run import MOST_FRAMES_BYTES
 from spinscope.pipeline.chain import Chain
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.registry import STAGES, Parameters
-from spinscope.pipeline.session import Choices, Session
+from spinscope.pipeline.session import Choices, Progress, Session
 from spinscope.pipeline.shots import ShotLog
 
 CHAIN_BYTES = 160_000_000  # a clip's columns: eight surfaces of a flight of 100 ms
@@ -42,7 +42,7 @@ class OpenRecording:
     Parameters
     ----------
     session : Session
-        All events of the window, and the parameters chosen on the command line.
+        The events of the window, and the parameters chosen on the command line.
     choices : Choices
         What was chosen on the command line.
     original : Path
@@ -75,10 +75,15 @@ class OpenRecording:
 
     @classmethod
     def open(
-        cls, path: Path, choices: Choices, original: Path | None = None, frames_bytes: int | None = None
+        cls,
+        path: Path,
+        choices: Choices,
+        original: Path | None = None,
+        frames_bytes: int | None = None,
+        on_progress: Progress | None = None,
     ) -> OpenRecording:
-        """Open a recording and read it once; raises SpinscopeError."""
-        return cls(Session.open(path, choices), choices, original or path, frames_bytes)
+        """Open a recording and read or index it; raises SpinscopeError."""
+        return cls(Session.open(path, choices, on_progress), choices, original or path, frames_bytes)
 
     @property
     def is_resimulated(self) -> bool:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import uvicorn
 
-from spinscope.app.terminal import note
+from spinscope.app.terminal import ProgressBar, note
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.session import Choices
 
@@ -69,7 +69,8 @@ def serve(
         For a recording or choices that cannot be used, or when no port can be opened.
     """
     state = AppState(path, choices, tools=tools, layout=layout, followed=followed)
-    recording = state.recording()
+    with ProgressBar() as bar:
+        recording = state.recording(on_progress=bar)
     # While the browser loads the page and the viewer, which takes longer.
     threading.Thread(target=_load_kernels, args=(recording,), name="kernels", daemon=True).start()
     listening = listening_socket(PORT if port is None else port)
