@@ -6,6 +6,7 @@ from pathlib import Path
 
 from ..errors import RecordingError
 from .formats.registry import FORMATS, HEAD_BYTES
+from .isolated_reader import IsolatedReader
 from .reader import Progress
 from .recording import Recording
 from .sensor import stated_resolution
@@ -52,7 +53,8 @@ def open_recording(
         head = _head(path)
         for format in FORMATS:
             if format.sniff(path, head):
-                return Recording(format.open(path), stated, on_progress)
+                reader = IsolatedReader(format.open, path) if format.isolated else format.open(path)
+                return Recording(reader, stated, on_progress)
         raise _unknown(path, head)
     except RecordingError as error:
         if str(path) in str(error):

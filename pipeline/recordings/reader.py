@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+import tokenize
 import zipfile
 import zlib
 from abc import ABC, abstractmethod
@@ -27,7 +29,8 @@ MAX_DISORDER_US = 10_000  # events up to this far behind an earlier one are put 
 # Whatever the libraries below throw at damaged files; none of it may reach the user as a traceback.
 FILE_ERRORS = (
     *(OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError, NotImplementedError),
-    *(AttributeError, IndexError, EOFError, SystemError, zlib.error, zipfile.BadZipFile),
+    *(AttributeError, IndexError, EOFError, SystemError, zlib.error, zipfile.BadZipFile, struct.error),
+    *(SyntaxError, tokenize.TokenError),  # of the headers of NumPy's arrays
 )
 
 

@@ -174,5 +174,6 @@ FORMATS.register(
         sniff=lambda path, head: head.startswith(b"PK"),
         open=NpzReader,
         write=write_npz,
+        isolated=True,
     )
 )

@@ -59,6 +59,9 @@ class RecordingFormat:
         `open(path)` returns the reader of a file; raises RecordingError when it cannot be read.
     write : callable or None
         `write(path, content)` writes a new file; raises OSError or RecordingError. None for a format only read.
+    isolated : bool
+        Whether files are opened and read in a process with limits: for those read through a foreign library. The reader
+        has to be picklable before and after a pass, and `open` a function of a module.
     keeps_truth : bool
         Whether written files hold truth and scene of a simulation.
     """
@@ -69,6 +72,7 @@ class RecordingFormat:
     sniff: Callable[[Path, bytes], bool]
     open: Callable[[Path], FormatReader]
     write: Callable[[Path, RecordingContent], None] | None = None
+    isolated: bool = False
     keeps_truth: bool = False
 
     @property

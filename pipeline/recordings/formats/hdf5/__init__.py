@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from ....isolation import without_time_limit
 from ...reader import FormatReader
 from ..registry import FORMATS, RecordingContent, RecordingFormat
 
@@ -16,7 +17,8 @@ def _sniff(path: Path, head: bytes) -> bool:
 
 
 def _open(path: Path) -> FormatReader:
-    from .reader import Hdf5Reader  # h5py takes 0.1 s to load
+    with without_time_limit():
+        from .reader import Hdf5Reader  # h5py takes 0.1 s to load
 
     return Hdf5Reader(path)
 
@@ -29,6 +31,13 @@ def _write(path: Path, content: RecordingContent) -> None:
 
 FORMATS.register(
     RecordingFormat(
-        name="hdf5", label="HDF5", suffixes=(".h5", ".hdf5"), sniff=_sniff, open=_open, write=_write, keeps_truth=True
+        name="hdf5",
+        label="HDF5",
+        suffixes=(".h5", ".hdf5"),
+        sniff=_sniff,
+        open=_open,
+        write=_write,
+        isolated=True,
+        keeps_truth=True,
     )
 )

@@ -15,6 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ....errors import RecordingError
+from ....isolation import without_time_limit
 
 Bytes = NDArray[np.uint8]
 
@@ -40,6 +41,8 @@ class EcfRows:
         self._block_rows = int(data.chunks[0])
         if self._block_rows > 1 << 22:  # Prophesee writes 16384
             raise RecordingError(f"ECF blocks of {self._block_rows} events: the file is damaged: {path}")
+        with without_time_limit():
+            decode_ecf(_empty_block(0), np.frombuffer(bytes(PAD_BYTES), np.uint8))  # compiles
 
     def rows_of(self, first: int, upto: int) -> tuple[NDArray[Any], ...]:
         """Decode t, x, y and p of rows [first, upto)."""

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....errors import RecordingError
+from ....isolation import without_time_limit
 from ....results import Truth
 from ...column_types import ColumnTypes, check_expansion, check_types, named_columns
 from ...reader import MAX_DISORDER_US, FormatReader, Place, ReadPass, Triggers, UncheckedEvents, file_errors
 from ...sensor import Resolution, geometry_or_none, resolution_or_none
-from .heap import check_heap
+from .storage import own_dataset
 
 if TYPE_CHECKING:
     from .ecf import EcfRows
@@ -35,12 +36,10 @@ class Hdf5Reader(FormatReader):
         super().__init__(path)
         with file_errors(path, "HDF5"), h5py.File(path, "r") as file:
             table = Hdf5Table(file, path)
-            if any(_has_texts(place) for place in table.attribute_places):
-                check_heap(path)
             self.format, self.events = table.format, table.rows
             self.attributes = _attributes(file, file.attrs)
             self.stated = _stated_sensor(table.attribute_places, self.warnings)
-            self.t_offset_us = _t_offset_us(file)
+            self.t_offset_us = _t_offset_us(file, path)
             first = table.rows_of(0, min(SAMPLED_ROWS, table.rows))[0]
             last = table.rows_of(max(table.rows - SAMPLED_ROWS, 0), table.rows)[0]
         self._types = ColumnTypes(path, np.concatenate([first, last]))
@@ -52,7 +51,7 @@ class Hdf5Reader(FormatReader):
         with file_errors(self.path, "HDF5"), h5py.File(self.path, "r") as file:
             table = Hdf5Table(file, self.path)
             if TRIGGERS in file:
-                reading.triggers.append(_triggers(file[TRIGGERS]))
+                reading.triggers.append(_triggers(own_dataset(file[TRIGGERS], self.path)))
             first = 0 if reading.place is None else reading.place.offset
             reading.first_row = first
             for row in range(first, table.rows, reading.max_events):
@@ -117,7 +116,8 @@ class Hdf5Table:
         return tuple(np.ascontiguousarray(records[self._names[c]]) for c in "txyp")
 
     def _check_storage(self, data: h5py.Dataset) -> None:
-        """Refuse missing blocks (HDF5 would read zeros), decompression bombs, and unknown filters."""
+        """Refuse other files, missing blocks (HDF5 would read zeros), decompression bombs, and unknown filters."""
+        own_dataset(data, self._path)
         unpacked = self.rows * data.dtype.itemsize
         if data.chunks is not None:
             chunks = -(-self.rows // data.chunks[0])
@@ -129,7 +129,7 @@ class Hdf5Table:
                 )
             if self._undo_filters(data):
                 return
-        elif data.id.get_storage_size() < unpacked and data.external is None:
+        elif data.id.get_storage_size() < unpacked:
             raise RecordingError(f"{data.name} is not all in the file: copy or export it again: {self._path}")
         check_expansion(data.id.get_storage_size(), unpacked, self._path)
 
@@ -138,13 +138,15 @@ class Hdf5Table:
         filters = data.id.get_create_plist()
         codes = [filters.get_filter(i)[0] for i in range(filters.get_nfilters())]
         if codes == [ECF_FILTER] and self._compound:
-            from .ecf import EcfRows  # compiles a decoder
+            with without_time_limit():
+                from .ecf import EcfRows
 
             self._ecf = EcfRows(data, self._path)
             return True
         missing = [code for code in codes if not h5py.h5z.filter_avail(code)]
         if missing:
-            import hdf5plugin  # noqa: F401  registers blosc, zstd and more; 0.1 s to load
+            with without_time_limit():
+                import hdf5plugin  # noqa: F401  registers blosc, zstd and more; 0.1 s to load
 
             missing = [code for code in missing if not h5py.h5z.filter_avail(code)]
         if missing:
@@ -216,17 +218,11 @@ def _stated_sensor(places: list[h5py.HLObject], warnings: list[str]) -> Resoluti
     return None
 
 
-def _has_texts(place: h5py.Group | h5py.Dataset) -> bool:
-    """Whether there are attributes of variable length, which HDF5 looks up in its heap."""
-    attributes = place.attrs
-    return any(h5py.check_dtype(vlen=attributes.get_id(name).dtype) is not None for name in attributes)
-
-
-def _t_offset_us(file: h5py.File) -> int | None:
+def _t_offset_us(file: h5py.File, path: Path) -> int | None:
     item = file.get("t_offset")
     if not isinstance(item, h5py.Dataset) or item.size != 1:
         return None
-    return int(np.asarray(item[()]).reshape(-1)[0])
+    return int(np.asarray(own_dataset(item, path)[()]).reshape(-1)[0])
 
 
 def _triggers(data: h5py.Dataset) -> Triggers:
@@ -235,7 +231,7 @@ def _triggers(data: h5py.Dataset) -> Triggers:
 
 
 def _truth(group: h5py.Group, events: int, path: Path) -> Truth:
-    columns = {name: group[name][:] for name in Truth.__slots__}
+    columns = {name: own_dataset(group[name], path)[:] for name in Truth.__slots__}
     label, rows = columns.pop("label"), columns["t_us"].size
     vectors = ("position_m", "velocity_m_s", "spin_rps")
     if any(column.shape != ((rows, 3) if name in vectors else (rows,)) for name, column in columns.items()):
