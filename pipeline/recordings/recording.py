@@ -16,7 +16,7 @@ from ..results import Truth
 from .index import IndexBuilder, RecordingIndex
 from .order import NO_TIME_US, TimeOrder
 from .reader import CHUNK_EVENTS, Damage, FormatReader, Place, Progress, ReadPass, Triggers, UncheckedEvents
-from .sensor import KNOWN_SENSORS, Resolution, smallest_known
+from .sensor import KNOWN_SENSORS, Resolution, check_resolution, smallest_known
 
 HASH_ALL_BYTES = 64 << 20  # larger files are large: half a second and more to read
 HASH_BLOCK_BYTES = 1 << 20
@@ -213,6 +213,7 @@ class Recording:
         if self._asked is not None:
             return self._asked
         if self._reader.stated is not None:
+            check_resolution(self._reader.stated)
             return self._reader.stated
         known = RecordingIndex.load(self._index_key()) if self.is_large else None
         if known is not None:

@@ -11,7 +11,9 @@ from ..errors import RecordingError
 KNOWN_SENSORS = ((304, 240), (346, 260), (320, 320), (640, 480), (1280, 720), (1280, 800), (1280, 960))
 # Old Prophesee RAW files state no size but the number of their camera system.
 SENSOR_OF_SYSTEM_ID = {21: (640, 480), 48: (1280, 720), 49: (1280, 720)}
-MAX_SIZE_PX = 65535
+# 13 times as many as the largest sensor has: `info` then takes 0.3 GB, whatever size a file states.
+MAX_PIXELS = 1 << 24
+MAX_SIDE_PX = 8192
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,26 +26,39 @@ class Resolution:
 
 
 def stated_resolution(width: object, height: object, origin: str) -> Resolution:
-    """Resolution from two values of a file or of the user; raises RecordingError for nonsense."""
-    try:
-        size = int(width), int(height)  # type: ignore[call-overload]
-    except (TypeError, ValueError, OverflowError):
-        size = (0, 0)
-    if not (0 < size[0] <= MAX_SIZE_PX and 0 < size[1] <= MAX_SIZE_PX):
+    """Resolution from two values of the user; raises RecordingError for nonsense and for what is too large."""
+    resolution = Resolution(*_size(width, height), origin)
+    check_resolution(resolution)
+    return resolution
+
+
+def check_resolution(resolution: Resolution) -> None:
+    """Raise RecordingError for a sensor that there is none of, before memory is taken for its pixels."""
+    width_px, height_px = resolution.width_px, resolution.height_px
+    possible = 0 < width_px <= MAX_SIDE_PX and 0 < height_px <= MAX_SIDE_PX and width_px * height_px <= MAX_PIXELS
+    if not possible:
         raise RecordingError(
-            f"sensor size {width} x {height} from the {origin} is not 1 to {MAX_SIZE_PX} pixels each way: "
+            f"sensor size {width_px:.7g} x {height_px:.7g} from the {resolution.origin} is not 1 to {MAX_SIDE_PX} "
+            f"pixels each way, {MAX_PIXELS / 1e6:.1f} million at most: "
             "state it with --sensor WxH, like --sensor 1280x720"
         )
-    return Resolution(*size, origin)
 
 
 def resolution_or_none(width: object, height: object, warnings: list[str]) -> Resolution | None:
-    """Resolution from two values of a file; None with a warning added when they are nonsense."""
+    """Resolution from two values of a file; None with a warning added when they are no size."""
+    size = _size(width, height)
+    if min(size) > 0:
+        return Resolution(*size, "file")
+    warnings.append(f"the file's sensor size {width!s:.20} x {height!s:.20} px makes no sense: ignored")
+    return None
+
+
+def _size(width: object, height: object) -> tuple[int, int]:
+    """Two values as whole numbers, (0, 0) where they are none."""
     try:
-        return stated_resolution(width, height, "file")
-    except RecordingError:
-        warnings.append(f"the file's sensor size {width!s:.20} x {height!s:.20} px makes no sense: ignored")
-        return None
+        return int(width), int(height)  # type: ignore[call-overload]
+    except (TypeError, ValueError, OverflowError):
+        return 0, 0
 
 
 def geometry_or_none(text: str, warnings: list[str]) -> Resolution | None:

@@ -16,7 +16,7 @@ from ..results import Truth
 from .formats.registry import RecordingContent, format_to_write
 from .opening import open_recording
 from .reader import Progress, Triggers
-from .sensor import MAX_SIZE_PX
+from .sensor import Resolution, check_resolution
 
 # Attributes about the encoding of a file, which every format states itself.
 ENCODING_KEYS = ("format", "evt", "geometry", "width", "height", "end")
@@ -132,10 +132,7 @@ def _write(content: RecordingContent) -> None:
     path = content.path
     format = format_to_write(path)
     assert format.write is not None
-    if not (0 < content.width_px <= MAX_SIZE_PX and 0 < content.height_px <= MAX_SIZE_PX):
-        raise RecordingError(
-            f"sensor of {content.width_px} x {content.height_px} px: 1 to {MAX_SIZE_PX} are allowed: {path}"
-        )
+    check_resolution(Resolution(content.width_px, content.height_px, "events to be written"))
     attributes = {name: value for name, value in content.attributes.items() if name not in ENCODING_KEYS}
     with atomic_file(path, "recording") as part:
         try:

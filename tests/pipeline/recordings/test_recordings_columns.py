@@ -375,10 +375,9 @@ def test_objects_in_npz_are_refused_without_opening_them(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("kind", ["h5", "npz"])
-def test_bombs_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
-    """Zeros that pack a thousand times; what is too small to be refused is lowered to 1 MB."""
-    monkeypatch.setattr("spinscope.pipeline.recordings.column_types.EXPANSION_FREE_BYTES", 1 << 20)
-    path, zeros = tmp_path / f"bomb.{kind}", dict.fromkeys("txyp", np.zeros(3_000_000, np.int8))
+def test_bombs_are_refused(tmp_path: Path, kind: str) -> None:
+    """Zeros that pack a thousand times."""
+    path, zeros = tmp_path / f"bomb.{kind}", dict.fromkeys("txyp", np.zeros(70_000_000, np.int8))
     if kind == "h5":
         write_columns(path, zeros, chunks=(1_000_000,), compression="gzip", compression_opts=9)
     else:
@@ -475,28 +474,3 @@ def test_hdf5_behind_a_user_block_is_read(tmp_path: Path) -> None:
         for name, values in some_columns().items():
             file[f"events/{name}"] = values
     assert_columns(open_recording(tmp_path / "a.h5").read(), some_columns())
-
-
-@pytest.mark.parametrize("places", ["root", "events"])
-def test_a_damaged_heap_of_texts_does_not_hold_the_reader_up(tmp_path: Path, places: str) -> None:
-    """Flips in every byte of the heap's heads: HDF5 itself goes round for ever on some of them."""
-    path = tmp_path / "a.h5"
-    write_columns(path, some_columns(20))
-    with h5py.File(path, "a") as file:
-        file["/" if places == "root" else "events"].attrs["geometry"] = "640x480"
-    whole = path.read_bytes()
-    heap = whole.index(b"GCOL")
-    for place in range(heap, heap + 56):
-        for bit in range(0, 8, 3):
-            data = bytearray(whole)
-            data[place] ^= 1 << bit
-            path.write_bytes(data)
-            try:
-                assert len(open_recording(path).read()) <= 20
-            except RecordingError as error:
-                assert "damaged" in str(error)
-    data = bytearray(whole)
-    data[heap + 40 : heap + 56] = bytes(16)  # free space of size 0
-    path.write_bytes(data)
-    with pytest.raises(RecordingError, match="a heap of texts without end"):
-        open_recording(path)
