@@ -1,4 +1,4 @@
-"""Files that appear under their name complete or not at all."""
+"""Files: those written appear complete or not at all, those read are ordinary ones of a limited size."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import os
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
+from errno import EFBIG, EINVAL
 from pathlib import Path
 
 from .errors import RecordingError
@@ -54,6 +55,17 @@ def atomic_file(path: str | Path, what: str = "file") -> Iterator[Path]:
     finally:
         if part is not None:
             part.unlink(missing_ok=True)
+
+
+def file_bytes(path: Path, most_bytes: int) -> bytes:
+    """Content of an ordinary file; raises OSError, with its reason in words, for devices, pipes and larger files."""
+    if path.exists() and not path.is_file():
+        raise OSError(EINVAL, "it is no ordinary file")
+    with open(path, "rb") as file:
+        content = file.read(most_bytes + 1)
+    if len(content) > most_bytes:
+        raise OSError(EFBIG, f"it has over {most_bytes / 1e6:.3g} MB")
+    return content
 
 
 def check_writable(path: Path, what: str = "file") -> None:

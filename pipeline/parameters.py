@@ -55,20 +55,20 @@ class Tunable:
             return None
         if kind == "choice":
             if value not in self.choices:
-                raise ParameterError(f"{name} = {value!r} is none of {', '.join(self.choices)}")
+                raise ParameterError(f"{name} = {value!r:.80} is none of {', '.join(self.choices)}")
             return value
         if kind == "switch":
             if not isinstance(value, bool):
-                raise ParameterError(f"{name} = {value!r} is not a switch: use true or false")
+                raise ParameterError(f"{name} = {value!r:.80} is not a switch: use true or false")
             return value
         if kind == "numbers":
             if not isinstance(value, (list, tuple)) or len(value) != len(self.default):
-                raise ParameterError(f"{name} = {value!r} is not a list of {len(self.default)} numbers")
+                raise ParameterError(f"{name} = {value!r:.80} is not a list of {len(self.default)} numbers")
             return tuple(self._number(name, item) for item in value)
         number = self._number(name, value)
         if kind == "whole number":
             if number != int(number):
-                raise ParameterError(f"{name} = {value!r} is not a whole number")
+                raise ParameterError(f"{name} = {value!r:.80} is not a whole number")
             return int(number)
         return number
 
@@ -76,7 +76,7 @@ class Tunable:
         if isinstance(value, int) and abs(value) > sys.float_info.max:
             raise ParameterError(f"{name} is too large a number: {self.allowed}")
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-            raise ParameterError(f"{name} = {value!r} is not a number: {self.allowed}")
+            raise ParameterError(f"{name} = {value!r:.80} is not a number: {self.allowed}")
         low = -math.inf if self.low is None else self.low
         high = math.inf if self.high is None else self.high
         if not low <= value <= high:
@@ -159,7 +159,7 @@ class ParameterGroup:
         for name, value in values.items():
             new_name = self.renamed.get(name, name)
             if new_name not in known:
-                raise ParameterError(f"{self.group_name()}.{name} is unknown{did_you_mean(name, known)}")
+                raise ParameterError(f"{self.group_name()}.{name:.80} is unknown{did_you_mean(name, known)}")
             if new_name != name and on_rename is not None:
                 on_rename(f"{self.group_name()}.{name} is now called {self.group_name()}.{new_name}")
             changed[new_name] = value
@@ -198,7 +198,7 @@ class ParameterSet(ABC):
     def _type_of(cls, name: str) -> type[ParameterGroup]:
         types = cls.group_types()
         if name not in types:
-            raise ParameterError(f"there is no stage {name!r}{did_you_mean(name, types)}")
+            raise ParameterError(f"there is no stage {name!r:.80}{did_you_mean(name, types)}")
         return types[name]
 
     def group(self, name: str) -> ParameterGroup:
@@ -235,7 +235,7 @@ class ParameterSet(ABC):
         for name, fields in values.items():
             group = self.group(name)
             if not isinstance(fields, Mapping):
-                raise ParameterError(f"{name} = {fields!r} is not a table of fields: write {name}.field = value")
+                raise ParameterError(f"{name:.80} = {fields!r:.80} is not a table of fields: write {name}.field = value")
             changed[name] = group.with_values(fields, on_rename)
         return self.with_groups(**changed)
 
@@ -248,7 +248,7 @@ class ParameterSet(ABC):
             target, equals, value = text.partition("=")
             stage, dot, name = target.strip().partition(".")
             if not (equals and dot and stage and name):
-                raise ParameterError(f"{text!r} is not of the form stage.field=value, like logo.pad_px=3")
+                raise ParameterError(f"{text!r:.80} is not of the form stage.field=value, like logo.pad_px=3")
             result = result.with_values({stage: {name: value.strip()}}, on_rename)
         return result
 

@@ -165,7 +165,7 @@ def description_in(attributes: Mapping[str, Any]) -> dict[str, Any] | None:
     """The description that `simulate_again` takes among a recording's attributes; None where there is none."""
     try:
         description = json.loads(str(attributes.get(DESCRIPTION, "null")))
-    except json.JSONDecodeError:
+    except (ValueError, RecursionError):  # RecursionError: nested thousands deep
         return None
     return description if isinstance(description, dict) else None
 

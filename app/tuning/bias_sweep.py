@@ -144,7 +144,7 @@ def known_biases(path: Path, recording: AnyRecording | None = None) -> BiasParam
             return beside
         stated = (recording or open_recording(path)).attributes.get(BIASES)
         return None if stated is None else BiasParameters().with_values(json.loads(str(stated)))
-    except (SpinscopeError, json.JSONDecodeError, TypeError):
+    except (SpinscopeError, ValueError, TypeError, RecursionError):
         return None
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import tomli_w
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.presets import FOLDER
 from spinscope.pipeline.registry import Parameters
+from spinscope.pipeline.toml import toml_tables
 
 from .controls import setup_of
 
@@ -37,9 +37,9 @@ def applied(text: str, opened: Parameters, on_rename: Callable[[str], None] | No
     Raises ParameterError that says what is wrong with the preset.
     """
     try:
-        values = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ParameterError(f"the preset is no TOML: {error}") from None
+        values = toml_tables(text)
+    except ParameterError as error:
+        raise ParameterError(f"the preset cannot be read: {error}") from None
     return Parameters().with_values(setup_of(opened)).with_values(values, on_rename)
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
 from ..errors import ParameterError
+from ..files import file_bytes
 from ..registry import Parameters
+from ..toml import MAX_BYTES, toml_tables
 
 FOLDER = Path(__file__).parent
 
@@ -38,10 +39,11 @@ def preset(
     """
     path = Path(name) if str(name).endswith(".toml") else FOLDER / f"{name}.toml"
     try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
+        values = toml_tables(file_bytes(path, MAX_BYTES).decode("utf-8"))
     except FileNotFoundError:
         known = ", ".join(preset_names())
         raise ParameterError(f"there is no preset {str(name)!r}: use {known} or the path of a .toml file") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ParameterError(f"the preset cannot be read ({error}): {path}") from None
+    except (OSError, ValueError, ParameterError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise ParameterError(f"the preset cannot be read ({why}): {path}") from None
     return (base or Parameters()).with_values(values, on_rename)

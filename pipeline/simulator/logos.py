@@ -19,11 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ParameterError
+from ..files import file_bytes
 
 Floats = NDArray[np.float64]
 Drawing = Callable[[Floats, Floats], Floats]  # (a, b) in mm -> distance to the print in mm, negative inside
 
 TEXEL_MM = 0.06  # a tenth of the thinnest stroke (0.6 mm)
+PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+MAX_PNG_BYTES = 32 << 20  # more than such a picture takes unpacked
+MAX_PNG_SIDE_PX = 2048  # 60 mm, the widest logo, in steps of half a texel
 RADIUS_MM = 20.0  # logos are drawn for the 40 mm ball
 
 
@@ -52,7 +56,7 @@ class Logo:
         if not name_or_png.lower().endswith(".png"):
             return cls(name_or_png)
         try:
-            content = Path(name_or_png).read_bytes()
+            content = file_bytes(Path(name_or_png), MAX_PNG_BYTES)
         except OSError as error:
             raise ParameterError(f"the logo cannot be read ({error.strerror}): {name_or_png}") from error
         logo = cls("png", base64.b64encode(content).decode("ascii"))
@@ -187,8 +191,15 @@ def _png_darkness(png_base64: str) -> Floats:
     """(h, w) float64, 0 = blank, 1 = print; raises ParameterError when it is no PNG."""
     import cv2  # only for pictures of one's own; 60 ms to load
 
-    content = np.frombuffer(base64.b64decode(png_base64), np.uint8)
-    image = cv2.imdecode(content, cv2.IMREAD_UNCHANGED) if content.size else None
+    content = base64.b64decode(png_base64)
+    if not content.startswith(PNG_SIGNATURE):
+        raise ParameterError("the logo is no PNG picture that can be read")
+    width, height = (int.from_bytes(content[place : place + 4]) for place in (16, 20))  # stated in every PNG's head
+    if max(width, height) > MAX_PNG_SIDE_PX:
+        raise ParameterError(
+            f"the logo's picture has {width} x {height} pixels: make it smaller, {MAX_PNG_SIDE_PX} each way at most"
+        )
+    image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None:
         raise ParameterError("the logo is no PNG picture that can be read")
     picture = image.astype(np.float64) / (65535.0 if image.dtype == np.uint16 else 255.0)

@@ -156,8 +156,8 @@ def simulate_again(
         if sensor is None:
             biases = description.get("biases")
             sensor = SensorModel(**description["sensor"]) if biases is None else BiasParameters(**biases)
-    except (KeyError, TypeError, ValueError) as error:
-        raise ParameterError(f"this is no description of a simulated recording: {error}") from error
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise ParameterError(f"this is no description of a simulated recording: {error!s:.200}") from error
     return simulate_scene(scene, camera=camera, sensor=sensor, lens=lens, seed=seed, on_progress=on_progress)
 
 

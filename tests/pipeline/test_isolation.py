@@ -1,0 +1,131 @@
+"""Calls in a process with limits: what they give, and what ends them."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from spinscope.pipeline import isolation
+from spinscope.pipeline.errors import RecordingError
+from spinscope.pipeline.isolation import IsolationError, call, iterate, without_time_limit
+
+
+def blocks(count: int, size: int) -> Iterator[dict[str, np.ndarray]]:
+    for k in range(count):
+        yield {"values": np.full(size, k), "process": np.array(os.getpid())}
+
+
+def hang() -> None:
+    while True:
+        pass
+
+
+def hang_after(count: int) -> Iterator[int]:
+    yield from range(count)
+    hang()
+
+
+def crash() -> None:
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+def take(size: int) -> int:
+    return np.ones(size, np.uint8).size
+
+
+def refuse() -> None:
+    raise RecordingError("x = -1 at event 7 is negative")
+
+
+def fail() -> None:
+    raise LookupError("a bug of ours")
+
+
+def print_and_work_long() -> int:
+    print("to the answers, if it could")  # noqa: T201
+    with without_time_limit():
+        time.sleep(isolation.MAX_SILENCE_S + 0.5)
+    return 7
+
+
+def process_id() -> int:
+    return os.getpid()
+
+
+def test_values_arrive_as_they_were_sent() -> None:
+    parts = list(iterate(blocks, 3, 100_000))
+    assert [int(part["values"].sum()) for part in parts] == [0, 100_000, 200_000]
+    parts[0]["values"][:] = 5  # memory of one's own, as from any other call
+
+
+def test_the_process_is_kept_and_is_not_this_one() -> None:
+    first = call(process_id)
+    assert first not in (os.getpid(), os.getppid()) and call(process_id) == first
+    assert next(iterate(blocks, 10**9, 10))["process"] == first, "also when its generator is left half read"
+    assert call(process_id) == first
+
+
+def test_each_of_several_calls_at_a_time_has_a_process() -> None:
+    one, other = iterate(blocks, 3, 10), iterate(blocks, 3, 10)
+    assert next(one)["process"] != next(other)["process"]
+    assert [len(list(rest)) for rest in (one, other)] == [2, 2]
+
+
+@pytest.mark.parametrize(
+    ("function", "arguments", "message"),
+    [(hang, (), "makes no progress"), (crash, (), "crashes the library"), (take, (2 << 30,), "over 512 MB of memory")],
+)
+def test_hanging_crashing_and_greedy_calls_end(function: object, arguments: tuple[int, ...], message: str) -> None:
+    start = time.monotonic()
+    with pytest.raises(IsolationError, match=message):
+        call(function, *arguments)  # type: ignore[arg-type]
+    assert time.monotonic() - start < isolation.MAX_SILENCE_S + 2
+    assert call(take, 10) == 10
+
+
+def test_values_before_a_hang_are_kept() -> None:
+    parts = iterate(hang_after, 2)
+    assert next(parts) == 0
+    with pytest.raises(IsolationError, match="no progress"):
+        list(parts)
+
+
+def test_a_slow_caller_is_waited_for() -> None:
+    parts = iterate(blocks, 2, 10)
+    next(parts)
+    time.sleep(isolation.MAX_SILENCE_S + 0.3)
+    assert len(list(parts)) == 1
+
+
+def test_errors_arrive_and_bugs_with_their_traceback() -> None:
+    with pytest.raises(RecordingError, match="^x = -1 at event 7 is negative$"):
+        call(refuse)
+    with pytest.raises(RuntimeError, match=r"in fail\n.*\nLookupError: a bug of ours"):
+        call(fail)
+
+
+def test_what_takes_long_in_sound_files_too_is_waited_for() -> None:
+    assert call(print_and_work_long) == 7
+
+
+def test_other_threads_go_on_while_a_call_hangs() -> None:
+    """The tuner's server is such a thread: a library that hangs with Python's lock would stop it."""
+    failed: list[IsolationError] = []
+
+    def hang_there() -> None:
+        try:
+            call(hang)
+        except IsolationError as error:
+            failed.append(error)
+
+    thread = threading.Thread(target=hang_there)
+    thread.start()
+    assert [call(take, size) for size in range(20)] == list(range(20)) and not failed
+    thread.join()
+    assert failed
