@@ -235,7 +235,9 @@ class ParameterSet(ABC):
         for name, fields in values.items():
             group = self.group(name)
             if not isinstance(fields, Mapping):
-                raise ParameterError(f"{name:.80} = {fields!r:.80} is not a table of fields: write {name}.field = value")
+                raise ParameterError(
+                    f"{name:.80} = {fields!r:.80} is not a table of fields: write {name}.field = value"
+                )
             changed[name] = group.with_values(fields, on_rename)
         return self.with_groups(**changed)
 

@@ -104,7 +104,7 @@ def test_a_slow_caller_is_waited_for() -> None:
 
 
 def test_errors_arrive_and_bugs_with_their_traceback() -> None:
-    with pytest.raises(RecordingError, match="^x = -1 at event 7 is negative$"):
+    with pytest.raises(RecordingError, match=r"^x = -1 at event 7 is negative$"):
         call(refuse)
     with pytest.raises(RuntimeError, match=r"in fail\n.*\nLookupError: a bug of ours"):
         call(fail)
