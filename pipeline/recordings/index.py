@@ -29,7 +29,7 @@ INDEXES_KEPT = 200  # of 1 MB for 100 million events
 
 @dataclass(frozen=True, eq=False)
 class RecordingIndex:
-    """What one pass over all of a recording found.
+    """Findings of one pass over all of a recording.
 
     Attributes
     ----------
