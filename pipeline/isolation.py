@@ -151,8 +151,8 @@ class _Process:
         return kind, pickle.loads(pickled, buffers=buffers)
 
     def is_running(self) -> bool:
-        """Whether the process still runs."""
-        return self._process.poll() is None
+        """Whether the process still runs and can be talked to."""
+        return self._process.poll() is None and not self._requests.closed
 
     def end(self) -> None:
         """End the process."""
@@ -163,7 +163,8 @@ class _Process:
                 pipe.close()
 
     def _write(self, content: bytes) -> None:
-        with suppress(BrokenPipeError):
+        # A closed pipe is a ValueError: the garbage collector may close it before it ends an abandoned `iterate`.
+        with suppress(BrokenPipeError, ValueError):
             self._requests.write(content)
             self._requests.flush()
 

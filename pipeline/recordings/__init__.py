@@ -11,6 +11,7 @@ from .formats.registry import readable_suffixes as readable_suffixes
 from .formats.registry import writable_suffixes as writable_suffixes
 from .opening import open_recording as open_recording
 from .reader import FormatReader as FormatReader
+from .reader import ReadingOptions as ReadingOptions
 from .reader import ReadPass as ReadPass
 from .reader import Triggers as Triggers
 from .reader import UncheckedEvents as UncheckedEvents

@@ -1,4 +1,4 @@
-"""Columns of events in HDF5 and NPZ files: names, types, and conversion to events."""
+"""Columns of events in files of columns: names, order, types, and conversion to events."""
 
 from __future__ import annotations
 
@@ -11,27 +11,60 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError
 from ..events import EventBatch
-from .reader import UncheckedEvents
+from .reader import Damage, ReadingOptions, UncheckedEvents
+from .time_units import UNITS_US, check_unit, microseconds, rate_warning, split_unit
 
-# Names in use for the four columns, ours and DSEC's first.
+# Names in use for the four columns, in lower case and without a unit behind them; ours and DSEC's first.
 NAMES = {
-    "t": ("t", "t_us", "ts", "time", "timestamp", "timestamps", "event_t"),
-    "x": ("x", "x_px", "xs", "event_x"),
-    "y": ("y", "y_px", "ys", "event_y"),
-    "p": ("p", "polarity", "polarities", "pol", "on", "event_p"),
+    "t": ("t", "ts", "time", "timestamp", "timestamps", "event_t", "events_t"),
+    "x": ("x", "x_px", "xs", "event_x", "events_x"),
+    "y": ("y", "y_px", "ys", "event_y", "events_y"),
+    "p": ("p", "polarity", "polarities", "pol", "ps", "on", "event_p", "events_p"),
 }
 # As Spinscope writes them.
 COLUMN_TYPES = {name: np.dtype(code) for name, code in zip("txyp", ("<i8", "<u2", "<u2", "u1"), strict=True)}
 EXPANSION_LIMIT = 500  # events pack 3 to 50 times; only constant columns come near deflate's 1032
 EXPANSION_FREE_BYTES = 1 << 28
 LAST_US = 1 << 62  # leaves room to add and subtract
+# So many broken rows cost only themselves; more are a sign that the columns are not what they are taken for.
+BROKEN_FREE, BROKEN_SHARE = 10, 0.01
+NONE = np.zeros(0, np.bool_)  # mask of a column without broken values
+SORTED_SHARE = 0.9  # of the steps of a column of times that do not go back
 
 
 def named_columns(present: Iterable[str]) -> dict[str, str] | None:
     """Map t, x, y and p to those of the names present that stand for them; None unless all four are there."""
-    there = set(present)
-    found = {c: next(n for n in names if n in there) for c, names in NAMES.items() if not there.isdisjoint(names)}
-    return found if len(found) == 4 else None
+    there = {split_unit(name.strip().lower())[0]: name for name in present}
+    found = {c: [there[name] for name in names if name in there] for c, names in NAMES.items()}
+    return {c: names[0] for c, names in found.items()} if all(found.values()) else None
+
+
+def column_order(sample: NDArray[Any]) -> dict[str, int] | None:
+    """Tell the four columns of a table without names apart.
+
+    Parameters
+    ----------
+    sample : (n, 4) number
+        First rows of the table.
+
+    Returns
+    -------
+    dict of str to int or None
+        Column of t, x, y and p: p is the last that holds -1, 0 and 1 only, t the one of the others that goes back least
+        often, then that with the longest span; x comes before y. None where no column can be p or t.
+    """
+    polarities = [k for k in range(4) if np.isin(sample[:, k], (-1, 0, 1)).all()]
+    if not polarities:
+        return None
+    p = polarities[-1]
+    values = sample.astype(np.float64)
+    rising = [float(np.mean(np.diff(values[:, k]) >= 0)) if len(values) > 1 else 1.0 for k in range(4)]
+    rest = [k for k in range(4) if k != p]
+    t = max(rest, key=lambda k: (rising[k], np.ptp(values[:, k]) if len(values) else 0.0))
+    if rising[t] < SORTED_SHARE:
+        return None
+    x, y = (k for k in rest if k != t)
+    return {"t": t, "x": x, "y": y, "p": p}
 
 
 def columns_of(batch: EventBatch) -> dict[str, NDArray[Any]]:
@@ -51,66 +84,100 @@ def check_expansion(packed_bytes: int, unpacked_bytes: int, path: Path) -> None:
 class ColumnTypes:
     """Conversion of the four columns of one file to events.
 
-    Whole-number times are microseconds. Floating times are seconds if any of those looked at has a fraction, and
-    microseconds otherwise; `warning` says which was assumed.
+    The unit of time is the user's, else the file's. Else whole-number times are microseconds; floating times are
+    seconds if any of those looked at has a fraction, and microseconds otherwise.
+
+    Attributes
+    ----------
+    warnings : list of str
+        What was assumed, and what is implausible about it.
     """
 
-    def __init__(self, path: Path, sampled_times: NDArray[Any]) -> None:
+    def __init__(
+        self, path: Path, options: ReadingOptions, stated: str | None, sampled_times: NDArray[Any], events: int
+    ) -> None:
+        """Choose the unit of time.
+
+        Parameters
+        ----------
+        stated : str or None
+            Unit that the file states.
+        sampled_times, events : (n,) number, int
+            Some of the times, and the number of events between the first and the last of them.
+        """
         self.path = path
-        self.warning: str | None = None
-        self._seconds = False
+        self.warnings: list[str] = []
+        check_unit(options.time_unit)
+        finite = sampled_times[np.isfinite(sampled_times)] if sampled_times.dtype.kind == "f" else sampled_times
+        self.unit = options.time_unit or stated or "us"
+        if options.time_unit or stated:
+            return
         if sampled_times.dtype.kind == "f":
-            finite = sampled_times[np.isfinite(sampled_times)]
-            self._seconds = bool(np.any(finite != np.floor(finite)))
-            unit = "seconds (they have fractions)" if self._seconds else "microseconds (they are whole)"
-            self.warning = f"times are floating-point numbers without a unit: taken as {unit}"
+            self.unit = "s" if np.any(finite != np.floor(finite)) else "us"
+            why = "seconds (they have fractions)" if self.unit == "s" else "microseconds (they are whole)"
+            self.warnings.append(f"times are floating-point numbers without a unit: taken as {why}")
+        if finite.size:
+            warning = rate_warning(self.unit, events, float(np.ptp(finite)))
+            self.warnings += [warning] if warning else []
 
     def columns(
-        self, first_row: int, t: NDArray[Any], x: NDArray[Any], y: NDArray[Any], p: NDArray[Any]
+        self, first_row: int, t: NDArray[Any], x: NDArray[Any], y: NDArray[Any], p: NDArray[Any], damage: Damage
     ) -> UncheckedEvents:
-        """Convert the rows from first_row on; raises RecordingError naming the first event that cannot be one."""
+        """Convert the rows from first_row on; those with a value that no event can have are dropped as damage.
+
+        Raises RecordingError when the columns differ in length, and when so many rows are broken that the columns are
+        not what they are taken for.
+        """
         if not (t.size == x.size == y.size == p.size):
             raise RecordingError(
                 f"columns end early (t {t.size}, x {x.size}, y {y.size}, p {p.size} values from event "
                 f"{first_row}): export the recording again: {self.path}"
             )
-        return UncheckedEvents(
-            self._times(t, first_row),
-            self._pixels("x", x, first_row),
-            self._pixels("y", y, first_row),
-            self._polarity(p, first_row),
-        )
+        for name, column, broken, why in (
+            ("t", t, self._no_times(t), f"is no time in {self.unit}"),
+            ("x", x, _no_pixels(x), "is no whole pixel from 0 on"),
+            ("y", y, _no_pixels(y), "is no whole pixel from 0 on"),
+            ("p", p, _no_polarities(p), "is none of 1 (ON), 0 and -1 (OFF)"),
+        ):
+            if not broken.any():
+                continue
+            damage.broken_events += int(np.count_nonzero(broken))
+            if damage.broken_events > BROKEN_FREE + BROKEN_SHARE * (first_row + t.size):
+                at = int(np.argmax(broken))
+                raise RecordingError(
+                    f"{name} = {column[at]} at event {first_row + at} {why}, and {damage.broken_events} values so far "
+                    f"are broken: repair the columns: {self.path}"
+                )
+            t, x, y, p = (values[~broken] for values in (t, x, y, p))
+            return self.columns(first_row, t, x, y, p, damage)
+        return UncheckedEvents(microseconds(t, self.unit), _whole(x), _whole(y), p == 1)
 
-    def _times(self, t: NDArray[Any], first_row: int) -> NDArray[np.int64]:
+    def _no_times(self, t: NDArray[Any]) -> NDArray[np.bool_]:
+        last = LAST_US / UNITS_US[self.unit]
+        good: NDArray[np.bool_] = NONE
         if t.dtype.kind == "f":
-            with np.errstate(over="ignore"):  # refused below
-                t = t.astype(np.float64) * (1e6 if self._seconds else 1.0)
-            self._check(~(np.abs(t) < LAST_US), "t", t, first_row, "is no time")  # NaN too
-            return np.rint(t).astype(np.int64)
-        if t.dtype.itemsize == 8 and t.size and (int(t.min()) <= -LAST_US or int(t.max()) >= LAST_US):
-            self._check((t <= -LAST_US) | (t >= LAST_US), "t", t, first_row, "is no time in microseconds")
-        return t.astype(np.int64, copy=False)
+            good = np.abs(t.astype(np.float64)) < last  # not of NaN
+        elif t.dtype.itemsize == 8 and t.size and (int(t.min()) <= -last or int(t.max()) >= last):
+            good = (t > -last) & (t < last)
+        return ~good
 
-    def _pixels(self, name: str, column: NDArray[Any], first_row: int) -> NDArray[Any]:
-        if column.dtype.kind == "f":
-            broken = ~(np.abs(column) < 2**31) | (column != np.floor(column))
-            self._check(broken, name, column, first_row, "is no whole pixel")
-            column = column.astype(np.int64)
-        if column.dtype.kind == "i" and column.size and column.min() < 0:
-            self._check(column < 0, name, column, first_row, "is negative; pixels count from 0")
-        return column
 
-    def _polarity(self, p: NDArray[Any], first_row: int) -> NDArray[np.bool_]:
-        if p.dtype.kind == "b":
-            return p.astype(np.bool_, copy=False)
-        on: NDArray[np.bool_] = p == 1
-        self._check(~(on | (p == 0) | (p == -1)), "p", p, first_row, "is none of 1 (ON), 0 and -1 (OFF)")
-        return on
+def _no_pixels(column: NDArray[Any]) -> NDArray[np.bool_]:
+    good: NDArray[np.bool_] = NONE
+    if column.dtype.kind == "f":
+        good = (column >= 0) & (column < 2**31) & (column == np.floor(column))  # not of NaN
+    elif column.dtype.kind == "i" and column.size and column.min() < 0:
+        good = column >= 0
+    return ~good
 
-    def _check(self, wrong: NDArray[np.bool_], name: str, column: NDArray[Any], row: int, why: str) -> None:
-        if wrong.any():
-            at = int(np.argmax(wrong))
-            raise RecordingError(f"{name} = {column[at]} at event {row + at} {why}: repair the column: {self.path}")
+
+def _no_polarities(p: NDArray[Any]) -> NDArray[np.bool_]:
+    good: NDArray[np.bool_] = NONE if p.dtype.kind == "b" else (p == 1) | (p == 0) | (p == -1)
+    return ~good
+
+
+def _whole(column: NDArray[Any]) -> NDArray[Any]:
+    return column.astype(np.int64) if column.dtype.kind == "f" else column
 
 
 def check_types(path: Path, types: dict[str, np.dtype[Any]]) -> None:

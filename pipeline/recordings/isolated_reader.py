@@ -11,10 +11,12 @@ from pathlib import Path
 from ..errors import RecordingError
 from ..isolation import IsolationError, call, iterate, without_time_limit
 from ..results import Truth
-from .reader import Damage, FormatReader, Place, ReadPass, Triggers, UncheckedEvents
+from .reader import Damage, FormatReader, Place, ReadingOptions, ReadPass, Triggers, UncheckedEvents
+
+ReaderOpener = Callable[[Path, ReadingOptions], FormatReader]
 
 # What a reader says of its file once it is open.
-STATEMENTS = ("format", "strict_order", "seeks", "attributes", "warnings", "stated", "t_offset_us", "events")
+STATEMENTS = ("format", "strict_order", "seeks", "takes", "attributes", "warnings", "stated", "t_offset_us", "events")
 
 
 class IsolatedReader(FormatReader):
@@ -23,13 +25,13 @@ class IsolatedReader(FormatReader):
     Parameters
     ----------
     open : callable
-        `open(path)` of the format, a function of a module.
+        `open(path, options)` of the format, a function of a module.
     """
 
-    def __init__(self, open: Callable[[Path], FormatReader], path: Path) -> None:
-        super().__init__(path)
+    def __init__(self, open: ReaderOpener, path: Path, options: ReadingOptions) -> None:
+        super().__init__(path, options)
         with self._isolation_errors():
-            statements, self._reader = call(_opened, open, path)
+            statements, self._reader = call(_opened, open, path, options)
         vars(self).update(statements)
 
     def columns(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
@@ -91,9 +93,9 @@ class ReadPart:
         reading.report(self.share, 1.0)
 
 
-def _opened(open: Callable[[Path], FormatReader], path: Path) -> tuple[dict[str, object], bytes]:
+def _opened(open: ReaderOpener, path: Path, options: ReadingOptions) -> tuple[dict[str, object], bytes]:
     """Statements of a reader, and the reader for the calls to come, pickled as the caller needs nothing else of it."""
-    reader = open(path)
+    reader = open(path, options)
     return {name: getattr(reader, name) for name in STATEMENTS}, pickle.dumps(reader)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from ..errors import RecordingError
 from .formats.registry import FORMATS, HEAD_BYTES
 from .isolated_reader import IsolatedReader
-from .reader import Progress
+from .reader import FormatReader, Progress, ReadingOptions
 from .recording import Recording
 from .sensor import stated_resolution
 
@@ -15,7 +15,6 @@ UNREADABLE = {
     b"#!AER-DAT": "AEDAT",
     b"#ROSBAG": "ROS bag",
     b"SQLite format 3": "ROS 2 bag (SQLite)",
-    b"\x93NUMPY": "single NumPy array (.npy)",
     b"\x1f\x8b": "gzip-packed",
     b"\xfd7zXZ": "xz-packed",
     b"7z\xbc\xaf": "7z-packed",
@@ -24,7 +23,12 @@ UNREADABLE = {
 
 
 def open_recording(
-    path: str | Path, *, sensor: tuple[int, int] | None = None, on_progress: Progress | None = None
+    path: str | Path,
+    *,
+    sensor: tuple[int, int] | None = None,
+    dataset: str | None = None,
+    time_unit: str | None = None,
+    on_progress: Progress | None = None,
 ) -> Recording:
     """Open a recording of any registered format, recognised by its content.
 
@@ -34,6 +38,10 @@ def open_recording(
         The file.
     sensor : (width_px, height_px), optional
         Size of the sensor as stated by the user; beats the file's own statement.
+    dataset : str, optional
+        Path of the events in a file that holds several streams, like "prophesee/left".
+    time_unit : str, optional
+        Unit of the times (s, ms, us or ns) in files of columns; beats the file's own statement.
     on_progress : callable, optional
         Called with the share done (0..1) while the events are searched for the sensor's size.
 
@@ -50,16 +58,27 @@ def open_recording(
     path = Path(path)
     try:
         stated = None if sensor is None else stated_resolution(*sensor, "command line")
+        options = ReadingOptions(dataset=dataset, time_unit=time_unit)
         head = _head(path)
         for format in FORMATS:
             if format.sniff(path, head):
-                reader = IsolatedReader(format.open, path) if format.isolated else format.open(path)
-                return Recording(reader, stated, on_progress)
+                opened = IsolatedReader(format.open, path, options) if format.isolated else format.open(path, options)
+                opened.warnings += _unused(opened)
+                return Recording(opened, stated, on_progress)
         raise _unknown(path, head)
     except RecordingError as error:
         if str(path) in str(error):
             raise
         raise RecordingError(f"{error}: {path}") from error
+
+
+def _unused(reader: FormatReader) -> list[str]:
+    """Sentences about options that mean nothing for the format of the file."""
+    return [
+        f"--{name.replace('_', '-')} {getattr(reader.options, name)} has no effect: a {reader.format} file states it"
+        for name in ("dataset", "time_unit")
+        if getattr(reader.options, name) is not None and name not in reader.takes
+    ]
 
 
 def _head(path: Path) -> bytes:

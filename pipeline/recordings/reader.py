@@ -45,6 +45,7 @@ class Damage:
     """Counts of everything wrong that a full pass over a recording found; all zero in a sound file."""
 
     bad_words: int = _count("{} words of no known type were skipped")
+    broken_events: int = _count("{} events with a value that is no time, pixel or polarity were dropped")
     backward_steps: int = _count("time steps backwards {} times; events up to 10 ms late were put in order")
     # Of these; only in RAW files, others are refused.
     late_events: int = _count("{} events more than 10 ms behind earlier ones were dropped")
@@ -139,11 +140,31 @@ class ReadPass:
         return self.end_us is not None and t_us >= self.end_us + MAX_DISORDER_US
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadingOptions:
+    """Statements of the user about the events in a file; they beat what the file says and what is guessed.
+
+    Attributes
+    ----------
+    dataset : str or None
+        Path of the events in a file that holds several streams.
+    time_unit : str or None
+        Unit of the times: s, ms, us or ns.
+    """
+
+    dataset: str | None = None
+    time_unit: str | None = None
+
+
 class FormatReader(ABC):
     """Reader of one file of one format.
 
     Attributes
     ----------
+    options : ReadingOptions
+        Statements of the user.
+    takes : tuple of str
+        Those of them that mean something for the format.
     format : str
         Format and encoding for people.
     strict_order : bool
@@ -163,9 +184,10 @@ class FormatReader(ABC):
     format: str
     strict_order = True
     seeks = False
+    takes: ClassVar[tuple[str, ...]] = ()
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: Path, options: ReadingOptions) -> None:
+        self.path, self.options = path, options
         self.attributes: dict[str, str | float] = {}
         self.warnings: list[str] = []
         self.stated: Resolution | None = None

@@ -21,6 +21,7 @@ from .sensor import KNOWN_SENSORS, Resolution, check_resolution, smallest_known
 HASH_ALL_BYTES = 64 << 20  # larger files are large: half a second and more to read
 HASH_BLOCK_BYTES = 1 << 20
 EVENT_BYTES = 13  # 8 + 2 + 2 + 1
+MAX_STRAY_SHARE = 1e-3  # of events that lie outside every known sensor and do not count for its size
 
 
 def file_identity(path: Path) -> str:
@@ -234,12 +235,20 @@ class Recording:
         return Resolution(*size, "guess")
 
     def _extent_px(self, on_progress: Progress | None) -> tuple[int, int]:
-        """One more than the largest x and y of all events, (0, 0) without events; a pass over the file."""
-        columns_px = rows_px = 0
+        """One more than the largest x and y of all events, (0, 0) without events; a pass over the file.
+
+        Few events that no known sensor holds are broken, and left out.
+        """
+        extents_px = np.zeros((2, 2), np.int64)  # of all events, and of those that some known sensor holds
+        events = strays = 0
+        largest_px = np.max(KNOWN_SENSORS, axis=0)
         for block in self._reader.columns(ReadPass(on_progress=on_progress)):
-            columns_px = max(columns_px, int(block.x.max()) + 1)
-            rows_px = max(rows_px, int(block.y.max()) + 1)
-        return columns_px, rows_px
+            held = block[(block.x < largest_px[0]) & (block.y < largest_px[1])]
+            events, strays = events + len(block), strays + len(block) - len(held)
+            for extent_px, part in zip(extents_px, (block, held), strict=True):
+                if len(part):
+                    extent_px[:] = np.maximum(extent_px, (part.x.max() + 1, part.y.max() + 1))
+        return tuple(extents_px[int(strays <= MAX_STRAY_SHARE * events)].tolist())
 
     def _index_key(self) -> str:
         """Name of the index in the cache: content of the file, and size of the sensor where the user states it."""
@@ -284,8 +293,8 @@ class Recording:
         if columns.x.max() >= self.width_px or columns.y.max() >= self.height_px:
             stated = self._reader.stated
             holds_stated = stated and stated.width_px <= self.width_px and stated.height_px <= self.height_px
-            if self._asked is not None and not holds_stated:
-                extent = self._extent_px(None)
+            extent = (0, 0) if self._asked is None or holds_stated else self._extent_px(None)
+            if extent[0] > self.width_px or extent[1] > self.height_px:
                 size = smallest_known(*extent) or extent
                 raise RecordingError(
                     f"--sensor {self.width_px}x{self.height_px} is too small, the events reach over {extent[0]} x "

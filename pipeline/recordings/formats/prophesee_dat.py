@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import RecordingError
 from ..prophesee_header import MAX_HEADER_BYTES, parse_header
-from ..reader import FormatReader, Place, ReadPass, UncheckedEvents, file_errors
+from ..reader import FormatReader, Place, ReadingOptions, ReadPass, UncheckedEvents, file_errors
 from ..sensor import resolution_or_none
 from .registry import FORMATS, RecordingFormat
 
@@ -25,8 +25,8 @@ class DatReader(FormatReader):
     strict_order = False
     seeks = True
 
-    def __init__(self, path: Path) -> None:
-        super().__init__(path)
+    def __init__(self, path: Path, options: ReadingOptions) -> None:
+        super().__init__(path, options)
         with file_errors(path, "DAT"), open(path, "rb") as file:
             header, start = parse_header(file.read(MAX_HEADER_BYTES))
             file.seek(start)

@@ -10,7 +10,7 @@ from ...errors import RecordingError
 from ...events import EventBatch
 from ...extensions import Registry
 from ...results import Truth
-from ..reader import FormatReader, Triggers
+from ..reader import FormatReader, ReadingOptions, Triggers
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +56,7 @@ class RecordingFormat:
     sniff : callable
         `sniff(path, head)` tells from the first `HEAD_BYTES` bytes, or from the file, whether it is of this format.
     open : callable
-        `open(path)` returns the reader of a file; raises RecordingError when it cannot be read.
+        `open(path, options)` returns the reader of a file; raises RecordingError when it cannot be read.
     write : callable or None
         `write(path, content)` writes a new file; raises OSError or RecordingError. None for a format only read.
     isolated : bool
@@ -70,7 +70,7 @@ class RecordingFormat:
     label: str
     suffixes: tuple[str, ...]
     sniff: Callable[[Path, bytes], bool]
-    open: Callable[[Path], FormatReader]
+    open: Callable[[Path, ReadingOptions], FormatReader]
     write: Callable[[Path, RecordingContent], None] | None = None
     isolated: bool = False
     keeps_truth: bool = False

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.events import EventBatch
-from spinscope.pipeline.recordings import FORMATS, Recording, open_recording, write_recording
+from spinscope.pipeline.recordings import FORMATS, ReadingOptions, Recording, open_recording, write_recording
 from tests.reference.recordings import ecf_block, naive_order
 
 N = 5000
@@ -214,21 +215,21 @@ def test_attributes_are_kept_as_numbers_and_texts(tmp_path: Path) -> None:
 
 CASES: dict[str, tuple[Callable[[dict[str, Any]], dict[str, Any]], str]] = {
     "lengths": (lambda c: {**c, "x": c["x"][:-1]}, r"columns differ in length.*x \(4999,\)"),
-    "two axes": (lambda c: {k: v.reshape(-1, 2) for k, v in c.items()}, "columns differ in length"),
+    "two axes": (lambda c: {k: v.reshape(-1, 2) for k, v in c.items()}, "columns differ in length|holds no events"),
     "text": (lambda c: {**c, "x": c["x"].astype("S4")}, "column x holds .*not numbers"),
-    "polarity": (
-        lambda c: {**c, "p": c["p"] + (np.arange(N) == 70) * 7},
-        r"p = [78] at event 70 is none of 1",
-    ),
+    "polarity": (lambda c: {**c, "p": c["p"] + (np.arange(N) % 70 == 0) * 7}, r"p = [78] at event 0 is none of 1"),
     "negative pixel": (
-        lambda c: {**c, "y": c["y"] - 2000 * (np.arange(N) == 9)},
-        "y = -.* at event 9 is negative",
+        lambda c: {**c, "y": c["y"] - 2000 * (np.arange(N) % 9 == 1)},
+        "y = -.* at event 1 is no whole pixel from 0 on, and 556 values so far are broken",
     ),
     "half a pixel": (lambda c: {**c, "x": c["x"] + 0.5}, "x = .* at event 0 is no whole pixel"),
-    "no number": (lambda c: {**c, "t": np.where(np.arange(N) == 33, np.nan, c["t"])}, "t = nan at event 33"),
+    "no number": (
+        lambda c: {**c, "t": np.where(np.arange(N) % 33 == 3, np.nan, c["t"])},
+        "t = nan at event 3 is no time",
+    ),
     "huge time": (
-        lambda c: {**c, "t": c["t"].astype("u8") + (np.arange(N) == 5).astype("u8") * 2**63},
-        "at event 5 is no time",
+        lambda c: {**c, "t": c["t"].astype("u8") + (np.arange(N) % 5 == 4).astype("u8") * 2**63},
+        "at event 4 is no time",
     ),
     "backwards": (
         lambda c: {**c, "t": np.roll(c["t"], N // 2)},
@@ -385,7 +386,7 @@ def test_bombs_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind
         np.savez_compressed(path, **zeros)
     (format,) = (format for format in FORMATS if f".{kind}" in format.suffixes)
     with pytest.raises(RecordingError, match=r"would unpack from 0\.\d+ MB to \d+ MB"):
-        format.open(path)  # in this process, for the limit lowered here
+        format.open(path, ReadingOptions())  # in this process, for the limit lowered here
 
 
 @pytest.mark.parametrize("kind", ["h5", "npz"])
@@ -476,3 +477,35 @@ def test_hdf5_behind_a_user_block_is_read(tmp_path: Path) -> None:
         for name, values in some_columns().items():
             file[f"events/{name}"] = values
     assert_columns(open_recording(tmp_path / "a.h5").read(), some_columns())
+
+
+BROKEN: dict[str, Callable[[dict[str, Any], NDArray[np.bool_]], dict[str, Any]]] = {
+    "pixel far outside": lambda c, one: {**c, "y": np.where(one, 33014, c["y"]).astype("u2")},
+    "negative pixel": lambda c, one: {**c, "x": np.where(one, -32522, c["x"]).astype("i2")},
+    "half a pixel": lambda c, one: {**c, "x": np.where(one, 7.5, c["x"])},
+    "pixel that is no number": lambda c, one: {**c, "y": np.where(one, np.nan, c["y"])},
+    "time that is no number": lambda c, one: {**c, "t": np.where(one, np.nan, c["t"])},
+    "time beyond all": lambda c, one: {**c, "t": np.where(one, -(2**63), c["t"])},
+    "polarity": lambda c, one: {**c, "p": np.where(one, 9, c["p"])},
+}
+
+
+@pytest.mark.parametrize("kind", ["h5", "npz"])
+@pytest.mark.parametrize("stated", [True, False])
+@pytest.mark.parametrize("case", BROKEN)
+def test_one_broken_value_costs_one_event(tmp_path: Path, case: str, stated: bool, kind: str) -> None:
+    one = np.arange(N) == 700
+    columns, path = some_columns(), tmp_path / f"a.{kind}"
+    if kind == "h5":
+        write_columns(path, BROKEN[case](columns, one), chunks=(100,))
+    else:
+        np.savez(path, **BROKEN[case](columns, one))
+    recording = open_recording(path, sensor=(640, 480) if stated else None)
+    assert_columns(recording.read(), {name: column[~one] for name, column in columns.items()})
+    assert (recording.width_px, recording.height_px) == (640, 480)
+    damage = recording.damage
+    assert damage.broken_events + damage.outside_events == 1
+    assert any("1 events" in warning for warning in recording.warnings)
+    later = recording.read(400_000, 500_000)
+    inside = (columns["t"] >= 400_000) & (columns["t"] < 500_000)
+    assert_columns(later, {name: column[inside] for name, column in columns.items()})

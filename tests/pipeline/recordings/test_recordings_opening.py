@@ -17,7 +17,7 @@ HEADS = {
     "a.aedat4": (b"#!AER-DAT4.0\r\n", "AEDAT file is not read here"),
     "a.bag": (b"#ROSBAG V2.0\n", "ROS bag file is not read here"),
     "a.db3": (b"SQLite format 3\0", "ROS 2 bag"),
-    "a.npy": (b"\x93NUMPY\x01\x00", "single NumPy array"),
+    "a.npy": (b"\x93NUMPY\x01\x00", "NPY file is damaged or was cut"),
     "a.h5.gz": (b"\x1f\x8b\x08\x00", "gzip-packed"),
     "a.h5": (b"version https://git-lfs.github.com", "file named .h5 is no HDF5 file"),
     "a.raw": (b"\x00\x01\x02\x03", "file named .raw is no Prophesee RAW file"),

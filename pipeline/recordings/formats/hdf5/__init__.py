@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ....isolation import without_time_limit
-from ...reader import FormatReader
+from ...reader import FormatReader, ReadingOptions
 from ..registry import FORMATS, RecordingContent, RecordingFormat
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -16,11 +16,11 @@ def _sniff(path: Path, head: bytes) -> bool:
     return any(head.startswith(SIGNATURE, place) for place in SIGNATURE_PLACES)
 
 
-def _open(path: Path) -> FormatReader:
+def _open(path: Path, options: ReadingOptions) -> FormatReader:
     with without_time_limit():
         from .reader import Hdf5Reader  # h5py takes 0.1 s to load
 
-    return Hdf5Reader(path)
+    return Hdf5Reader(path, options)
 
 
 def _write(path: Path, content: RecordingContent) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +14,21 @@ from numpy.typing import NDArray
 from ....errors import RecordingError
 from ....isolation import without_time_limit
 from ....results import Truth
-from ...column_types import ColumnTypes, check_expansion, check_types, named_columns
-from ...reader import MAX_DISORDER_US, FormatReader, Place, ReadPass, Triggers, UncheckedEvents, file_errors
+from ...column_types import ColumnTypes, check_expansion, check_types, column_order
+from ...reader import (
+    MAX_DISORDER_US,
+    Damage,
+    FormatReader,
+    Place,
+    ReadingOptions,
+    ReadPass,
+    Triggers,
+    UncheckedEvents,
+    file_errors,
+)
 from ...sensor import Resolution, geometry_or_none, resolution_or_none
+from ...time_units import split_unit, unit_of
+from .layout import TABLE_COLUMNS, ColumnPlace, EventLayout, find_layout
 from .storage import own_dataset
 
 if TYPE_CHECKING:
@@ -23,7 +36,7 @@ if TYPE_CHECKING:
 
 ECF_FILTER = 0x8ECF  # Prophesee's event compression, in no plugin package; decoded in `ecf.py`
 SAMPLED_ROWS = 4096  # times looked at, first and last, to tell seconds from microseconds
-COMPOUNDS = ("CD/events", "events")
+TIME_UNIT_NAMES = ("time_unit", "time_units", "unit", "units")
 TRIGGERS = "EXT_TRIGGER/events"
 
 
@@ -31,36 +44,39 @@ class Hdf5Reader(FormatReader):
     """Reader of one HDF5 recording."""
 
     seeks = True
+    takes = ("dataset", "time_unit")
 
-    def __init__(self, path: Path) -> None:
-        super().__init__(path)
+    def __init__(self, path: Path, options: ReadingOptions) -> None:
+        super().__init__(path, options)
         with file_errors(path, "HDF5"), h5py.File(path, "r") as file:
-            table = Hdf5Table(file, path)
-            self.format, self.events = table.format, table.rows
+            self._layout = find_layout(file, options.dataset, path, self.warnings)
+            table = Hdf5Table(file, self._layout, path)
+            self.format, self.events = self._layout.format, table.rows
             self.attributes = _attributes(file, file.attrs)
-            self.stated = _stated_sensor(table.attribute_places, self.warnings)
+            self.stated = _stated_sensor(table.attribute_places, path, self.warnings)
             self.t_offset_us = _t_offset_us(file, path)
-            first = table.rows_of(0, min(SAMPLED_ROWS, table.rows))[0]
-            last = table.rows_of(max(table.rows - SAMPLED_ROWS, 0), table.rows)[0]
-        self._types = ColumnTypes(path, np.concatenate([first, last]))
-        if self._types.warning:
-            self.warnings.append(self._types.warning)
+            first = table.rows_of(0, min(SAMPLED_ROWS, table.rows))["t"]
+            last = table.rows_of(max(table.rows - SAMPLED_ROWS, 0), table.rows)["t"]
+            unit = _stated_unit(file, table)
+        self._types = ColumnTypes(path, options, unit, np.concatenate([first, last]), table.rows)
+        self.warnings += self._types.warnings
 
     def columns(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
         """Yield the events."""
         with file_errors(self.path, "HDF5"), h5py.File(self.path, "r") as file:
-            table = Hdf5Table(file, self.path)
+            table = Hdf5Table(file, self._layout, self.path)
             if TRIGGERS in file:
                 reading.triggers.append(_triggers(own_dataset(file[TRIGGERS], self.path)))
             first = 0 if reading.place is None else reading.place.offset
             reading.first_row = first
             for row in range(first, table.rows, reading.max_events):
                 upto = min(row + reading.max_events, table.rows)
-                block = self._types.columns(row, *table.rows_of(row, upto))
+                block = self._types.columns(row, **table.rows_of(row, upto), damage=reading.damage)
                 reading.place = Place(upto)
-                yield block
+                if len(block):
+                    yield block
                 reading.report(upto - first, table.rows - first)
-                if reading.is_past(int(block.t_us[-1])):
+                if len(block) and reading.is_past(int(block.t_us[-1])):
                     return
 
     def truth(self) -> Truth | None:
@@ -73,54 +89,81 @@ class Hdf5Reader(FormatReader):
     def place_before(self, start_us: int) -> Place | None:
         """Find the place by bisection, close to the first event that is not earlier."""
         with file_errors(self.path, "HDF5"), h5py.File(self.path, "r") as file:
-            table = Hdf5Table(file, self.path)
+            table = Hdf5Table(file, self._layout, self.path)
             low, high = 0, table.rows  # invariant: all rows before low are early
             while high - low > 1:
                 middle = (low + high) // 2
-                t_us = self._types.columns(middle, *table.rows_of(middle, middle + 1)).t_us
-                # Later events may be up to 10 ms earlier than this one, earlier events up to 10 ms later.
-                if int(t_us[0]) + MAX_DISORDER_US < start_us:
+                t_us = self._types.columns(middle, **table.rows_of(middle, middle + 1), damage=Damage()).t_us
+                # Later events may be up to 10 ms earlier than this one, earlier events up to 10 ms later. A broken
+                # row tells nothing.
+                if t_us.size and int(t_us[0]) + MAX_DISORDER_US < start_us:
                     low = middle
                 else:
                     high = middle
             return Place(low)
 
 
+class RowDataset:
+    """Dataset whose rows are events: (n,), or (n, width) or (width, n), as MATLAB writes it."""
+
+    def __init__(self, data: h5py.Dataset, width: int) -> None:
+        self.data = data
+        self._across = data.ndim == 2 and data.shape[0] == width != data.shape[1]
+        self.fits = data.ndim == 1 or (data.ndim == 2 and width in data.shape)
+        self.rows = int(data.shape[self._across]) if self.fits else 0
+
+    def read(self, first: int, upto: int) -> NDArray[Any]:
+        """Read rows [first, upto): (n,), or (n, width) of a table."""
+        block: NDArray[Any] = self.data[:, first:upto].T if self._across else self.data[first:upto]
+        return block.reshape(-1) if block.shape[1:] == (1,) else block
+
+
 class Hdf5Table:
     """Event rows of an open file, checked for being all there and readable; raises RecordingError otherwise."""
 
-    def __init__(self, file: h5py.File, path: Path) -> None:
+    def __init__(self, file: h5py.File, layout: EventLayout, path: Path) -> None:
         self._path = path
-        self.format, self._place, self._names, self._compound = _layout(file, path)
-        place = file[self._place]
-        self._sets = {self._place: place} if self._compound else {c: place[n] for c, n in self._names.items()}
-        shapes = {name: data.shape for name, data in self._sets.items()}
-        if len(set(shapes.values())) > 1 or any(len(shape) != 1 for shape in shapes.values()):
-            listed = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+        is_table = layout.columns is None
+        places = layout.columns or {c: ColumnPlace(layout.path, k) for k, c in enumerate("txyp")}
+        width = TABLE_COLUMNS if is_table else 1
+        self._sets = {name: RowDataset(file[name], width) for name in {at.dataset: None for at in places.values()}}
+        if len({rows.rows for rows in self._sets.values()}) > 1 or not all(rows.fits for rows in self._sets.values()):
+            listed = ", ".join(f"{c} {file[at.dataset].shape}" for c, at in places.items())
             raise RecordingError(f"event columns differ in length ({listed}): export the recording again: {path}")
-        self.rows = int(next(iter(shapes.values()))[0])
-        check_types(path, {c: place.dtype[n] if self._compound else place[n].dtype for c, n in self._names.items()})
-        # Root, events, and the group that they lie in.
-        self.attribute_places = [file, place, place.parent]
+        self.rows = next(iter(self._sets.values())).rows
         self._ecf: EcfRows | None = None
-        for data in self._sets.values():
-            self._check_storage(data)
+        for rows in self._sets.values():
+            self._check_storage(rows.data)
+        self._columns = self._told_apart(layout) if is_table else places
+        types = {c: (self._sets[at.dataset].data.dtype, at.part) for c, at in self._columns.items()}
+        check_types(path, {c: dtype[part] if isinstance(part, str) else dtype for c, (dtype, part) in types.items()})
+        # Root, events, and the group that they lie in.
+        self.attribute_places = [file, file[layout.path], file[layout.path].parent]
+        self.times = self._columns["t"]
 
-    def rows_of(self, first: int, upto: int) -> tuple[NDArray[Any], ...]:
+    def rows_of(self, first: int, upto: int) -> dict[str, NDArray[Any]]:
         """Read t, x, y and p of rows [first, upto), in the types of the file."""
         if self._ecf is not None:
-            return self._ecf.rows_of(first, upto)
-        if not self._compound:
-            return tuple(self._sets[c][first:upto] for c in "txyp")
-        records = self._sets[self._place][first:upto]
-        return tuple(np.ascontiguousarray(records[self._names[c]]) for c in "txyp")
+            return dict(zip("txyp", self._ecf.rows_of(first, upto), strict=True))
+        blocks = {name: rows.read(first, upto) for name, rows in self._sets.items()}
+        return {c: _part(blocks[at.dataset], at.part) for c, at in self._columns.items()}
+
+    def _told_apart(self, layout: EventLayout) -> dict[str, ColumnPlace]:
+        """Places of the columns of a table, told from the values in its first rows."""
+        order = column_order(self._sets[layout.path].read(0, min(SAMPLED_ROWS, self.rows)))
+        if order is None:
+            raise RecordingError(
+                f"columns of {layout.path} cannot be told apart, one of times in order and one of polarities are "
+                f"needed: export t, x, y and p under their names: {self._path}"
+            )
+        return {c: ColumnPlace(layout.path, k) for c, k in order.items()}
 
     def _check_storage(self, data: h5py.Dataset) -> None:
         """Refuse other files, missing blocks (HDF5 would read zeros), decompression bombs, and unknown filters."""
         own_dataset(data, self._path)
-        unpacked = self.rows * data.dtype.itemsize
+        unpacked = data.size * data.dtype.itemsize
         if data.chunks is not None:
-            chunks = -(-self.rows // data.chunks[0])
+            chunks = prod(-(-size // chunk) for size, chunk in zip(data.shape, data.chunks, strict=True))
             present = data.id.get_num_chunks()
             if present < chunks:
                 raise RecordingError(
@@ -137,9 +180,9 @@ class Hdf5Table:
         """Check that the filters can be undone; True if they are Prophesee's, undone by `EcfRows`."""
         filters = data.id.get_create_plist()
         codes = [filters.get_filter(i)[0] for i in range(filters.get_nfilters())]
-        if codes == [ECF_FILTER] and self._compound:
+        if codes == [ECF_FILTER] and data.dtype.names:
             with without_time_limit():
-                from .ecf import EcfRows
+                from .ecf import EcfRows  # compiles a decoder
 
             self._ecf = EcfRows(data, self._path)
             return True
@@ -157,37 +200,11 @@ class Hdf5Table:
         return False
 
 
-def _layout(file: h5py.File, path: Path) -> tuple[str, str, dict[str, str], bool]:
-    """Find the events in a file.
-
-    Returns
-    -------
-    format : str
-        Name of the layout for people.
-    place : str
-        Path of the compound dataset, or of the group of the columns.
-    names : dict of str to str
-        Field or dataset of t, x, y and p.
-    compound : bool
-        Whether the events are one dataset of records.
-    """
-    for place in COMPOUNDS:
-        item = file.get(place)
-        if isinstance(item, h5py.Dataset) and item.dtype.names:
-            names = named_columns(item.dtype.names)
-            if names is not None:
-                maker = "Prophesee HDF5" if place.startswith("CD") else "HDF5"
-                return f"{maker} compound", place, names, True
-    for place in ("events", "/"):
-        item = file.get(place)
-        if isinstance(item, h5py.Group):
-            names = named_columns(n for n in item if isinstance(item.get(n), h5py.Dataset))
-            if names is not None:
-                return "HDF5 columns", place, names, False
-    present = ", ".join(sorted(file)[:8]) or "nothing"
-    raise RecordingError(
-        f"HDF5 file holds no events (it has {present}): /CD/events or /events/x, y, t, p needed: {path}"
-    )
+def _part(block: NDArray[Any], part: str | int | None) -> NDArray[Any]:
+    """A field of records, a column of a table, or all of a column."""
+    if part is None:
+        return block
+    return np.ascontiguousarray(block[part] if isinstance(part, str) else block[:, part])
 
 
 def _attributes(place: h5py.HLObject, names: Iterable[str]) -> dict[str, str | float]:
@@ -208,14 +225,36 @@ def _attributes(place: h5py.HLObject, names: Iterable[str]) -> dict[str, str | f
     return found
 
 
-def _stated_sensor(places: list[h5py.HLObject], warnings: list[str]) -> Resolution | None:
+def _stated_sensor(places: list[h5py.HLObject], path: Path, warnings: list[str]) -> Resolution | None:
     for place in places:
-        attributes = _attributes(place, [name for name in ("width", "height", "geometry") if name in place.attrs])
+        attributes = _attributes(
+            place, [name for name in ("width", "height", "geometry", "sensor_resolution") if name in place.attrs]
+        )
         if "width" in attributes and "height" in attributes:
             return resolution_or_none(attributes["width"], attributes["height"], warnings)
         if "geometry" in attributes:
             return geometry_or_none(str(attributes["geometry"]), warnings)
+        if "sensor_resolution" in attributes:  # rows before columns, as event_utils and its like write it
+            height, _, width = str(attributes["sensor_resolution"]).partition(",")
+            return resolution_or_none(width, height, warnings)
+        size = place.get("calib/resolution") if isinstance(place, h5py.Group) else None
+        if isinstance(size, h5py.Dataset) and size.shape == (2,):  # M3ED
+            width, height = own_dataset(size, path)[:].tolist()
+            return resolution_or_none(width, height, warnings)
     return None
+
+
+def _stated_unit(file: h5py.File, table: Hdf5Table) -> str | None:
+    """Unit of the times by the name of their column, or by attributes of it, of the events or of the file."""
+    place = table.times
+    name = place.part if isinstance(place.part, str) else place.dataset.rpartition("/")[2]
+    words = [
+        _attributes(item, [name])[name]
+        for item in (file[place.dataset], *table.attribute_places)
+        for name in TIME_UNIT_NAMES
+        if name in item.attrs
+    ]
+    return split_unit(name)[1] or next((unit for word in words if (unit := unit_of(word))), None)
 
 
 def _t_offset_us(file: h5py.File, path: Path) -> int | None:

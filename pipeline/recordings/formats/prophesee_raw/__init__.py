@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ...reader import FormatReader
+from ...reader import FormatReader, ReadingOptions
 from ..prophesee_dat import is_dat
 from ..registry import FORMATS, RecordingContent, RecordingFormat
 
@@ -13,10 +13,10 @@ def _sniff(path: Path, head: bytes) -> bool:
     return head.startswith(b"% ") and not is_dat(path, head)
 
 
-def _open(path: Path) -> FormatReader:
+def _open(path: Path, options: ReadingOptions) -> FormatReader:
     from .reader import RawReader  # numba takes 0.3 s to load
 
-    return RawReader(path)
+    return RawReader(path, options)
 
 
 def _write(path: Path, content: RecordingContent) -> None:

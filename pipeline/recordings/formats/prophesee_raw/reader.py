@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ....errors import RecordingError
 from ...prophesee_header import MAX_HEADER_BYTES, parse_header
-from ...reader import FormatReader, Place, ReadPass, Triggers, UncheckedEvents, file_errors
+from ...reader import FormatReader, Place, ReadingOptions, ReadPass, Triggers, UncheckedEvents, file_errors
 from ...sensor import SENSOR_OF_SYSTEM_ID, Resolution, geometry_or_none, resolution_or_none
 from .decoding import BAD_WORDS, EVENTS, OUTSIDE, TIME_HIGH, TIME_JUMPS, TRIGGERS, UNTIMED, Decoded, initial_state
 from .evt2 import HIGH_BITS, HIGH_MASK, decode_evt2
@@ -28,18 +28,18 @@ class RawReader(FormatReader):
     strict_order = False
     seeks = True
 
-    def __init__(self, path: Path) -> None:
-        super().__init__(path)
+    def __init__(self, path: Path, options: ReadingOptions) -> None:
+        super().__init__(path, options)
         with file_errors(path, "RAW"), open(path, "rb") as file:
             head = file.read(MAX_HEADER_BYTES)
         header, self._start = parse_header(head)
         self.attributes |= header
-        options = format_options(header)
-        self._encoding = _encoding(header, options, path)
+        format_said = format_options(header)
+        self._encoding = _encoding(header, format_said, path)
         self.format = f"{self._encoding} RAW"
-        self.stated = _stated_sensor(header, options, self.warnings)
+        self.stated = _stated_sensor(header, format_said, self.warnings)
         two_halves = self._encoding == "EVT2.1"
-        self._legacy = two_halves and self._is_legacy(options.get("endianness", ""), head[self._start :])
+        self._legacy = two_halves and self._is_legacy(format_said.get("endianness", ""), head[self._start :])
 
     def columns(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
         """Yield the events; only the words before, or a decoder's state there, tell the time."""
