@@ -7,7 +7,7 @@ import glob
 import json
 import traceback
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -65,7 +65,7 @@ class BatchWork:
     def settings_hash(self) -> str:
         """Hash of all options that the results depend on."""
         choices = self.choices
-        settings = [choices.parameters().as_dict(), choices.window_us, choices.fixed_ball, choices.sensor_px]
+        settings = [choices.parameters().as_dict(), choices.window_us, choices.fixed_ball, astuple(choices.reading)]
         return digest([*settings, self.method])
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from .errors import ParameterError
 from .events import EventBatch
 from .flight_calibration import FlightCalibration, flight_calibration
+from .recordings import ReadingOptions
 from .recordings.in_memory import RecordingInMemory
 from .registry import Parameters
 from .session import AnyRecording, Choices, Progress, Result, Session, check_method
@@ -85,7 +86,7 @@ def estimate(
             f"a {type(recording).__name__} is no recording: give a path, a Recording, or an EventBatch "
             "(EventBatch.checked makes one of columns t_us, x_px, y_px, on)"
         )
-    choices = Choices(preset, assignments, window_us, None, sensor_px)
+    choices = Choices(preset, assignments, window_us, None, ReadingOptions(sensor=sensor_px))
     session = Session.open(recording, choices, on_progress)
     if isinstance(parameters, Parameters):
         session.parameters = parameters

@@ -15,7 +15,7 @@ from .chain import Chain, EventsInMemory, Tick
 from .errors import ParameterError, RecordingError
 from .events import EventBatch
 from .presets import preset
-from .recordings import Recording, open_recording
+from .recordings import ReadingOptions, Recording, open_recording
 from .recordings.in_memory import RecordingInMemory
 from .recordings.streamed import RecordingPieces, StreamedEvents, events_of
 from .registry import STAGES, Parameters, methods
@@ -52,8 +52,8 @@ class Choices:
         [start, end) in file time: only these events are used.
     fixed_ball : (x_px, y_px, radius_px) or "auto", optional
         Circle of a ball spinner's ball.
-    sensor_px : (int, int), optional
-        Width and height of the sensor.
+    reading : ReadingOptions
+        Statements about the recording: size of the sensor, dataset, unit of time.
     flight_calibration : str or Path, optional
         TOML file with the calibration of the set-up's flights; it goes before the preset.
     """
@@ -62,7 +62,7 @@ class Choices:
     assignments: Sequence[str] = ()
     window_us: tuple[int, int] | None = None
     fixed_ball: tuple[float, float, float] | str | None = None
-    sensor_px: tuple[int, int] | None = None
+    reading: ReadingOptions = ReadingOptions()
     flight_calibration: str | Path | None = None
 
     @property
@@ -107,7 +107,7 @@ class Session:
         parameters = choices.parameters(warnings.append)
         begin = time.perf_counter()
         if isinstance(recording, (str, Path)):
-            recording = open_recording(Path(recording), sensor=choices.sensor_px)
+            recording = open_recording(Path(recording), **dataclasses.asdict(choices.reading))
         source = _source(recording, choices.window_us, on_progress)
         read_seconds = time.perf_counter() - begin
         sidecar = Sidecar.beside(recording.path) if isinstance(recording, Recording) else Sidecar()

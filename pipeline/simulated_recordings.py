@@ -189,7 +189,7 @@ def write_simulation(made: SimulatedRecording, out: Path) -> WrittenSimulation:
     HDF5 carries the truth and what it takes to simulate the scene again; RAW (EVT3) and NPZ hold events alone.
     The file appears only when complete. Raises RecordingError.
     """
-    keeps_truth = format_to_write(out).keeps_truth
+    keeps_truth = "truth" in format_to_write(out).keeps
     attributes = in_memory(made).attributes if keeps_truth else None
     write_recording(
         out, made.events, width_px=made.width_px, height_px=made.height_px, attributes=attributes, truth=made.truth

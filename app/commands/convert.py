@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
-from spinscope.pipeline.recordings import writable_suffixes
+from spinscope.pipeline.recordings import ReadingOptions, writable_suffixes
 
-from ..terminal import ProgressBar
-from .options import RECORDING, sensor_option
+from ..terminal import ProgressBar, note
+from .options import RECORDING, reading_options, window_option
 
 
 @click.command(
@@ -17,10 +17,32 @@ from .options import RECORDING, sensor_option
 )
 @click.argument("source", type=RECORDING)
 @click.argument("target", type=RECORDING)
-@sensor_option
-def convert(source: Path, target: Path, sensor: tuple[int, int] | None) -> None:
+@window_option
+@click.option(
+    "--roi",
+    type=(int, int, click.IntRange(1), click.IntRange(1)),
+    metavar="X Y W H",
+    help="Write only the events in this rectangle, px; size of the sensor and coordinates stay.",
+)
+@reading_options
+def convert(
+    source: Path,
+    target: Path,
+    reading: ReadingOptions,
+    window: tuple[int, int] | None,
+    roi: tuple[int, int, int, int] | None,
+) -> None:
     """Convert a recording."""
     from spinscope.pipeline.recordings import convert as converted
 
     with ProgressBar() as bar:
-        converted(source, target, sensor=sensor, on_progress=lambda share: bar(share, "converting"))
+        losses = converted(
+            source,
+            target,
+            options=reading,
+            window_us=window,
+            roi_px=roi,
+            on_progress=lambda share: bar(share, "converting"),
+        )
+    for loss in losses:
+        note(f"warning: {loss}")

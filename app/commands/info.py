@@ -3,41 +3,42 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 import click
 from rich.table import Table
 
-from spinscope.pipeline.recordings import RecordingInfo, open_recording, summary
+from spinscope.pipeline.recordings import ReadingOptions, RecordingInfo, open_recording, summary
 from spinscope.pipeline.session import Progress
 
 from ..terminal import ProgressBar, console
-from .options import RECORDING, sensor_option, write_text
+from .options import RECORDING, reading_options, write_text
 
 SHOWN = 60  # characters of an attribute; a simulation's scene is a page long
 
 
 @click.command()
 @click.argument("recording", type=RECORDING)
-@sensor_option
+@reading_options
 @click.option("--json", "output", type=click.Path(), help="Write JSON to this file, - for standard output.")
-def info(recording: Path, sensor: tuple[int, int] | None, output: str | None) -> None:
+def info(recording: Path, reading: ReadingOptions, output: str | None) -> None:
     """Say what a recording holds: format, sensor, events, duration, rates, hot pixels, triggers, damage."""
     with ProgressBar() as bar:
-        found = information(recording, sensor, bar)
+        found = information(recording, reading, bar)
     if output:
         write_text(output, json.dumps(found.as_dict(), allow_nan=False) + "\n")
     else:
         print_information(found)
 
 
-def information(path: Path, sensor_px: tuple[int, int] | None, on_progress: Progress) -> RecordingInfo:
+def information(path: Path, reading: ReadingOptions, on_progress: Progress) -> RecordingInfo:
     """Summarise a recording in one pass; raises RecordingError."""
 
     def report(share: float) -> None:
         on_progress(share, "reading")
 
-    return summary(open_recording(path, sensor=sensor_px, on_progress=report), report)
+    return summary(open_recording(path, **asdict(reading), on_progress=report), report)
 
 
 def print_information(info: RecordingInfo) -> None:

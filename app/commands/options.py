@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import click
 
 from spinscope.pipeline.files import atomic_file
+from spinscope.pipeline.recordings import TIME_UNITS, ReadingOptions
 from spinscope.pipeline.session import Choices
 
 RECORDING = click.Path(path_type=Path)
@@ -89,9 +91,47 @@ class ListingCommand(click.Command):
             formatter.write_dl(list(self._entries().items()))
 
 
-sensor_option = click.option(
-    "--sensor", type=SensorSize(), help="Size of the sensor in pixels, where the file does not say it."
+def _window(ctx: click.Context, param: click.Parameter, value: tuple[int, int] | None) -> tuple[int, int] | None:
+    if value and value[0] >= value[1]:
+        raise click.UsageError(f"--window {value[0]} {value[1]} is empty: START_US must be below END_US", ctx)
+    return value
+
+
+window_option = click.option(
+    "--window",
+    type=int,
+    nargs=2,
+    callback=_window,
+    metavar="START_US END_US",
+    help="Use only the events of [START, END), file time in us.",
 )
+
+
+def reading_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the statements about a recording to a command, which gets them as one `reading`."""
+
+    def with_reading(sensor: tuple[int, int] | None, dataset: str | None, time_unit: str | None, **rest: Any) -> None:
+        command(reading=ReadingOptions(sensor=sensor, dataset=dataset, time_unit=time_unit), **rest)
+
+    return _decorated(
+        with_reading,
+        command,
+        click.option(
+            "--sensor", type=SensorSize(), help="Size of the sensor in pixels, where the file does not say it."
+        ),
+        click.option("--dataset", metavar="PATH", help="Events to read where a file holds several streams."),
+        click.option("--time-unit", type=click.Choice(TIME_UNITS), help="Unit of the times in a file of columns."),
+    )
+
+
+def _decorated(
+    wrapper: Callable[..., None], command: Callable[..., None], *options: Callable[..., Any]
+) -> Callable[..., None]:
+    """The wrapper with the options, in this order, and with the command's name, help and options."""
+    wrapper = functools.wraps(command)(wrapper)
+    for option in reversed(options):
+        wrapper = option(wrapper)
+    return wrapper
 
 
 def session_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -109,13 +149,7 @@ def session_options(command: Callable[..., None]) -> Callable[..., None]:
             metavar="STAGE.FIELD=VALUE",
             help="Change one setting; repeatable, like --set logo.pad_px=3.",
         ),
-        click.option(
-            "--window",
-            type=int,
-            nargs=2,
-            metavar="START_US END_US",
-            help="Use only the events of [START, END), file time in us.",
-        ),
+        window_option,
         click.option(
             "--fixed-ball",
             type=FixedBall(),
@@ -126,7 +160,6 @@ def session_options(command: Callable[..., None]) -> Callable[..., None]:
             metavar="FILE.toml",
             help="Lift, drag and plumb line of the set-up, as `analyze --calibrate-flight` wrote them.",
         ),
-        sensor_option,
     )
 
     def with_choices(
@@ -135,18 +168,12 @@ def session_options(command: Callable[..., None]) -> Callable[..., None]:
         window: tuple[int, int] | None,
         fixed_ball: tuple[float, float, float] | str | None,
         flight_calibration: str | None,
-        sensor: tuple[int, int] | None,
+        reading: ReadingOptions,
         **rest: Any,
     ) -> None:
-        if window and window[0] >= window[1]:
-            raise click.UsageError(f"--window {window[0]} {window[1]} is empty: START_US must be below END_US")
-        command(choices=Choices(preset, assignments, window, fixed_ball, sensor, flight_calibration), **rest)
+        command(choices=Choices(preset, assignments, window, fixed_ball, reading, flight_calibration), **rest)
 
-    with_choices.__name__, with_choices.__doc__ = command.__name__, command.__doc__
-    decorated: Callable[..., None] = with_choices
-    for option in reversed(options):
-        decorated = option(decorated)
-    return decorated
+    return reading_options(_decorated(with_choices, command, *options))
 
 
 def write_text(output: str, text: str) -> None:

@@ -18,5 +18,6 @@ from .reader import UncheckedEvents as UncheckedEvents
 from .recording import Recording as Recording
 from .summary import RecordingInfo as RecordingInfo
 from .summary import summary as summary
+from .time_units import TIME_UNITS as TIME_UNITS
 from .writing import convert as convert
 from .writing import write_recording as write_recording

@@ -58,7 +58,7 @@ def open_recording(
     path = Path(path)
     try:
         stated = None if sensor is None else stated_resolution(*sensor, "command line")
-        options = ReadingOptions(dataset=dataset, time_unit=time_unit)
+        options = ReadingOptions(sensor=sensor, dataset=dataset, time_unit=time_unit)
         head = _head(path)
         for format in FORMATS:
             if format.sniff(path, head):

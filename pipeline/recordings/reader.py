@@ -142,16 +142,19 @@ class ReadPass:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadingOptions:
-    """Statements of the user about the events in a file; they beat what the file says and what is guessed.
+    """Statements of the user about a file; they beat what the file says and what is guessed.
 
     Attributes
     ----------
+    sensor : (int, int) or None
+        Width and height of the sensor, pixels.
     dataset : str or None
         Path of the events in a file that holds several streams.
     time_unit : str or None
         Unit of the times: s, ms, us or ns.
     """
 
+    sensor: tuple[int, int] | None = None
     dataset: str | None = None
     time_unit: str | None = None
 
@@ -164,7 +167,7 @@ class FormatReader(ABC):
     options : ReadingOptions
         Statements of the user.
     takes : tuple of str
-        Those of them that mean something for the format.
+        Those of them, besides the sensor, that mean something for the format.
     format : str
         Format and encoding for people.
     strict_order : bool

@@ -207,8 +207,10 @@ class Recording:
         return EventBatch.concatenate(parts)
 
     def identity(self) -> str:
-        """Hash of the file; see `file_identity`."""
-        return file_identity(self.path)
+        """Hash of the file (see `file_identity`) and of the statements about its events, 32 hexadecimal digits."""
+        options = self._reader.options
+        stated = f"{file_identity(self.path)} {options.dataset} {options.time_unit}"
+        return hashlib.blake2b(stated.encode(), digest_size=16).hexdigest()
 
     def _chosen_sensor(self, on_progress: Progress | None) -> Resolution:
         if self._asked is not None:

@@ -12,6 +12,7 @@ from ..errors import RecordingError
 
 # Microseconds in one unit, and the words that files use for it.
 UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
+TIME_UNITS = tuple(UNITS_US)
 WORDS = {
     "s": ("s", "sec", "secs", "second", "seconds"),
     "ms": ("ms", "msec", "millisecond", "milliseconds"),

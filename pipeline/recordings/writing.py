@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +13,10 @@ from ..errors import RecordingError
 from ..events import EventBatch
 from ..files import atomic_file
 from ..results import Truth
-from .formats.registry import RecordingContent, format_to_write
+from .formats.registry import RecordingContent, RecordingFormat, format_to_write
 from .opening import open_recording
-from .reader import Progress, Triggers
+from .reader import Progress, ReadingOptions, Triggers
+from .recording import Recording
 from .sensor import Resolution, check_resolution
 
 # Attributes about the encoding of a file, which every format states itself.
@@ -72,18 +73,25 @@ def convert(
     source: str | Path,
     target: str | Path,
     *,
-    sensor: tuple[int, int] | None = None,
+    options: ReadingOptions = ReadingOptions(),  # noqa: B008  frozen
+    window_us: tuple[int, int] | None = None,
+    roi_px: tuple[int, int, int, int] | None = None,
     on_progress: Progress | None = None,
-) -> None:
+) -> list[str]:
     """Write the recording `source` to `target`, in the format of its suffix, in constant memory.
 
     Attributes, triggers, `t_offset` and truth are taken over where the format holds them (see `write_recording`). The
-    truth is not where events had to be moved or dropped, so that its labels do not fit.
+    truth is not where events are moved or left out, so that its labels do not fit.
 
     Parameters
     ----------
-    sensor : (width_px, height_px), optional
-        Size of the sensor, where the file does not state it.
+    options : ReadingOptions
+        Statements about the source.
+    window_us : (int, int), optional
+        [start, end) in the file's time: only these events and triggers are written.
+    roi_px : (x, y, width, height), optional
+        Only the events in this rectangle are written. Coordinates and size of the sensor stay as they are, and with
+        them the camera's principal point.
     on_progress : callable, optional
         Called with the share done, 0..1.
 
@@ -91,10 +99,15 @@ def convert(
     ------
     RecordingError
         `source` cannot be read or `target` not be written.
+
+    Returns
+    -------
+    list of str
+        What the source holds and the target does not, in sentences.
     """
     source, target = Path(source), Path(target)
-    format_to_write(target)  # fails before the source is read
-    recording = open_recording(source, sensor=sensor)
+    format = format_to_write(target)  # fails before the source is read
+    recording = open_recording(source, **asdict(options))
     if target.exists() and os.path.samefile(source, target):
         raise RecordingError(f"a recording cannot be converted onto itself: give another name: {target}")
     read_share = 0.0  # share of the progress before the batches are read
@@ -108,16 +121,18 @@ def convert(
         if recording.known_index() is None:
             recording.scan(lambda share: report(share / 2))
             read_share = 0.5
-        return recording.triggers
+        return recording.triggers.between(start_us, end_us)
 
     def truth() -> Truth | None:
-        damage = recording.damage
-        return None if damage.backward_steps or damage.outside_events else recording.truth
+        whole = window_us is None and roi_px is None and not any(asdict(recording.damage).values())
+        return recording.truth if whole else None
 
+    start_us, end_us = window_us or (-(2**63), 2**63 - 1)
+    batches = recording.chunks(*(window_us or ()), on_progress=report)
     _write(
         RecordingContent(
             path=target,
-            batches=recording.chunks(on_progress=report),
+            batches=batches if roi_px is None else _inside(batches, roi_px),
             width_px=recording.width_px,
             height_px=recording.height_px,
             attributes=recording.attributes,
@@ -126,6 +141,33 @@ def convert(
             t_offset_us=recording.t_offset_us,
         )
     )
+    return _losses(recording, format, truth())
+
+
+def _inside(batches: Iterable[EventBatch], roi_px: tuple[int, int, int, int]) -> Iterator[EventBatch]:
+    """Yield the events in the rectangle (x, y, width, height)."""
+    x, y, width, height = roi_px
+    for batch in batches:
+        columns, rows = batch.x_px.astype(np.int64) - x, batch.y_px.astype(np.int64) - y
+        yield batch[(columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)]
+
+
+def _losses(recording: Recording, format: RecordingFormat, truth: Truth | None) -> list[str]:
+    """Sentences about what a converted recording has lost."""
+    stated = [name for name in recording.attributes if name not in ENCODING_KEYS]
+    there = {
+        "attributes": f"what the recording states ({', '.join(stated)})" if stated else "",
+        "triggers": f"{len(recording.triggers)} triggers" if len(recording.triggers) else "",
+        "t_offset": "t_offset" if recording.t_offset_us is not None else "",
+    }
+    lost = [
+        f"{format.label} does not hold {what}: lost" for key, what in there.items() if what and key not in format.keeps
+    ]
+    if recording.truth is not None and "truth" not in format.keeps:
+        lost.append(f"{format.label} does not hold the simulation's truth: lost")
+    elif recording.truth is not None and truth is None:
+        lost.append("the simulation's truth is lost: its labels do not fit where events are left out or moved")
+    return lost
 
 
 def _write(content: RecordingContent) -> None:

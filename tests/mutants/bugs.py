@@ -681,8 +681,8 @@ COMMANDS = [
     ),
     Mutant(
         "app/commands/info.py",
-        "found = information(recording, sensor, bar)",
-        "found = information(recording, None, bar)",
+        "found = information(recording, reading, bar)",
+        "found = information(recording, ReadingOptions(), bar)",
         "tests/app/test_info.py",
     ),
 ]

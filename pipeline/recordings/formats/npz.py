@@ -229,6 +229,7 @@ FORMATS.register(
         open=NpzReader,
         write=write_npz,
         isolated=True,
+        keeps=frozenset({"attributes"}),
     )
 )
 FORMATS.register(

@@ -62,8 +62,8 @@ class RecordingFormat:
     isolated : bool
         Whether files are opened and read in a process with limits: for those read through a foreign library. The reader
         has to be picklable before and after a pass, and `open` a function of a module.
-    keeps_truth : bool
-        Whether written files hold truth and scene of a simulation.
+    keeps : frozenset of str
+        What written files hold beside events and sensor: of "attributes", "triggers", "truth" and "t_offset".
     """
 
     name: str
@@ -73,7 +73,7 @@ class RecordingFormat:
     open: Callable[[Path, ReadingOptions], FormatReader]
     write: Callable[[Path, RecordingContent], None] | None = None
     isolated: bool = False
-    keeps_truth: bool = False
+    keeps: frozenset[str] = frozenset()
 
     @property
     def listed(self) -> str:

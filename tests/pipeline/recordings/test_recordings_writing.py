@@ -189,3 +189,38 @@ def test_what_no_reader_would_take_back_is_not_written(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="EVT3 holds pixels up to 2047"):
         write_recording(tmp_path / "a.raw", events, width_px=2049, height_px=720)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("second", ["h5", "npz", "raw"])
+def test_conversion_of_a_part_leaves_the_rest_out_and_says_so(tmp_path: Path, second: str) -> None:
+    events = moving_edge(2000)
+    edges = Triggers(events.t_us[[400, 1500]], np.array([1, 0], np.uint8), np.array([0, 6], np.uint8))
+    source, target = tmp_path / "a.h5", tmp_path / f"b.{second}"
+    size = {"width_px": 1280, "height_px": 720}
+    write_recording(source, events, **size, triggers=edges, truth=some_truth(events), t_offset_us=77)
+    start_us, end_us = int(events.t_us[300]), int(events.t_us[1200])
+    x, y = int(events.x_px[600]), int(events.y_px[600])
+    roi = (x - 40, y - 300, 90, 310)
+    lost = " / ".join(convert(source, target, window_us=(start_us, end_us), roi_px=roi))
+    inside = (np.abs(events.x_px.astype(int) - (x + 4.5)) < 45) & (np.abs(events.y_px.astype(int) - (y - 145.5)) < 155)
+    inside &= (events.t_us >= start_us) & (events.t_us < end_us)
+    assert 0 < np.count_nonzero(inside) < 900
+    recording = open_recording(target)
+    assert_same_events(recording.read(), events[inside])
+    assert (recording.width_px, recording.height_px) == (1280, 720)
+    assert recording.truth is None and "truth" in lost
+    assert recording.triggers.t_us.tolist() == ([] if second == "npz" else [int(events.t_us[400])])
+    assert ("triggers: lost" in lost) == (second == "npz")
+    assert ("t_offset: lost" in lost) == (second != "h5")
+
+
+def test_conversion_says_nothing_is_lost_where_nothing_is(tmp_path: Path) -> None:
+    events = moving_edge(500)
+    stated: dict[str, str | float] = {"camera.focal_length_mm": 16.0}
+    write_recording(
+        tmp_path / "a.h5", events, width_px=1280, height_px=720, attributes=stated, truth=some_truth(events)
+    )
+    assert convert(tmp_path / "a.h5", tmp_path / "b.h5") == []
+    assert convert(tmp_path / "b.h5", tmp_path / "c.npz") == ["NPZ does not hold the simulation's truth: lost"]
+    for name in ("b.h5", "c.npz"):
+        assert open_recording(tmp_path / name).attributes["camera.focal_length_mm"] == 16.0

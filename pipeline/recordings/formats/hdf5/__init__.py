@@ -38,6 +38,6 @@ FORMATS.register(
         open=_open,
         write=_write,
         isolated=True,
-        keeps_truth=True,
+        keeps=frozenset({"attributes", "triggers", "truth", "t_offset"}),
     )
 )

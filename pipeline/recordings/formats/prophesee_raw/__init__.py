@@ -27,6 +27,12 @@ def _write(path: Path, content: RecordingContent) -> None:
 
 FORMATS.register(
     RecordingFormat(
-        name="prophesee_raw", label="Prophesee RAW", suffixes=(".raw",), sniff=_sniff, open=_open, write=_write
+        name="prophesee_raw",
+        label="Prophesee RAW",
+        suffixes=(".raw",),
+        sniff=_sniff,
+        open=_open,
+        write=_write,
+        keeps=frozenset({"attributes", "triggers"}),
     )
 )

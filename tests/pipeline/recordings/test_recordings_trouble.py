@@ -1,0 +1,56 @@
+"""Small recordings after kinds of trouble that users report, all of one spinner's 9,917 events."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from spinscope.pipeline.errors import RecordingError
+from spinscope.pipeline.recordings import open_recording
+
+FOLDER = Path(os.environ.get("SPINSCOPE_REAL_RECORDINGS", "")) / "trouble"
+pytestmark = pytest.mark.skipif(
+    "SPINSCOPE_REAL_RECORDINGS" not in os.environ, reason="SPINSCOPE_REAL_RECORDINGS names no folder of recordings"
+)
+
+READ = {
+    "01_event_utils_xs_ys_ts_ps.h5": {},
+    "02_v2e_events_Nx4.h5": {},
+    "04_m3ed_prophesee_left.h5": {"dataset": "prophesee/left"},
+    "05_mvsec_davis_left_events.h5": {"dataset": "davis/left"},
+    "06_times_ns_int.npz": {"time_unit": "ns"},
+    "06c_times_ms_float.npz": {"time_unit": "ms"},
+    "07b_userblock512.h5": {},
+    "07c_columns_Nx1.h5": {},
+    "09_npz_events_Nx4.npz": {},
+    "20_evt3_plain.raw": {},
+    "22b_dat_header_date_first.dat": {},
+}
+
+
+@pytest.mark.parametrize("name", READ)
+def test_layouts_in_use_are_read(name: str) -> None:
+    events = open_recording(FOLDER / name, **READ[name]).read()
+    plain = open_recording(FOLDER / "20_evt3_plain.raw").read()
+    assert (len(events), int(events.t_us[0]), int(events.t_us[-1])) == (9917, 31, 99_937)
+    for column in ("x_px", "y_px", "on"):
+        assert getattr(events, column).sum() == getattr(plain, column).sum(), column
+
+
+@pytest.mark.parametrize("name", ["03_one_event_y33014.h5", "03b_one_event_y33014_geometry.h5"])
+def test_one_broken_coordinate_costs_one_event(name: str) -> None:
+    recording = open_recording(FOLDER / name)
+    assert len(recording.read()) == 9916
+    assert recording.damage.outside_events == 1
+
+
+@pytest.mark.parametrize(("name", "unit"), [("06_times_ns_int.npz", "ns"), ("06c_times_ms_float.npz", "ms")])
+def test_an_implausible_rate_is_warned_of_with_its_remedy(name: str, unit: str) -> None:
+    assert any(f"--time-unit {unit}" in warning for warning in open_recording(FOLDER / name).warnings)
+
+
+def test_a_dataset_without_events_is_refused_with_those_that_hold_some() -> None:
+    with pytest.raises(RecordingError, match="give one of prophesee/left"):
+        open_recording(FOLDER / "04_m3ed_prophesee_left.h5", dataset="ovc/left")
