@@ -19,7 +19,7 @@ from spinscope.pipeline.errors import ParameterError, RecordingError, SpinscopeE
 from spinscope.pipeline.evaluation.tables import Row
 from spinscope.pipeline.evaluation.tasks import Task, TaskContext, digest, executor, performed, text_digest
 from spinscope.pipeline.files import check_writable
-from spinscope.pipeline.recordings import readable_suffixes
+from spinscope.pipeline.recordings import is_recording, readable_suffixes
 from spinscope.pipeline.recordings.recording import file_identity
 from spinscope.pipeline.result_rows import ResultRow, shot_columns, shot_rows, tick_columns, tick_rows
 from spinscope.pipeline.session import Choices, Progress
@@ -89,15 +89,15 @@ class BatchSummary:
 def recordings_in(names: Sequence[Path], others: Collection[Path] = ()) -> list[Path]:
     """Recordings named by files, folders (with those below) and patterns like `day1/*.raw`; each once.
 
-    A folder's recordings are told by their suffixes; `others` are no recordings. Raises RecordingError for a folder or
-    a pattern without one.
+    A folder's recordings are told by their suffixes, texts by their content; `others` are no recordings. Raises
+    RecordingError for a folder or a pattern without one.
     """
     found: dict[Path, None] = {}
     not_these = {path.absolute() for path in others}
     for name in names:
         if name.is_dir():
-            below = sorted(path for path in name.rglob("*") if path.suffix.lower() in readable_suffixes())
-            these = [path for path in below if path.is_file() and path.absolute() not in not_these]
+            below = sorted(path for path in name.rglob("*") if is_recording(path))
+            these = [path for path in below if path.absolute() not in not_these]
             if not these:
                 raise RecordingError(f"the folder holds no recordings ({', '.join(readable_suffixes())}): {name}")
         elif not name.exists() and glob.has_magic(str(name)):

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from spinscope.pipeline.biases import CURVES, BiasParameters
 from spinscope.pipeline.errors import ParameterError, RecordingError, SpinscopeError
 from spinscope.pipeline.events import EventBatch
-from spinscope.pipeline.recordings import open_recording, readable_suffixes
+from spinscope.pipeline.recordings import is_recording, open_recording
 from spinscope.pipeline.registry import Parameters
 from spinscope.pipeline.session import AnyRecording, Session
 from spinscope.pipeline.sidecar import biases_beside
@@ -136,7 +136,7 @@ def bias_state(recording: AnyRecording) -> BiasState:
 
 def known_biases(path: Path, recording: AnyRecording | None = None) -> BiasParameters | None:
     """Biases that a recording has in a sidecar, or states itself; None where it has none or is unreadable."""
-    if path.suffix.lower() not in readable_suffixes() or not path.is_file():
+    if not is_recording(path):
         return None
     try:
         beside = biases_beside(path)

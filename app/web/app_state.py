@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 
 from spinscope.app.viewer.drawing_cache import DrawingCache
 from spinscope.pipeline.errors import ParameterError, RecordingError
-from spinscope.pipeline.recordings import readable_suffixes
+from spinscope.pipeline.recordings import is_recording
 from spinscope.pipeline.session import Choices, Progress
 
 from .client_session import ClientSession
@@ -76,8 +76,7 @@ class AppState:
 
     def recording_names(self) -> list[str]:
         """Names of the recordings in the folder."""
-        suffixes = readable_suffixes()
-        found = {path.name for path in self.folder.iterdir() if path.suffix.lower() in suffixes and path.is_file()}
+        found = {path.name for path in self.folder.iterdir() if is_recording(path)}
         return sorted(found | {self.path.name})
 
     def open_session(self, name: str | None) -> ClientSession:

@@ -7,6 +7,7 @@ from .formats.registry import FORMATS as FORMATS
 from .formats.registry import RecordingContent as RecordingContent
 from .formats.registry import RecordingFormat as RecordingFormat
 from .formats.registry import format_to_write as format_to_write
+from .formats.registry import is_recording as is_recording
 from .formats.registry import readable_suffixes as readable_suffixes
 from .formats.registry import writable_suffixes as writable_suffixes
 from .opening import open_recording as open_recording

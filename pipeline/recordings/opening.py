@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import RecordingError
-from .formats.registry import FORMATS, HEAD_BYTES
+from .formats.registry import FORMATS, head_of
 from .isolated_reader import IsolatedReader
 from .reader import FormatReader, Progress, ReadingOptions
 from .recording import Recording
@@ -60,7 +60,7 @@ def open_recording(
         stated = None if sensor is None else stated_resolution(*sensor, "command line")
         options = ReadingOptions(sensor=sensor, dataset=dataset, time_unit=time_unit)
         head = _head(path)
-        for format in FORMATS:
+        for format in sorted(FORMATS, key=lambda format: format.generic):
             if format.sniff(path, head):
                 opened = IsolatedReader(format.open, path, options) if format.isolated else format.open(path, options)
                 opened.warnings += _unused(opened)
@@ -90,8 +90,7 @@ def _head(path: Path) -> bytes:
             raise RecordingError(f"recording does not exist: check the name and the folder: {path}")
         if not path.is_file():
             raise RecordingError(f"recording is not an ordinary file: copy it into one first: {path}")
-        with open(path, "rb") as file:
-            head = file.read(HEAD_BYTES)
+        head = head_of(path)
     except PermissionError as error:
         raise RecordingError(f"recording may not be read: ask for the right to read it: {path}") from error
     except (OSError, ValueError) as error:

@@ -156,6 +156,7 @@ def _losses(recording: Recording, format: RecordingFormat, truth: Truth | None) 
     """Sentences about what a converted recording has lost."""
     stated = [name for name in recording.attributes if name not in ENCODING_KEYS]
     there = {
+        "sensor": f"the size of the sensor (state it with --sensor {recording.width_px}x{recording.height_px})",
         "attributes": f"what the recording states ({', '.join(stated)})" if stated else "",
         "triggers": f"{len(recording.triggers)} triggers" if len(recording.triggers) else "",
         "t_offset": "t_offset" if recording.t_offset_us is not None else "",

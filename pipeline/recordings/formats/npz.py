@@ -229,7 +229,7 @@ FORMATS.register(
         open=NpzReader,
         write=write_npz,
         isolated=True,
-        keeps=frozenset({"attributes"}),
+        keeps=frozenset({"sensor", "attributes"}),
     )
 )
 FORMATS.register(

@@ -63,7 +63,10 @@ class RecordingFormat:
         Whether files are opened and read in a process with limits: for those read through a foreign library. The reader
         has to be picklable before and after a pass, and `open` a function of a module.
     keeps : frozenset of str
-        What written files hold beside events and sensor: of "attributes", "triggers", "truth" and "t_offset".
+        What written files hold beside the events: of "sensor", "attributes", "triggers", "truth" and "t_offset".
+    generic : bool
+        Whether other kinds of files look alike and have these suffixes, too: the format is asked last, and in a folder
+        the content tells.
     """
 
     name: str
@@ -73,7 +76,8 @@ class RecordingFormat:
     open: Callable[[Path, ReadingOptions], FormatReader]
     write: Callable[[Path, RecordingContent], None] | None = None
     isolated: bool = False
-    keeps: frozenset[str] = frozenset()
+    keeps: frozenset[str] = frozenset({"sensor"})
+    generic: bool = False
 
     @property
     def listed(self) -> str:
@@ -83,6 +87,24 @@ class RecordingFormat:
 
 HEAD_BYTES = 4096
 FORMATS: Registry[RecordingFormat] = Registry("recording format")
+
+
+def head_of(path: Path) -> bytes:
+    """First HEAD_BYTES bytes of a file; raises OSError."""
+    with open(path, "rb") as file:
+        return file.read(HEAD_BYTES)
+
+
+def is_recording(path: Path) -> bool:
+    """Whether a file in a folder is taken as a recording: by its suffix, and by its content where that is shared."""
+    suffix = path.suffix.lower()
+    for format in FORMATS:
+        if suffix in format.suffixes and path.is_file():
+            try:
+                return not format.generic or format.sniff(path, head_of(path))
+            except OSError:
+                return True  # its reader says what is wrong
+    return False
 
 
 def readable_suffixes() -> tuple[str, ...]:

@@ -118,8 +118,8 @@ def test_conversion_keeps_events_and_what_the_format_can_hold(tmp_path: Path, fi
 def test_conversion_refuses_what_it_cannot_do(tmp_path: Path) -> None:
     source = tmp_path / "a.h5"
     write_recording(source, moving_edge(50), width_px=1280, height_px=720)
-    with pytest.raises(RecordingError, match=r"suffix '\.txt' is no format"):
-        convert(source, tmp_path / "b.txt")
+    with pytest.raises(RecordingError, match=r"suffix '\.png' is no format"):
+        convert(source, tmp_path / "b.png")
     with pytest.raises(RecordingError, match="onto itself"):
         convert(source, source)
     with pytest.raises(RecordingError, match="its folder does not exist"):

@@ -38,6 +38,6 @@ FORMATS.register(
         open=_open,
         write=_write,
         isolated=True,
-        keeps=frozenset({"attributes", "triggers", "truth", "t_offset"}),
+        keeps=frozenset({"sensor", "attributes", "triggers", "truth", "t_offset"}),
     )
 )

@@ -33,6 +33,6 @@ FORMATS.register(
         sniff=_sniff,
         open=_open,
         write=_write,
-        keeps=frozenset({"attributes", "triggers"}),
+        keeps=frozenset({"sensor", "attributes", "triggers"}),
     )
 )
