@@ -34,9 +34,12 @@ def sample(name: str) -> tuple[EventBatch, Truth]:
     return EventBatch.checked(t, x, y, p == 1, width_px=WIDTH, height_px=HEIGHT), truth
 
 
-def setting(width_px: int = WIDTH, height_px: int = HEIGHT, focal_length_mm: float = 8.0) -> Context:
+def setting(
+    width_px: int = WIDTH, height_px: int = HEIGHT, focal_length_mm: float = 8.0, contour_mode: str = "trail"
+) -> Context:
     optics = CameraParameters(focal_length_mm=focal_length_mm)
-    return Context(Camera.of(optics, width_px, height_px), 0.02, {"spin.max_spin_rps": 150.0})
+    values = {"spin.max_spin_rps": 150.0, "filter.contour_mode": contour_mode}
+    return Context(Camera.of(optics, width_px, height_px), 0.02, values)
 
 
 PAPER_CONTEXT = setting()
@@ -49,7 +52,10 @@ def inputs(
     surface_mode: str = "stc_cut_trail",
 ) -> Inputs:
     """Packets with their filtered events and surfaces, from the tick of the first event to that of the last."""
-    sieve, drawing = FilterParameters(mode=surface_mode), SurfaceParameters()
+    sieve, drawing = (
+        FilterParameters(mode=surface_mode, contour_mode=place["filter.contour_mode"]),
+        SurfaceParameters(),
+    )
     filter_state, surface_state = filter.start(sieve, place), surface.start(drawing, place)
     rows: Inputs = []
     for index in range(int(events.t_us[0]) // tick_us, int(events.t_us[-1]) // tick_us + 1):

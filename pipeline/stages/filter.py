@@ -16,6 +16,7 @@ from ..results import Packet
 from ..stage import Context, Stage
 
 MODES = {"off": kernels.OFF, "stc": kernels.STC, "trail": kernels.TRAIL, "stc_cut_trail": kernels.STC_CUT_TRAIL}
+STC_MODES = "stc", "stc_cut_trail"  # nothing passes of an edge that gives one event a pixel
 LAMPS_HZ = {"off": 0, "mains_50hz": 100, "mains_60hz": 120}  # a lamp flickers with twice the mains' frequency
 
 

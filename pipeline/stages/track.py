@@ -30,7 +30,18 @@ from .track_hough import hough_near
 from .track_limits import Limits
 from .track_outline import VOTE_US, Edge, Sighting
 from .track_result import BallTrack, BeganBy, EndedBy, ShotEnd, Status, TrackResult
-from .track_search import MOST_CANDIDATES, MOST_RIVALS, ROUTES, Route, agree, look, moved, outside_balls, support_times
+from .track_search import (
+    MOST_CANDIDATES,
+    MOST_RIVALS,
+    ROUTES,
+    Route,
+    agree,
+    look,
+    moved,
+    outside_balls,
+    removed_by_filter,
+    support_times,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -288,6 +299,8 @@ def _search(
         routes = (ROUTES[packet.end_us // LOOK_US % 2],)
     camera, limits = state.context.camera, state.limits
     hough, found, excluded = look(surface, events, packet.end_us, camera, limits, state.last_us, most, routes)
+    if not (state.balls or found or excluded):
+        excluded = removed_by_filter(state.context, packet, len(events), surface, limits)
     state.excluded = None if state.balls else excluded or state.excluded
     pending, state.pending = state.pending, []
     for sighting, circle in found:
@@ -384,6 +397,7 @@ STAGE = Stage(
     help="Hough circle in the surface, refined on the ball's outline, and Kalman filter: each ball's place and speed.",
     scope="recording",
     inputs=("packet", "filter", "surface"),
+    reads=("filter.contour_mode",),
     parameters=TrackParameters,
     start=start,
     step=step,

@@ -13,6 +13,8 @@ from .track_outline import Sighting
 # Distances of a ball whose radii are looked for unless they are stated: a table is 2.7 m long, and a camera stands
 # no nearer to the players than this. The margin is for the outline, which lies outside, and for uncertain optics.
 NEAREST_M, FARTHEST_M, RADIUS_MARGIN = 0.3, 6.0, 0.1
+# A setting that excluded a ball is advised beyond what was seen by this share: the next sighting differs a little.
+ADVISED_MARGIN = 0.1
 # Smaller circles have too few pixels: noise draws them as well.
 LEAST_RADIUS_PX = 3.0
 
@@ -75,17 +77,19 @@ class Limits:
         return self.speed_max_m_s / self.ball_radius_m
 
     def excluding(self, sighting: Sighting) -> str | None:
-        """The setting that excludes this outline, in words; None where it is within the limits."""
+        """The setting that excludes this outline, and the value that admits it, in words; None within the limits."""
         radius_px = float(sighting.ring[4])
         speed_m_s = sighting.speed_px_s / radius_px * self.ball_radius_m
         what = f"a circle of radius {radius_px:.3g} px"
-        for name, value, limit, is_within in (
-            ("radius_min_px", radius_px, self.radius_min_px, radius_px >= self.radius_min_px),
-            ("radius_max_px", radius_px, self.radius_max_px, radius_px <= self.radius_max_px),
-            ("speed_min_m_s", speed_m_s, self.speed_min_m_s, speed_m_s >= self.speed_min_m_s),
-            ("speed_max_m_s", speed_m_s, self.speed_max_m_s, speed_m_s <= self.speed_max_m_s),
+        for name, value, limit in (
+            ("radius_min_px", radius_px, self.radius_min_px),
+            ("radius_max_px", radius_px, self.radius_max_px),
+            ("speed_min_m_s", speed_m_s, self.speed_min_m_s),
+            ("speed_max_m_s", speed_m_s, self.speed_max_m_s),
         ):
-            if not is_within:
+            sign, other = (1, "more") if "max" in name else (-1, "less")
+            if sign * value > sign * limit:
                 moves = f"moves at {value:.3g} m/s" if name.startswith("speed") else "moves like a ball"
-                return f"{what} {moves}, track.{name} = {limit:g} excludes it"
+                advised = f"{value * (1 + sign * ADVISED_MARGIN):.2g} or {other} admits it"
+                return f"{what} {moves}, track.{name} = {limit:g} excludes it: {advised}"
         return None

@@ -13,7 +13,9 @@ from ..events import EventBatch
 from ..kernels import eros, neighbour_support
 from ..kernels import moving_circle as kernels
 from ..kernels.take_events import take_events
-from ..results import Circle
+from ..results import Circle, Packet
+from ..stage import Context
+from .filter import STC_MODES
 from .surface import OrdinalSurface, SurfaceParameters, SurfaceResult
 from .track_hough import candidates
 from .track_limits import Limits
@@ -75,6 +77,34 @@ def look(
         # Only to tell which setting to change.
         _, _, excluded = searching.circles(drawn, supported, limits.possible_px, signed=False)
     return first or second, found, excluded
+
+
+def removed_by_filter(
+    context: Context, packet: Packet, passed: int, surface: SurfaceResult, limits: Limits
+) -> str | None:
+    """The setting of the outline's filter that removes a ball's outline from the packet, in words; None if none does.
+
+    A ball is looked for in the packet's unfiltered events. Only where STC filters the outline, which needs a second
+    event at a pixel: TRAIL passes the first one of every edge, no outline is lost by it.
+
+    Parameters
+    ----------
+    passed : int
+        Events that the filter passed.
+    """
+    mode, camera = context["filter.contour_mode"], context.camera
+    if mode not in STC_MODES or len(packet.events) <= passed:
+        return None
+    _, found, _ = look(
+        surface, packet.events, packet.end_us, camera, limits, support_times(camera), MOST_CANDIDATES, ("contour",)
+    )
+    radius_px = next((one.ring[4] for one, _ in found if one.trusted or one.explained), None)
+    if radius_px is None:
+        return None
+    return (
+        f"a circle of radius {radius_px:.3g} px moves like a ball in the unfiltered events, "
+        f"filter.contour_mode = {mode} removes it: off keeps it"
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -229,12 +231,39 @@ def test_low_contrast_of_one_event_a_pixel_is_tracked_within_10_ms(ground: str) 
         ("speed_min_m_s", 20.0, "m/s, track.speed_min_m_s = 20 excludes it"),
     ],
 )
-def test_no_ball_names_the_setting_that_excludes_a_circle(setting_name: str, value: float, words: str) -> None:
+def test_no_ball_names_the_setting_that_excludes_a_circle_and_a_value_that_admits_it(
+    setting_name: str, value: float, words: str
+) -> None:
     rows = inputs(sample("flight_slow_top")[0].between(20_000, 80_000))
     results = run(rows, TrackParameters(**{setting_name: value}))
     assert not any(result.has_ball for result in results)
-    assert words in (results[-1].reason or "")
-    assert (results[-1].reason or "").startswith("no ball: a circle of radius 1")
+    reason = results[-1].reason or ""
+    assert words in reason and reason.startswith("no ball: a circle of radius 1")
+    advised = re.search(r"excludes it: ([0-9.]+) or (?:more|less) admits it$", reason)
+    assert advised is not None
+    assert any(result.has_ball for result in run(rows, TrackParameters(**{setting_name: float(advised[1])})))
+
+
+@pytest.mark.parametrize("mode", ["stc", "stc_cut_trail"])
+def test_no_ball_names_the_filter_that_removes_its_outline(mode: str) -> None:
+    """One event a pixel, of which STC passes none; noise that it removes as well is no ball."""
+    events = disc_events(np.array([400.0, 300.4, 4800.0, -2100.0, 17.5]), 0, 40_000)
+    results = run(inputs(events, place=setting(contour_mode=mode)), place=setting(contour_mode=mode))
+    assert not any(result.has_ball for result in results)
+    reason = results[-1].reason or ""
+    assert reason.startswith("no ball: a circle of radius 1")
+    assert reason.endswith(f"filter.contour_mode = {mode} removes it: off keeps it")
+    kept = setting(contour_mode="off")
+    assert any(result.has_ball for result in run(inputs(events, place=kept), place=kept))
+    rng = np.random.default_rng(17)
+    noise = EventBatch(
+        np.sort(rng.integers(0, 40_000, 20_000)),
+        rng.integers(0, WIDTH, 20_000).astype(np.uint16),
+        rng.integers(0, HEIGHT, 20_000).astype(np.uint16),
+        rng.random(20_000) < 0.5,
+    )
+    results = run(inputs(noise, place=setting(contour_mode=mode)), place=setting(contour_mode=mode))
+    assert not any("filter" in (result.reason or "") for result in results)
 
 
 def test_a_slow_ball_in_the_middle_is_watched_before_it_is_a_shot() -> None:
