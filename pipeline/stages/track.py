@@ -25,7 +25,7 @@ from .filter import FilterResult
 from .surface import SurfaceResult
 from .track_background import SHAKING_US, background_moves
 from .track_ball import Measuring, TrackedBall
-from .track_contact import ROLLING_M_S, Contact, find_contact, rolls
+from .track_contact import Contact, find_contact
 from .track_hough import hough_near
 from .track_limits import Limits
 from .track_outline import VOTE_US, Edge, Sighting
@@ -185,7 +185,8 @@ def _step_flying(
     contacts, earlier = _announce_contacts(parameters, state)
     for ball in state.balls:
         if ball.is_shot:
-            ball.is_shot = not _rolls(state, ball) and not any(ball.is_shadow_of(other) for other in state.balls)
+            is_shadow = any(ball.is_shadow_of(other) for other in state.balls)
+            ball.is_shot = not is_shadow and not ball.rolls(state.measuring)
     state.balls.sort(key=lambda ball: not ball.is_shot)
     balls = tuple(_ball_track(parameters, ball, packet.end_us, earlier.get(ball.shot, ())) for ball in state.balls)
     status: Status = "coasting"
@@ -273,11 +274,6 @@ def _is_shaking(parameters: TrackParameters, state: TrackState, end_us: int) -> 
     ):
         state.shaken_us = end_us
     return state.shaken_us is not None and end_us - state.shaken_us < SHAKING_US
-
-
-def _rolls(state: TrackState, ball: TrackedBall) -> bool:
-    radius_m = state.context.ball_radius_m
-    return ball.speed_m_s(radius_m) < ROLLING_M_S and rolls(ball.path, state.context.camera, radius_m)
 
 
 def _is_search_due(state: TrackState, packet: Packet) -> bool:

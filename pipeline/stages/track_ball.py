@@ -16,11 +16,12 @@ from ..kernels.moving_circle import HALF_AHEAD
 from ..kernels.outline import ON_OUTLINE_PX
 from ..kernels.take_events import take_events
 from ..results import Circle, Packet
-from .track_contact import PATH_US, Contact
+from .track_contact import Contact
 from .track_kalman import OBSERVED, OBSERVED_BLOCK, BallFilter
 from .track_outline import FREE, LEAST_ARC, Edge, Sighting, measure
 from .track_path import PathPoint
 from .track_result import BeganBy
+from .track_rolling import JUDGED_US, ROLLING_M_S, rolls
 
 Floats = NDArray[np.float64]
 
@@ -116,7 +117,7 @@ class TrackedBall:
     seen : (5,) float64
         Its state then.
     path : list of PathPoint
-        The shot's ticks of the last PATH_US.
+        The shot's ticks of the last JUDGED_US.
     is_shot : bool
         Whether it is taken for a flight: until it is seen to roll, or to be another's shadow.
     contrast, clutter : float
@@ -168,6 +169,11 @@ class TrackedBall:
                 self.seen_us, self.seen = point.end_us, self.filter.mean
             self._add(replace(point, circle=circle))
             yield point
+
+    def rolls(self, measuring: Measuring) -> bool:
+        """Whether it is seen to roll."""
+        is_slow = self.speed_m_s(measuring.ball_radius_m) < ROLLING_M_S
+        return is_slow and rolls(self.path, measuring.camera, measuring.ball_radius_m, measuring.contour_us)
 
     def speed_m_s(self, ball_radius_m: float) -> float:
         """Speed across the view."""
@@ -297,5 +303,5 @@ class TrackedBall:
         if self.path and self.path[-1].end_us == point.end_us:  # found again elsewhere after all
             del self.path[-1]
         self.path.append(point)
-        while self.path[0].end_us < point.end_us - PATH_US:
+        while self.path[0].end_us < point.end_us - JUDGED_US:
             del self.path[0]

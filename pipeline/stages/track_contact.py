@@ -1,4 +1,4 @@
-"""Contacts in a ball's path: a change test on its measured circles (bounce, hit), and the test for a rolling ball.
+"""Contacts in a ball's path: a change test on its measured circles (bounce, hit).
 
 A flight's circles lie on a smooth path; a contact puts a hinge into it, a jump of velocity. The generalised likelihood
 ratio (Willsky and Jones 1976) compares the best path with a hinge, at any recent time, with the best one without.
@@ -16,13 +16,21 @@ from numpy.typing import NDArray
 
 from ..camera import Camera
 from ..kernels import hinged_path as kernels
-from .track_path import DRAG_1_M, GRAVITY_M_S2, JUMP_M_S, LIFT_1_M, HingedPath, PathPoint, Places
+from .track_path import (
+    DRAG_1_M,
+    GRAVITY_M_S2,
+    JUMP_M_S,
+    LIFT_1_M,
+    HingedPath,
+    PathPoint,
+    Places,
+    independent_points,
+)
 
 Floats = NDArray[np.float64]
 
-# A path is kept for so long, enough to tell that a ball rolls; the change test looks for a hinge between the last
-# circles of a shorter one, over which one cubic describes any flight.
-PATH_US, TESTED_US, RECENT_CIRCLES = 250_000, 100_000, 8
+# The change test looks for a hinge between the last circles of a path, over which one cubic describes any flight.
+TESTED_US, RECENT_CIRCLES = 100_000, 8
 # Errors of the outline's edge ahead and of the circle's radius from tick to tick that the test must bear, in clutter.
 EDGE_STD_PX, RADIUS_STD_PX = 0.1, 0.15
 ERRORS_PX2 = np.array([EDGE_STD_PX, EDGE_STD_PX, RADIUS_STD_PX]) ** 2
@@ -37,8 +45,6 @@ STEP_US, FINE_STEP_US, REFINED_US = 2000, 250, 8000
 MOST_FRICTION = 0.6
 # And its push at most turns round a fall from 3 m.
 MOST_PUSH_M_S = 15.0
-# Balls faster than this do not roll, and no shorter path could show it: gravity bends it by a tenth of a pixel.
-ROLLING_M_S, ROLLED_US = 3.5, 100_000
 Kind = Literal["bounce", "hit"]
 
 
@@ -73,7 +79,7 @@ def find_contact(
     least_after : int
         Circles that must have been measured after the contact.
     """
-    points = _independent(path, straddled_us)
+    points = independent_points(path, TESTED_US, straddled_us)
     # Two circles on one side of the hinge and as many more as tell a jump from an acceleration.
     if len(points) < 3 + least_after:
         return None
@@ -96,17 +102,6 @@ def find_contact(
         return None
     kind = _kind(before, after, refined.unsure_m_s, np.array(camera.up))
     return Contact(round(refined.hinge_us), kind, refined)
-
-
-def _independent(path: list[PathPoint], apart_us: int) -> list[PathPoint]:
-    """The points of the last TESTED_US with circles that share no events, oldest first."""
-    points: list[PathPoint] = []
-    for point in reversed(path):
-        if point.end_us <= path[-1].end_us - TESTED_US:
-            break
-        if point.circle is not None and (not points or points[-1].end_us - point.end_us >= apart_us):
-            points.append(point)
-    return points[::-1]
 
 
 class _PathFit:
@@ -171,31 +166,3 @@ def _kind(before_m_s: Floats, after_m_s: Floats, unsure_m_s: Floats, up: Floats)
     falls = before_m_s @ up < unsure_push and push > -unsure_push
     most_push = min(max(push + unsure_push, 0.0), MOST_PUSH_M_S)
     return "bounce" if falls and rubbed - unsure_rubbed <= MOST_FRICTION * most_push else "hit"
-
-
-def rolls(path: list[PathPoint], camera: Camera, ball_radius_m: float) -> bool:
-    """Whether a ball is seen to roll: gravity does not bend its path. A path too short to tell may be a flight's.
-
-    Judged by the size of the acceleration, whatever its direction: camera.up may be unknown.
-    """
-    points = [point for point in path if point.circle is not None]
-    if len(points) < 4 or points[-1].end_us - points[0].end_us < ROLLED_US:
-        return False
-    circles = np.array([[c.x_px, c.y_px, c.radius_px] for point in points if (c := point.circle)])
-    s = np.array([(point.end_us - points[0].end_us) * 1e-6 for point in points])
-    middle, half = (s[0] + s[-1]) / 2, (s[-1] - s[0]) / 2
-    design = np.vander((s - middle) / half, 3)
-    coefficients = np.linalg.lstsq(design, circles)[0]
-    noise_px = np.maximum([EDGE_STD_PX, EDGE_STD_PX, RADIUS_STD_PX], (circles - design @ coefficients).std(axis=0))
-    bend_px = noise_px * math.sqrt(np.linalg.inv(design.T @ design)[0, 0])
-    circle = coefficients[2]
-
-    def acceleration_m_s2(bent: Floats) -> Floats:
-        ends = np.stack([circle + bent - coefficients[1], circle, circle + bent + coefficients[1]])
-        start, centre, end = camera.ball_centre_m(ends[:, 0], ends[:, 1], ends[:, 2], ball_radius_m)
-        bend: Floats = (start - 2 * centre + end) / half**2
-        return bend
-
-    here = acceleration_m_s2(coefficients[0])
-    spread = [acceleration_m_s2(coefficients[0] + step) - here for step in np.diag(bend_px)]
-    return float(np.linalg.norm(here)) + 3.0 * float(np.linalg.norm(spread)) < GRAVITY_M_S2 / 2

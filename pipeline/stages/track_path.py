@@ -48,6 +48,17 @@ class PathPoint:
     shake_px: float = 0.0
 
 
+def independent_points(path: list[PathPoint], span_us: int, apart_us: int) -> list[PathPoint]:
+    """The points of the path's last span_us with circles at least apart_us apart, oldest first."""
+    points: list[PathPoint] = []
+    for point in reversed(path):
+        if point.end_us <= path[-1].end_us - span_us:
+            break
+        if point.circle is not None and (not points or points[-1].end_us - point.end_us >= apart_us):
+            points.append(point)
+    return points[::-1]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Places:
     """A ball's measured places in space.

@@ -10,11 +10,11 @@ import pytest
 
 from spinscope.pipeline.camera import Camera, CameraParameters
 from spinscope.pipeline.results import Circle
-from spinscope.pipeline.simulator import Air, Ball, Flight, Scene, flight
+from spinscope.pipeline.simulator import Ball, Flight, Scene, flight
 from spinscope.pipeline.simulator.motion import Trajectory, trajectory, triple
 from spinscope.pipeline.stages import track_contact
 from spinscope.pipeline.stages.track import TrackParameters
-from spinscope.pipeline.stages.track_contact import Contact, find_contact, rolls
+from spinscope.pipeline.stages.track_contact import Contact, find_contact
 from spinscope.pipeline.stages.track_path import PathPoint
 
 ABOVE = Camera.of(CameraParameters(), 1280, 720)
@@ -192,22 +192,9 @@ def test_a_contact_is_announced_after_three_circles_and_at_the_end_after_one() -
     assert at_the_end and at_the_end[0] <= after
 
 
-@pytest.mark.parametrize("camera", [ABOVE, SIDE])
-def test_a_ball_that_rolls_is_told_from_one_that_flies(camera: Camera) -> None:
-    """Within a quarter of a second; before, and for one that flies always, it may be a flight."""
-    for speed_m_s in (1.0, 2.5):
-        start = Flight(0.0, 0.25, (-0.2, 0.0, 1.9), (speed_m_s, 0.0, 0.0), (0.0, 0.0, 0.0), UPRIGHT)
-        for air, rolling in ((Air(gravity_m_s2=0.0, drag=0.0, magnus=0.0), True), (Air(), False)):
-            scene = Scene(0.25, (Ball((start,)),), air=air, up=camera.up)  # type: ignore[arg-type]
-            path = path_of(flown(scene), camera, np.random.default_rng(5))
-            judged = [rolls(path[: n + 1], camera, 0.02) for n in range(len(path))]
-            assert judged[-1] == rolling and any(judged) == rolling and not any(judged[:10])
-
-
 def test_a_short_path_tells_nothing() -> None:
     path = path_of(bounce_above(7703)[0], ABOVE, np.random.default_rng(6))[:3]
     assert find_contact(path, ABOVE, 0.02, CONTOUR_US, 3) is None
-    assert not rolls(path, ABOVE, 0.02)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,69 @@
+"""Whether a ball rolls on a table: told from one in flight by gravity, which bends a flight."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Camera
+from .track_contact import EDGE_STD_PX, RADIUS_STD_PX
+from .track_path import GRAVITY_M_S2, PathPoint, independent_points
+
+Floats = NDArray[np.float64]
+
+# A path is judged over so long at most, enough to see the fall along the view of a camera above a table.
+JUDGED_US = 250_000
+# Circles that leave one degree of freedom beside a parabola.
+FEWEST_CIRCLES = 4
+# Faster balls do not roll. Drag and lift of slower ones are a third of gravity at most.
+ROLLING_M_S = 3.5
+# Limits are kept by so many standard errors.
+SIGMAS = 3.0
+
+
+def rolls(path: list[PathPoint], camera: Camera, ball_radius_m: float, apart_us: int) -> bool:
+    """Whether a slow ball is seen to roll; one whose path is too short to tell may fly.
+
+    It rolls if its acceleration along `camera.up` is under half of gravity, and not seen to be a quarter of gravity in
+    any other direction: `camera.up` may not be stated.
+
+    Parameters
+    ----------
+    path : list of PathPoint
+        Its circles so far, oldest first.
+    apart_us : int
+        How far back the events of a circle reach: nearer circles share events.
+    """
+    points = independent_points(path, JUDGED_US, apart_us)
+    if len(points) < FEWEST_CIRCLES:
+        return False
+    acceleration, changes = _acceleration_m_s2(points, camera, ball_radius_m)
+    up = np.array(camera.up)
+    if abs(acceleration @ up) + SIGMAS * np.linalg.norm(changes @ up) > GRAVITY_M_S2 / 2:
+        return False
+    bent = np.abs(acceleration) - SIGMAS * np.linalg.norm(changes, axis=0) > GRAVITY_M_S2 / 4
+    return not bent.any()
+
+
+def _acceleration_m_s2(points: list[PathPoint], camera: Camera, ball_radius_m: float) -> tuple[Floats, Floats]:
+    """Acceleration (3,) in space by parabolas through the circles.
+
+    Also its changes (3, 3) by 1 sigma of the circles' columns, rows and radii, one a row.
+    """
+    circles = np.array([[c.x_px, c.y_px, c.radius_px] for point in points if (c := point.circle)])
+    s = np.array([(point.end_us - points[0].end_us) * 1e-6 for point in points])
+    middle, half = (s[0] + s[-1]) / 2, (s[-1] - s[0]) / 2
+    design = np.vander((s - middle) / half, 3)
+    bend, slope, circle = np.linalg.lstsq(design, circles)[0]
+    shake_px = max(point.shake_px for point in points)
+    least_px = np.hypot([EDGE_STD_PX, EDGE_STD_PX, RADIUS_STD_PX], [shake_px, shake_px, 0.0])
+    noise_px = np.maximum(least_px, (circles - design @ np.stack([bend, slope, circle])).std(axis=0))
+    bend_std = np.sqrt(np.linalg.inv(design.T @ design)[0, 0]) * noise_px
+
+    def by_bend(bent: Floats) -> Floats:
+        ends = np.stack([circle + bent - slope, circle, circle + bent + slope])
+        start, centre, end = camera.ball_centre_m(ends[:, 0], ends[:, 1], ends[:, 2], ball_radius_m)
+        return np.asarray((start - 2 * centre + end) / half**2)
+
+    acceleration = by_bend(bend)
+    return acceleration, np.stack([by_bend(bend + step) - acceleration for step in np.diag(bend_std)])
