@@ -49,7 +49,7 @@ class Damage:
     backward_steps: int = _count("time steps backwards {} times; events up to 10 ms late were put in order")
     # Of these; only in RAW files, others are refused.
     late_events: int = _count("{} events more than 10 ms behind earlier ones were dropped")
-    time_jumps: int = _count("{} time words that the next one contradicts were ignored")
+    time_jumps: int = _count("{} times that those after them contradict were ignored")
     untimed_events: int = _count("{} events without a sure time or row were dropped")
     outside_events: int = _count("{} events outside the sensor were dropped")
     lost_bytes: int = _count("{} bytes at the end make no whole word: the file was cut")

@@ -445,10 +445,16 @@ RECORDINGS = [
         "tests/pipeline/recordings/test_recordings_writing.py",
     ),
     Mutant(
-        "pipeline/recordings/formats/prophesee_dat.py",
-        "turns = int(t[-1]), int(wraps[-1])",
-        "turns = int(t[-1]), 0",
-        RAW,
+        "pipeline/recordings/dat_decoding.py",
+        "if ahead > TURN_US >> 1 and t >= TURN_US:",
+        "if t >= TURN_US:",
+        "tests/pipeline/recordings/test_recordings_dat.py",
+    ),
+    Mutant(
+        "pipeline/recordings/dat_decoding.py",
+        "if _is_copy(words, i):",
+        "if False:",
+        "tests/pipeline/recordings/test_recordings_dat.py",
     ),
     Mutant(
         "pipeline/recordings/formats/hdf5/ecf.py",

@@ -137,6 +137,35 @@ def naive_evt2(heads: list[int], masks: list[int] | None = None) -> NaiveDecoded
     return out
 
 
+def naive_dat(words: list[tuple[int, int]]) -> NaiveDecoded:
+    """Events of DAT words (time, pixel); a time far from the one before is taken if the next eight go on from it."""
+    out = NaiveDecoded()
+    turn, now = 1 << 32, None
+    for i, (value, pixel) in enumerate(words):
+        followed = [value]
+        for word, before in zip(words[i + 1 :], words[i:], strict=False):
+            if word != before and len(followed) <= 8:
+                followed.append(word[0])
+        if now is None:
+            t, way, limit, near = value, 0, turn // 2, False
+        else:
+            way, limit = (value - now) % turn, turn - MAX_DISORDER_US
+            back = way > turn // 2 and now + way >= turn
+            t = now + way - turn * back
+            near = way <= MAX_DISORDER_US or (back and way >= limit)
+        believed = near or len(followed) > 1 or way <= 1_000_000
+        for a, b in pairwise(followed):
+            step = (b - a) % turn
+            way += step - turn * (step > turn - MAX_DISORDER_US)
+            believed &= near or way < limit
+        if believed:
+            out.events.append((t, pixel & 0x3FFF, (pixel >> 14) & 0x3FFF, pixel >> 28 != 0))
+            now = t
+        else:
+            out.time_jumps += 1
+    return out
+
+
 def write_evt2(
     path: Path, events: EventBatch, *, width_px: int, height_px: int, triggers: Triggers | None = None
 ) -> None:
