@@ -24,6 +24,7 @@ from spinscope.pipeline.recordings.recording import file_identity
 from spinscope.pipeline.result_rows import ResultRow, shot_columns, shot_rows, tick_columns, tick_rows
 from spinscope.pipeline.session import Choices, Progress
 from spinscope.pipeline.sidecar import Sidecar
+from spinscope.pipeline.truth_table import TRUTH_TABLE
 
 from .analysis import analyzed
 from .result_journal import JournalEntry, ResultJournal, journal_path, journals_of
@@ -94,12 +95,13 @@ def recordings_in(names: Sequence[Path], others: Collection[Path] = ()) -> list[
     """
     found: dict[Path, None] = {}
     not_these = {path.absolute() for path in others}
+    suffixes = readable_suffixes()
     for name in names:
         if name.is_dir():
-            below = sorted(path for path in name.rglob("*") if is_recording(path))
+            below = (path for path in sorted(name.rglob("*")) if path.name != TRUTH_TABLE and is_recording(path))
             these = [path for path in below if path.absolute() not in not_these]
             if not these:
-                raise RecordingError(f"the folder holds no recordings ({', '.join(readable_suffixes())}): {name}")
+                raise RecordingError(f"the folder holds no recordings ({', '.join(suffixes)}): {name}")
         elif not name.exists() and glob.has_magic(str(name)):
             these = sorted(path for path in map(Path, glob.glob(str(name), recursive=True)) if path.is_file())
             if not these:

@@ -1,7 +1,8 @@
 """Sidecars: statements beside a recording about its camera, ball, truth and biases.
 
 `NAME.toml` beside `NAME.raw` has the tables [camera] and [ball] (parameters), [fixed_ball] (`x_px`, `y_px`,
-`radius_px`), [truth] and [biases]; `NAME.bias` is as the camera's software writes it.
+`radius_px`), [truth] and [biases]; `NAME.bias` is as the camera's software writes it. A `truth.csv` states the same of
+all recordings of a folder; what `NAME.toml` states goes before it.
 """
 
 from __future__ import annotations
@@ -19,8 +20,10 @@ from .camera import BallParameters, CameraParameters
 from .errors import ParameterError, RecordingError
 from .extensions import did_you_mean
 from .parameters import ParameterGroup
+from .truth_table import stated_tables, truth_table_of
 
 GROUPS: dict[str, type[ParameterGroup]] = {"camera": CameraParameters, "ball": BallParameters}
+BALL_NUMBERS = range(1, 8)  # of the paper
 TABLES = (*GROUPS, "fixed_ball", "truth", "biases")
 
 
@@ -74,9 +77,9 @@ class StatedTruth:
             spin_rps=spin,
             rps=math.hypot(*(spin or ())) if rps is None else rps,
             spin_std_rps=_number(table, "spin_std_rps"),
-            ball=table.get("ball"),
+            ball=_ball_number(table),
             speed_m_s=_number(table, "speed_m_s"),
-            setting=table.get("setting"),
+            setting=None if "setting" not in table else str(table["setting"]),
         )
 
 
@@ -93,39 +96,47 @@ class Sidecar:
     truth : StatedTruth, optional
     biases : BiasParameters, optional
         Of the table [biases].
-    digest : str
-        Of the file's content: "" without a file.
     """
 
     parameters: Mapping[str, Any] = field(default_factory=dict)
     fixed_ball: tuple[float, float, float] | None = None
     truth: StatedTruth | None = None
     biases: BiasParameters | None = None
-    digest: str = ""
+
+    @property
+    def digest(self) -> str:
+        """Digest of all that is stated; "" where nothing is."""
+        if self == Sidecar():
+            return ""
+        return hashlib.blake2b(repr(self).encode(), digest_size=12).hexdigest()
 
     @classmethod
     def beside(cls, recording: Path) -> Sidecar:
-        """The sidecar `NAME.toml` of a recording; raises RecordingError or ParameterError where it is wrong."""
-        path = recording.with_suffix(".toml")
-        if not path.is_file():
-            return cls()
-        try:
-            with open(path, "rb") as file:
-                content = file.read(LARGEST_BYTES + 1)
-            if len(content) > LARGEST_BYTES:
-                raise RecordingError(f"the sidecar is larger than {LARGEST_BYTES >> 20} MB: {path}")
-            tables = tomllib.loads(content.decode("utf-8-sig"))
-        except OSError as error:
-            raise RecordingError(f"the sidecar cannot be read ({error.strerror}): {path}") from error
-        except (ValueError, RecursionError) as error:  # not UTF-8, not TOML
-            raise RecordingError(f"the sidecar is no TOML ({error}): {path}") from None
-        try:
-            return cls._of(tables, hashlib.blake2b(content, digest_size=12).hexdigest())
-        except ParameterError as error:
-            raise ParameterError(f"{error}: {path}") from None
+        """What `NAME.toml` and `truth.csv` state of a recording; raises RecordingError or ParameterError."""
+        own, table = recording.with_suffix(".toml"), truth_table_of(recording)
+        stated = cls._of(stated_tables(table, recording), table) if table else cls()
+        return cls._of(_toml_tables(own), own)._over(stated) if own.is_file() else stated
+
+    def _over(self, other: Sidecar) -> Sidecar:
+        """These statements, and the other ones where these say nothing."""
+        return Sidecar(
+            parameters={**other.parameters, **self.parameters},
+            fixed_ball=self.fixed_ball or other.fixed_ball,
+            truth=self.truth or other.truth,
+            biases=self.biases or other.biases,
+        )
 
     @classmethod
-    def _of(cls, tables: Mapping[str, Any], digest: str) -> Sidecar:
+    def _of(cls, tables: Mapping[str, Any], path: Path) -> Sidecar:
+        try:
+            return cls._of_tables(tables)
+        except ParameterError as error:
+            raise ParameterError(f"{error}: {path}") from None
+        except (ValueError, OverflowError):  # whole numbers beyond all floats, or too long to be shown
+            raise ParameterError(f"a number is too large: {path}") from None
+
+    @classmethod
+    def _of_tables(cls, tables: Mapping[str, Any]) -> Sidecar:
         for name, table in tables.items():
             if name not in TABLES:
                 hint = did_you_mean(name, TABLES)
@@ -145,7 +156,6 @@ class Sidecar:
             biases=None
             if biases is None
             else BiasParameters().with_values({name.removeprefix("bias_"): value for name, value in biases.items()}),
-            digest=digest,
         )
 
 
@@ -153,6 +163,20 @@ def biases_beside(recording: Path) -> BiasParameters | None:
     """Biases of a recording's `NAME.bias`, else of its `NAME.toml`; None without; raises as `read_biases` does."""
     path = recording.with_suffix(".bias")
     return read_biases(path) if path.is_file() else Sidecar.beside(recording).biases
+
+
+def _toml_tables(path: Path) -> dict[str, Any]:
+    """The tables of a TOML file; raises RecordingError."""
+    try:
+        with open(path, "rb") as file:
+            content = file.read(LARGEST_BYTES + 1)
+        if len(content) > LARGEST_BYTES:
+            raise RecordingError(f"the sidecar is larger than {LARGEST_BYTES >> 20} MB: {path}")
+        return tomllib.loads(content.decode("utf-8-sig"))
+    except OSError as error:
+        raise RecordingError(f"the sidecar cannot be read ({error.strerror}): {path}") from error
+    except (ValueError, RecursionError) as error:  # not UTF-8, not TOML
+        raise RecordingError(f"the sidecar is no TOML ({error}): {path}") from None
 
 
 def _circle(table: Mapping[str, Any]) -> tuple[float, float, float]:
@@ -168,6 +192,13 @@ def _number(table: Mapping[str, Any], name: str) -> float | None:
     if value is not None and value < 0:
         raise ParameterError(f"truth.{name} = {value:g} is not allowed: give a number of 0 or more")
     return value
+
+
+def _ball_number(table: Mapping[str, Any]) -> int | None:
+    number = table.get("ball")
+    if number is not None and number not in BALL_NUMBERS:
+        raise ParameterError(f"truth.ball = {number!r} is not allowed: give a number of the paper's balls, 1 to 7")
+    return number
 
 
 def _vector(table: Mapping[str, Any], name: str) -> tuple[float, float, float] | None:
