@@ -95,13 +95,12 @@ def recordings_in(names: Sequence[Path], others: Collection[Path] = ()) -> list[
     """
     found: dict[Path, None] = {}
     not_these = {path.absolute() for path in others}
-    suffixes = readable_suffixes()
     for name in names:
         if name.is_dir():
             below = (path for path in sorted(name.rglob("*")) if path.name != TRUTH_TABLE and is_recording(path))
             these = [path for path in below if path.absolute() not in not_these]
             if not these:
-                raise RecordingError(f"the folder holds no recordings ({', '.join(suffixes)}): {name}")
+                raise RecordingError(f"the folder holds no recordings ({', '.join(readable_suffixes())}): {name}")
         elif not name.exists() and glob.has_magic(str(name)):
             these = sorted(path for path in map(Path, glob.glob(str(name), recursive=True)) if path.is_file())
             if not these:

@@ -261,11 +261,10 @@ def test_folders_patterns_and_files_are_each_found_once(folder: Path) -> None:
     assert recordings_in([Path("missing.h5")]) == [Path("missing.h5")], "opening it says what is wrong"
 
 
-def test_a_folders_truth_is_no_recording_of_it(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(batch, "readable_suffixes", lambda: (".h5", ".csv"))
+def test_a_folders_truth_is_no_recording_of_it(folder: Path) -> None:
     (folder / "truth.csv").write_text("recording,spin_rps\nball_fixed,1 2 3\n")
     names = [path.name for path in recordings_in([folder])]
-    assert names == ["ball_fixed.h5", "noise0.h5", "noise1.h5", "noise2.h5"]
+    assert names == ["bad.raw", "ball_fixed.h5", "noise0.h5", "noise1.h5", "noise2.h5"]
 
 
 def test_the_command_says_what_came_of_it(folder: Path) -> None:
