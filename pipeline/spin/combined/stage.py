@@ -100,9 +100,10 @@ def step(
     state.sightings.add(packet, ball, logo, state.context.camera, state.context["contrast.window_us"])
     basis, candidates = _candidates(state.context, rate, contrast, trajectory)
     witnesses = _witnesses(rate, normal_flow.estimate, contrast, trajectory)
-    if basis is None:
+    if basis is None or contrast.changes:
         reason = contrast.estimate.reason or "the logo is not seen"
-        return CombinedResult(SpinEstimate.refused(METHOD, reason), witnesses)
+        against = "trajectory" if contrast.changes else None  # which is of two flights as well
+        return CombinedResult(SpinEstimate.refused(METHOD, reason, against=against), witnesses)
     spins_rps = np.stack([candidate.spins_rps for candidate in candidates])
     bend = by_flight(trajectory, spins_rps)
     logs = {"trajectory": bend}

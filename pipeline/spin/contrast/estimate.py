@@ -133,6 +133,16 @@ def follow_spin(
     )
 
 
+def refine_spin(
+    events: SphereEvents, ball: BallUncertainty, settings: ContrastSettings, spin_rps: Floats
+) -> ContrastEstimate:
+    """Estimate from a part of these events around a spin that may be several kernels off; no rivals are looked for."""
+    events, stretch = _centred(events)
+    some = events.thinned(settings.follow_events)
+    spins = maximise_over_growing_segments(some, spin_rps[None] * TURN, settings)
+    return _refined(_off_rim(some, settings), spins[0], ball, settings, stretch, np.zeros(3), 2)
+
+
 def _centred(events: SphereEvents) -> tuple[SphereEvents, Stretch]:
     """The events with times from the middle of their stretch."""
     stretch = Stretch(len(events), 0.5 * float(events.t_s[0] + events.t_s[-1]), float(events.t_s[-1] - events.t_s[0]))

@@ -35,6 +35,15 @@ class ContrastParameters(ParameterGroup):
         "sigma",
         "distance from the normal flow's spin that puts it in doubt, unless it is settled",
     )
+    # Of 122 flights of our simulator without a contact the farthest are 3.1 apart.
+    change_sigmas: float = tunable(
+        5.0,
+        0.0,
+        100.0,
+        0.5,
+        "sigma",
+        "distance between the spins of the flight's first and last third that shows a missed contact",
+    )
     smallest_patch_rad: float = tunable(
         0.18, 0.0, 1.5, 0.01, "rad", "spread of the logo's events over the ball (rms) below which it is not seen"
     )

@@ -38,6 +38,8 @@ class ContrastResult(ReadOnlyArrays):
         Score an event less that of permuted times; 0 = nothing turns with the spin.
     turns_seen : bool
         Whether the contrast is enough to tell a pattern that turns from chance; without it no spin is likelier.
+    changes : bool
+        Whether the spin changes within the flight: a contact was missed, and no estimate from all of it holds.
     full : bool
         Whether this tick made a full estimate, or followed the last one.
     magnitudes_rps, magnitude_scores : (m,) float64
@@ -58,6 +60,7 @@ class ContrastResult(ReadOnlyArrays):
     offsets_px: Floats
     contrast: float
     turns_seen: bool
+    changes: bool
     full: bool
     magnitudes_rps: Floats
     magnitude_scores: Floats
@@ -80,6 +83,7 @@ class ContrastResult(ReadOnlyArrays):
             offsets_px=np.zeros(3),
             contrast=0.0,
             turns_seen=False,
+            changes=False,
             full=False,
             **ScoreMap.empty()._asdict(),
         )

@@ -21,11 +21,12 @@ from ...stage import Context, SpinMethod
 from ...stages.logo import LogoResult
 from ...stages.rate import RateResult
 from ...stages.track_result import BallTrack
+from .change import estimates_of_ends
 from .estimate import ScoreMap, estimate_spin, follow_spin, score_map
 from .events import BallUncertainty, ContrastEstimate, ContrastSettings, SphereEvents
 from .parameters import FLOW_METHOD, METHOD, ContrastParameters
 from .result import ContrastResult
-from .trust import RETURNED_TURNS, doubt, judged, misses_rhythm, sigmas_apart
+from .trust import RETURNED_TURNS, change_doubt, doubt, judged, misses_rhythm, sigmas_apart
 
 # Full estimates when the shot is so old, then each time it is half as old again; in between the last answer is
 # followed, which costs a tenth.
@@ -60,6 +61,8 @@ class ContrastState:
         Number of events at the last full estimate and at the last search over all spins.
     scanned_turns, followed_contrast : float
         Turns that the last alias scan saw, and the best contrast of following since the last full estimate.
+    changes : bool
+        Whether the last full estimate saw the spin change within the flight.
     """
 
     context: Context
@@ -73,6 +76,7 @@ class ContrastState:
     followed_contrast: float = 0.0
     answer: ContrastEstimate | None = None
     reason: str | None = None
+    changes: bool = False
     score_map: ScoreMap = field(default_factory=ScoreMap.empty)
 
 
@@ -205,7 +209,12 @@ def _estimate(
         answer = estimate_spin(events, ball, settings, starts_rps=starts_rps, rhythms_rps=rhythms_rps)
     if scanning:
         state.scanned_turns = answer.turns
-    state.answer, state.reason = answer, doubt(parameters, answer)
+    state.answer, state.reason, state.changes = answer, doubt(parameters, answer), False
+    # A ball that stays in place, on a spinner, touches nothing.
+    flies = ball.speed_px_s > 0.0
+    if state.reason is None and flies and (ends := estimates_of_ends(events, ball, settings, answer)):
+        state.reason = change_doubt(parameters, *ends)
+        state.changes = state.reason is not None
 
 
 def _settled(parameters: ContrastParameters, state: ContrastState) -> bool:
@@ -241,7 +250,15 @@ def _result(
     if answer is None or answer.spin_rps is None or answer.covariance_rps2 is None:
         return ContrastResult.nothing(SpinEstimate.refused(METHOD, state.reason or "no estimate yet", count))
     estimate, turns_seen = judged(
-        parameters, answer, state.reason, _settled(parameters, state), _rarer_polarity(state), rate, flow, count
+        parameters,
+        answer,
+        state.reason,
+        state.changes,
+        _settled(parameters, state),
+        _rarer_polarity(state),
+        rate,
+        flow,
+        count,
     )
     middle_us, half_us = answer.reference_s * 1e6, 0.5e6 * answer.span_s
     return ContrastResult(
@@ -257,6 +274,7 @@ def _result(
         offsets_px=answer.offsets_px.copy(),
         contrast=answer.contrast,
         turns_seen=turns_seen,
+        changes=state.changes,
         full=full,
         **{name: column.copy() for name, column in state.score_map._asdict().items()},
     )

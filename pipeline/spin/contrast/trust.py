@@ -52,6 +52,20 @@ def doubt(parameters: ContrastParameters, answer: ContrastEstimate) -> str | Non
     return None
 
 
+def change_doubt(parameters: ContrastParameters, early: ContrastEstimate, late: ContrastEstimate) -> str | None:
+    """Reason for doubt where a flight's ends have two spins, in words; None where one spin may explain both.
+
+    Ends that give no answer to be trusted show nothing.
+    """
+    if doubt(parameters, early) is not None or doubt(parameters, late) is not None:
+        return None
+    before, after = (SpinEstimate(METHOD, one.spin_rps, one.covariance_rps2, None) for one in (early, late))
+    if sigmas_apart(before, after) <= parameters.change_sigmas:
+        return None
+    words = f"from {vector_words(before.vector_rps)} to {vector_words(after.vector_rps)}"
+    return f"the spin changes within the flight, {words}: a contact may have been missed"
+
+
 def sigmas_apart(one: SpinEstimate, other: SpinEstimate) -> float:
     """By how many standard deviations two estimates differ; 0 where one says nothing."""
     if one.vector_rps is None or one.covariance_rps2 is None:
@@ -80,6 +94,7 @@ def judged(
     parameters: ContrastParameters,
     answer: ContrastEstimate,
     reason: str | None,
+    changes: bool,
     settled: bool,
     rarer_polarity: float,
     rate: RateResult,
@@ -91,7 +106,9 @@ def judged(
     Parameters
     ----------
     reason : str, optional
-        The answer's own `doubt`.
+        The answer's own `doubt`, or that its spin changes.
+    changes : bool
+        Whether the spin changes within the flight: then the normal flow mixes two spins as well.
     settled : bool
         Whether the logo says so much that neither its rhythm nor its normal flow can put the answer in doubt.
     rarer_polarity : float
@@ -107,7 +124,7 @@ def judged(
     against = None
     if reason is not None:
         # Where nothing turns, the normal flow has seen no pattern either, but noise.
-        against = None if turns_seen else FLOW_METHOD
+        against = None if turns_seen and not changes else FLOW_METHOD
     elif may_be_outline:
         reason = (
             "nearly all logo events have one polarity and have not come back: a slow sensor's outline does that too"

@@ -189,8 +189,10 @@ TRUSTED_AXIS_DEG, TRUSTED_SHARE = 20.0, 0.333
 
 
 def is_trusted(estimates: Mapping[str, SpinEstimate]) -> bool:
-    """Whether the flight tells the spin closely enough."""
+    """Whether the flight tells the spin closely enough, and no other method excludes that it is one flight."""
     estimate = estimates[METHOD]
+    if any(other.against == METHOD for other in estimates.values()):
+        return False
     magnitude, std, axis_std = estimate.magnitude_rps, estimate.magnitude_std_rps, estimate.axis_std_deg
     if magnitude is None or std is None or axis_std is None:
         return False

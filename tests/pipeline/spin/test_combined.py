@@ -132,6 +132,15 @@ def test_two_spins_that_explain_the_logo_are_left_open_by_the_pattern_alone() ->
     assert "two spins open" in (result.estimate.reason or "")
 
 
+def test_a_spin_that_changes_is_trusted_to_no_witness() -> None:
+    clear = pattern(TOP, [OTHER], [6.0])
+    of_flight = {"trajectory": SpinEstimate("trajectory", TOP, covariance(TOP, 5.0, 3.0), None)}
+    assert answered(clear).estimate.status == "ok" and trusted_method(of_flight) == "trajectory"
+    changed = answered(replace(clear, changes=True), flight(TOP), rhythm([60.2])).estimate
+    assert changed.reason == REFUSED.reason
+    assert trusted_method(of_flight | {"contrast": REFUSED, "combined": changed}) is None
+
+
 def test_one_witness_that_may_be_wrong_is_not_enough_and_two_choose_the_rival() -> None:
     two = pattern(SLOW, [TOP], [0.5])
     by_flight = answered(two, flight(TOP))

@@ -59,6 +59,15 @@ def test_each_threshold_is_where_its_parameter_says(
     assert re.search(reason, trust.doubt(PARAMETERS, doubted) or "")
 
 
+@pytest.mark.parametrize(("off_rps", "changes"), [(0.69, False), (0.72, True)])
+def test_a_change_of_spin_is_seen_beyond_its_sigmas(off_rps: float, changes: bool) -> None:
+    """5 sigma of two ends of 0.1 rps each: 0.71 rps. An end that is not to be trusted by itself shows nothing."""
+    late = uncertain(0.1, 2.0, SPIN * (1.0 + off_rps / 20.0))
+    reason = trust.change_doubt(replace(PARAMETERS, change_sigmas=5.0), SURE, late)
+    assert (reason is not None) == changes
+    assert trust.change_doubt(replace(PARAMETERS, change_sigmas=5.0), SURE, replace(late, contrast=0.2)) is None
+
+
 def rhythm(*spins_rps: float, sigmas: float = 9.0) -> RateResult:
     """A result of the rate stage with these magnitudes by which the pattern comes back."""
     return replace(
