@@ -10,7 +10,7 @@ of time that grows with the shot.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,7 +21,7 @@ from ...stage import Context, SpinMethod
 from ...stages.logo import LogoResult
 from ...stages.rate import RateResult
 from ...stages.track_result import BallTrack
-from .change import estimates_of_ends
+from .change import PARTS, estimates_of_ends
 from .estimate import ScoreMap, estimate_spin, follow_spin, score_map
 from .events import BallUncertainty, ContrastEstimate, ContrastSettings, SphereEvents
 from .parameters import FLOW_METHOD, METHOD, ContrastParameters
@@ -117,7 +117,7 @@ def step(
     )
     events = _joined(state)
     if not full and state.answer is not None and state.reason is None:
-        state.answer = follow_spin(events, _uncertainty(state), settings, state.answer)
+        state.answer = follow_spin(events, _uncertainty(state.ball_stds), settings, state.answer)
         state.reason = doubt(parameters, state.answer)
         full = state.answer.contrast < LOST * state.followed_contrast
         full = full or state.scanned_turns < RETURNED_TURNS <= state.answer.turns
@@ -155,9 +155,9 @@ def _joined(state: ContrastState) -> SphereEvents:
     return SphereEvents(*(np.concatenate([getattr(p, name) for _, p in state.parts], axis=-1) for name in names))
 
 
-def _uncertainty(state: ContrastState) -> BallUncertainty:
-    """Uncertainty of the ball's place over the stretch: the ticks' medians."""
-    position, radius, velocity, speed = (float(value) for value in np.median(np.array(state.ball_stds), axis=0))
+def _uncertainty(ball_stds: Sequence[tuple[float, float, float, float]]) -> BallUncertainty:
+    """Uncertainty of the ball's place over some ticks: their medians."""
+    position, radius, velocity, speed = (float(value) for value in np.median(np.array(ball_stds), axis=0))
     return BallUncertainty(
         centre_std_px=max(math.hypot(position, speed * LATENCY_SPREAD_S), 0.01),
         radius_std_px=max(radius, 0.01),
@@ -191,7 +191,7 @@ def _estimate(
         starts += [state.answer.spin_rps, *state.answer.rivals_rps]
     if normal_flow.vector_rps is not None and np.any(normal_flow.vector_rps):
         starts.append(normal_flow.vector_rps)
-    starts_rps, ball = np.array(starts).reshape(-1, 3), _uncertainty(state)
+    starts_rps, ball = np.array(starts).reshape(-1, 3), _uncertainty(state.ball_stds)
     answer, scanning = None, not _settled(parameters, state)
     if starts:
         answer = estimate_spin(
@@ -211,9 +211,11 @@ def _estimate(
         state.scanned_turns = answer.turns
     state.answer, state.reason, state.changes = answer, doubt(parameters, answer), False
     # A ball that stays in place, on a spinner, touches nothing.
-    flies = ball.speed_px_s > 0.0
-    if state.reason is None and flies and (ends := estimates_of_ends(events, ball, settings, answer)):
-        state.reason = change_doubt(parameters, *ends)
+    if state.reason is None and ball.speed_px_s > 0.0:
+        ticks = max(1, len(state.ball_stds) // PARTS)
+        balls = _uncertainty(state.ball_stds[:ticks]), _uncertainty(state.ball_stds[-ticks:])
+        ends = estimates_of_ends(events, balls, settings, answer)
+        state.reason = change_doubt(parameters, *ends) if ends else None
         state.changes = state.reason is not None
 
 

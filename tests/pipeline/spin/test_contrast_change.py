@@ -27,7 +27,7 @@ def ends_of(before: Floats, after: Floats, settings: ContrastSettings) -> tuple[
     parts = first.at(first.t_s < 0.0), last.at(last.t_s >= 0.0)
     columns = (np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in SphereEvents.__slots__)
     whole = ContrastEstimate(before, np.eye(3), 1200, contrast=1.0, patch_rad=0.3)
-    return estimates_of_ends(SphereEvents(*columns), BALL, settings, whole)
+    return estimates_of_ends(SphereEvents(*columns), (BALL, BALL), settings, whole)
 
 
 @pytest.mark.parametrize(("after", "changes"), [(SPIN, False), (NEAR, True), (FAR, True)])

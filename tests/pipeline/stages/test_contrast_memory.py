@@ -46,7 +46,7 @@ def test_events_and_places_older_than_the_window_are_forgotten_together(window_u
         kept = list(range(max(1, number - window_us // 5000 + 1), number + 1))
         assert [end_us for end_us, _ in state.parts] == [5000 * one for one in kept]
         assert [stds[0] for stds in state.ball_stds] == kept
-        uncertainty = contrast._uncertainty(state)
+        uncertainty = contrast._uncertainty(state.ball_stds)
         middle = float(np.median(kept))
         assert uncertainty.centre_std_px == pytest.approx(middle)
         assert uncertainty.track_std_px == pytest.approx(middle)
@@ -62,7 +62,7 @@ def test_a_ball_that_flies_on_while_pixels_wait_is_less_sure_of_its_place() -> N
     ball = known_ball(packet.end_us)
     flying = dataclasses.replace(ball, mean=np.add(ball.mean, [0, 0, 4800.0, -6400.0, 0]))
     contrast._take(parameters, state, packet, flying, seen(packet, position_std_px=0.15))
-    uncertainty = contrast._uncertainty(state)
+    uncertainty = contrast._uncertainty(state.ball_stds)
     assert uncertainty.centre_std_px == pytest.approx(0.25)
     assert uncertainty.track_std_px == pytest.approx(0.15)
 

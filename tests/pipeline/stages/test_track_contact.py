@@ -93,15 +93,17 @@ def contact_s(flown: Trajectory) -> float:
     return float(flown.time_s[int(np.argmax(jumps)) + 1])
 
 
-@pytest.mark.parametrize(("scene", "kind"), [(bounce_above, "bounce"), (bounce_side, "bounce"), (hit, "hit")])
-def test_contacts_are_found_to_2_ms(scene: object, kind: str) -> None:
+@pytest.mark.parametrize(
+    ("scene", "kind", "count"), [(bounce_above, "bounce", 50), (bounce_side, "bounce", 50), (hit, "hit", 20)]
+)
+def test_contacts_are_found_to_2_ms(scene: object, kind: str, count: int) -> None:
     errors_ms = []
-    for seed in range(7700, 7720):
+    for seed in range(7700, 7700 + count):
         path, camera = scene(seed)  # type: ignore[operator]
-        contact = first_contact(path_of(path, camera, np.random.default_rng(seed)), camera)
+        contact = first_contact(path_of(path, camera, rng_of(seed)), camera)
         assert contact is not None and contact.kind == kind
         errors_ms.append(abs(contact.time_us * 1e-3 - contact_s(path) * 1e3))
-    assert np.percentile(errors_ms, 90) < 2.0
+    assert np.percentile(errors_ms, 97) < 2.0
     assert max(errors_ms) < 4.0
 
 
@@ -117,13 +119,29 @@ def test_the_path_after_a_contact_is_the_balls() -> None:
     assert abs(state[4] - radius[0]) < 0.3
 
 
+def flight_above(seed: int) -> tuple[Trajectory, Camera]:
+    rng = np.random.default_rng([seed, 4])
+    spin_rps, speed_m_s = float(rng.uniform(0, 120)), float(rng.uniform(3.5, 22))
+    return flown(flight(kind=KINDS[seed % 6], magnitude_rps=spin_rps, speed_m_s=speed_m_s, seed=seed)), ABOVE
+
+
+def flight_side(seed: int) -> tuple[Trajectory, Camera]:
+    rng = np.random.default_rng([seed, 5])
+    speed_m_s = float(rng.uniform(3.5, 22))
+    duration_s = min(0.15, 0.9 / speed_m_s)
+    start = Flight(0.0, duration_s, (-0.45, float(rng.uniform(-0.1, 0.1)), 2.0),
+                   (speed_m_s, *rng.uniform(-1, 1, 2).tolist()), triple(rng.uniform(-60, 60, 3)), UPRIGHT)  # fmt: skip
+    return flown(Scene(duration_s, (Ball((start,)),), up=(0.0, -1.0, 0.0))), SIDE
+
+
 def test_no_contact_where_there_is_none() -> None:
-    """Fast and slow, strongly curved: not a single one in 100 flights."""
-    for seed in range(7800, 7900):
-        rng = np.random.default_rng(seed)
-        speed_m_s = float(rng.choice([3.5, 6.0, 10.0, 15.0, 22.0]))
-        scene = flight(kind=KINDS[seed % 6], magnitude_rps=float(rng.uniform(0, 120)), speed_m_s=speed_m_s, seed=seed)
-        assert first_contact(path_of(flown(scene), ABOVE, rng), ABOVE) is None
+    """Fast and slow, strongly curved, from above and from the side: at most one in 200 flights."""
+    false = 0
+    for scene in (flight_above, flight_side):
+        for seed in range(7800, 7900):
+            path, camera = scene(seed)
+            false += first_contact(path_of(path, camera, rng_of(seed)), camera) is not None
+    assert false <= 1
 
 
 def test_an_outlier_is_no_contact() -> None:
