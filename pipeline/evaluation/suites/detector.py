@@ -22,7 +22,7 @@ from ..tasks import Task, TaskContext
 LABEL = "Ball detector: error against speed"
 HELP = "Errors of the ball's place, size and velocity against its speed (section 4.2)."
 
-SEED = 73_000  # of this suite alone
+SEED = 882_541  # of this suite alone
 SPEEDS_M_S = tuple(float(speed) for speed in range(4, 21, 2))
 SCENES = ("one ball", "two balls", "arm")
 FLIGHTS = 3  # of each speed and scene
