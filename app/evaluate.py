@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import datetime
 import io
 import json
@@ -23,9 +24,20 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table as ScreenTable
 
-from spinscope.pipeline.evaluation import SUITES, Report, TaskContext, evaluate, executor
+from spinscope.pipeline.evaluation import (
+    SUITES,
+    LabFolder,
+    Report,
+    SceneChoices,
+    TaskContext,
+    evaluate,
+    evaluate_real,
+    executor,
+)
 from spinscope.pipeline.evaluation.plots import draw
+from spinscope.pipeline.evaluation.protocol import protocol_findings
 from spinscope.pipeline.evaluation.tasks import Progress, write_whole
+from spinscope.pipeline.session import Choices
 
 from .terminal import console as terminal_console
 
@@ -64,9 +76,12 @@ def evaluate_suite(
     workers: int | None = None,
     cluster: str | None = None,
     cache: Path | None = None,
+    choices: Choices | None = None,
+    scene: SceneChoices | None = None,
+    real: Path | None = None,
     on_progress: Progress | None = None,
 ) -> Evaluation:
-    """Run a suite with the default parameters; see `pipeline.evaluation.evaluate`.
+    """Run a suite; see `pipeline.evaluation.evaluate` and `evaluate_real`.
 
     Parameters
     ----------
@@ -78,14 +93,28 @@ def evaluate_suite(
         Address of a Dask scheduler whose workers run the tasks instead; raises ParameterError when none answers.
     cache : Path or None
         Folder of the recordings and results kept between runs; None = in the user's cache folder.
+    choices : Choices or None
+        Preset and settings of the pipeline under evaluation; None = the defaults.
+    scene : SceneChoices or None
+        Ball and lens of the scenes; the pipeline is told of the lens.
+    real : Path or None
+        Folder of real recordings to run on instead of simulated ones.
     on_progress : callable or None
     """
     if SUITES[name].timed:
         workers, cluster = 1, None
-    context = TaskContext(cache or platformdirs.user_cache_path("spinscope") / "evaluation")
+    choices, scene = choices or Choices(), scene or SceneChoices()
+    if scene.lens_mm is not None:
+        lens = f"camera.focal_length_mm={scene.lens_mm:g}"
+        choices = dataclasses.replace(choices, assignments=[lens, *choices.assignments])
+    folder = cache or platformdirs.user_cache_path("spinscope") / "evaluation"
+    context = TaskContext(folder, choices.parameters(), choices, scene)
     begin = time.perf_counter()
     with executor(cpu_count() if workers is None else workers, cluster) as parallel:
-        report = evaluate(name, context, quick=quick, parallel=parallel, on_progress=on_progress)
+        if real is None:
+            report = evaluate(name, context, quick=quick, parallel=parallel, on_progress=on_progress)
+        else:
+            report = evaluate_real(name, real, context, parallel=parallel, on_progress=on_progress)
     seconds = time.perf_counter() - begin
     today = datetime.datetime.now(datetime.UTC).date().isoformat()
     return Evaluation(report, today, _machine(), version("spinscope"), seconds)
@@ -95,6 +124,19 @@ def suite_list() -> str:
     """Name and description of every suite, one a line."""
     width = max(map(len, SUITES.names))
     return "\n".join(f"{suite.name:{width}}  {suite.help}" for suite in sorted(SUITES, key=lambda suite: suite.name))
+
+
+def check_folder(folder: Path, choices: Choices, console: Console | None = None) -> int:
+    """Show what a folder of real recordings lacks of the recording protocol; the exit status, 1 where it lacks any."""
+    console = console or terminal_console()
+    found = LabFolder.of(folder, choices)
+    missing = protocol_findings(found)
+    for finding in missing:
+        console.print(f"{finding.recording}: {finding.what}", markup=False, highlight=False, soft_wrap=True)
+    count = len(found.recordings) + len(found.wrong)
+    lacking = len({finding.recording for finding in missing})
+    console.print(f"{count} recordings, {lacking} lack something; see docs/recording_protocol.md", highlight=False)
+    return 1 if missing else 0
 
 
 def print_evaluation(evaluation: Evaluation, console: Console | None = None) -> None:
@@ -149,14 +191,26 @@ errors. `triplet` is the paper's method, `best` the answer that the program itse
 """
 
 
+ABOUT_REAL = """\
+# Results on real recordings
+
+Made by `spinscope evaluate --real`: the paper's experiments on recordings of a folder, with the truth that stands
+beside them, next to the paper's own numbers. What could not be evaluated is named in the first table of each suite.
+
+Errors: mean ± standard deviation (median), against the truth as it was stated. A refusal, or no ball, counts as failed
+in the success rate and not in the errors. `triplet` is the paper's method, `best` the answer that the program itself
+trusts. Which events are the logo's is not known, so shares "of those with logo" are left out.
+"""
+
+
 def write_page(evaluations: Sequence[Evaluation], path: Path, pictures: Sequence[Path] = ()) -> None:
     """Write the tables of these suites, with their figures from `write_figures`, as one page of Markdown.
 
     Raises RecordingError.
     """
-    lines = [ABOUT]
+    lines = [ABOUT if any(one.report.folder is None for one in evaluations) else ABOUT_REAL]
     for one in evaluations:
-        lines += [f"## {one.report.suite.label} (`{one.report.suite.name}`)", "", _how_made(one), ""]
+        lines += [f"## {one.report.title} (`{one.report.suite.name}`)", "", _how_made(one), ""]
         for picture in pictures:
             if picture.suffix == ".png" and picture.name.startswith(f"{one.report.suite.name}_"):
                 place = Path(os.path.relpath(picture, path.parent)).as_posix()
@@ -171,6 +225,7 @@ def write_page(evaluations: Sequence[Evaluation], path: Path, pictures: Sequence
 
 def _how_made(one: Evaluation) -> str:
     thinned = ", thinned (--quick)" if one.report.quick else ""
+    thinned += f", real recordings of {one.report.folder.name}" if one.report.folder else ""
     return f"{one.date}, Spinscope {one.version}, {one.machine}{thinned}."
 
 

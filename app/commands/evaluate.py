@@ -1,4 +1,4 @@
-"""`spinscope evaluate`: the paper's experiments on simulated recordings."""
+"""`spinscope evaluate`: the paper's experiments on simulated and on real recordings."""
 
 from __future__ import annotations
 
@@ -18,10 +18,28 @@ def _list_suites(context: click.Context, _: click.Parameter, wanted: bool) -> No
 
 
 @click.command()
-@click.argument("suites", nargs=-1, required=True, metavar="SUITE...")
+@click.argument("suites", nargs=-1, metavar="SUITE...")
 @click.option(
     "--list", is_flag=True, is_eager=True, expose_value=False, callback=_list_suites, help="List the suites and exit."
 )
+@click.option(
+    "--real",
+    type=click.Path(path_type=Path),
+    metavar="FOLDER",
+    help="Run on the real recordings of a folder, with truth from their sidecars.",
+)
+@click.option(
+    "--check",
+    type=click.Path(path_type=Path),
+    metavar="FOLDER",
+    help="Check a folder of real recordings against the recording protocol, and run no suite.",
+)
+@click.option("--preset", metavar="NAME|FILE.toml", help="Settings to start from: default, paper, or a TOML file.")
+@click.option(
+    "--set", "assignments", multiple=True, metavar="STAGE.FIELD=VALUE", help="Change one setting; repeatable."
+)
+@click.option("--ball", type=click.IntRange(1, 7), help="Only this ball of the paper's, 1 to 7.")
+@click.option("--lens-mm", type=click.FloatRange(1.0, 200.0), help="Focal length of the lens, in mm.")
 @click.option("--quick", is_flag=True, help="A thinned suite, about ten seconds.")
 @click.option("--json", "output", type=click.Path(path_type=Path), metavar="OUT", help="Write JSON, one suite a line.")
 @click.option("--figures", type=click.Path(path_type=Path), metavar="DIR", help="Write figures (PNG) and rows (CSV).")
@@ -30,6 +48,12 @@ def _list_suites(context: click.Context, _: click.Parameter, wanted: bool) -> No
 @click.option("--workers", type=click.IntRange(0), help="Processes on this machine; one a core by default.")
 def evaluate(
     suites: tuple[str, ...],
+    real: Path | None,
+    check: Path | None,
+    preset: str | None,
+    assignments: tuple[str, ...],
+    ball: int | None,
+    lens_mm: float | None,
     quick: bool,
     output: Path | None,
     figures: Path | None,
@@ -37,17 +61,37 @@ def evaluate(
     cluster: str | None,
     workers: int | None,
 ) -> None:
-    """Run the paper's experiments on simulated recordings, next to the paper's own numbers.
+    """Run the paper's experiments on simulated or real recordings, next to the paper's own numbers.
 
     `spinscope evaluate --list` lists the suites. Recordings and results are kept, so that an interrupted run resumes
     where it stopped.
     """
+    from spinscope.pipeline.evaluation import SceneChoices
+    from spinscope.pipeline.session import Choices
+
     from .. import evaluate as running
 
+    choices, scene = Choices(preset, assignments), SceneChoices(ball, lens_mm)
+    if check is not None:
+        raise click.exceptions.Exit(running.check_folder(check, choices))
+    if not suites:
+        raise click.UsageError("name a suite: `spinscope evaluate --list` lists them")
+    if real is not None and quick:
+        raise click.UsageError("--quick thins simulated suites: leave it out with --real")
     done, pictures = [], []
     for suite in suites:
         with ProgressBar() as bar:
-            done.append(running.evaluate_suite(suite, quick=quick, workers=workers, cluster=cluster, on_progress=bar))
+            evaluation = running.evaluate_suite(
+                suite,
+                quick=quick,
+                workers=workers,
+                cluster=cluster,
+                choices=choices,
+                scene=scene,
+                real=real,
+                on_progress=bar,
+            )
+        done.append(evaluation)
         running.print_evaluation(done[-1])
         if figures:
             for path in running.write_figures(done[-1], figures):

@@ -3,23 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ..api import estimate
 from ..chain import Chain, EventsInMemory
+from ..presets import preset
 from ..recordings.in_memory import RecordingInMemory
 from ..registry import Parameters, methods
-from ..results import Truth
+from ..results import Truth, spin_errors
 from ..session import Result
 from ..shots import Shot
+from ..sidecar import StatedTruth
 from ..simulator import SimulatedRecording
 from ..simulator.sensor import LOGO
 from .tables import Cell, Row, distinct, share, summary, where
 from .uncertainty_calibration import ERRORS, STATED, is_answer, is_right
 
 BEST = "best"  # what the program itself trusts
+PAPER_METHOD = "triplet"
+PAPER_PRESET = "triplet, paper preset"  # the paper's method behind the paper's own filters, surface, logo and rate
+
+PRESET_NOTE = (
+    f"'{PAPER_PRESET}': the paper's method with the settings that the paper states; all other rows run with ours. "
+)
 
 
 def estimated(
@@ -48,24 +57,52 @@ def logo_events(recording: SimulatedRecording, window_us: tuple[int, int] | None
     return int(np.count_nonzero(recording.truth.label[first:last] == LOGO))
 
 
-def estimate_rows(result: Result, truth: Truth, about: Row) -> list[Row]:
+def estimate_rows(result: Result, truth: Truth | StatedTruth, about: Row) -> list[Row]:
     """One row a method and one for `best`: its errors against the truth, or why there is no answer."""
     shot = longest(result)
     rows: list[Row] = []
     for name in (*([method.name for method in methods()] if shot is None else shot.estimates), BEST):
-        row: Row = {**about, "method": name, "shots": len(result.shots)}
-        row |= dict.fromkeys((*ERRORS, *STATED, "reason"))
         method = name if name != BEST or shot is None else shot.best
-        if shot is None:
-            row["reason"] = result.no_shot_reason
-        elif method is None:
-            row["reason"] = "no method is trusted"
-        else:
-            found = shot.estimates[method]
-            row |= zip(ERRORS, shot.error_against(truth, method) or (None, None), strict=True)
-            row |= zip((*STATED, "reason"), (found.magnitude_std_rps, found.axis_std_deg, found.reason), strict=True)
-        rows.append(row)
+        rows.append(_estimate_row(result, method, truth, {**about, "method": name}))
     return rows
+
+
+def rows_of_both_presets(result: Result, truth: Truth | StatedTruth, about: Row) -> list[Row]:
+    """Rows of `estimate_rows`, and one of the paper's method with the paper's preset over the same events."""
+    session = result.session
+    of_paper = preset("paper").with_groups(camera=session.parameters.camera, ball=session.parameters.ball)
+    track = session.parameters.track
+    circle = {name: getattr(track, name) for name in track.tunables() if name == "ball" or name.startswith("fixed_")}
+    paper = replace(session, parameters=of_paper.with_values({"track": circle})).estimate(PAPER_METHOD)
+    about_paper = {**about, "method": PAPER_PRESET}
+    return [*estimate_rows(result, truth, about), _estimate_row(paper, PAPER_METHOD, truth, about_paper)]
+
+
+def _estimate_row(result: Result, method: str | None, truth: Truth | StatedTruth, about: Row) -> Row:
+    """The row of one method (None: none is trusted) in the longest shot."""
+    row: Row = {**about, "shots": len(result.shots), **dict.fromkeys((*ERRORS, *STATED, "reason"))}
+    shot = longest(result)
+    if shot is None:
+        row["reason"] = result.no_shot_reason
+    elif method is None:
+        row["reason"] = "no method is trusted"
+    else:
+        found = shot.estimates[method]
+        row |= zip(ERRORS, _errors(shot, method, truth), strict=True)
+        row |= zip((*STATED, "reason"), (found.magnitude_std_rps, found.axis_std_deg, found.reason), strict=True)
+    return row
+
+
+def _errors(shot: Shot, method: str, truth: Truth | StatedTruth) -> tuple[float | None, float | None]:
+    """Errors of magnitude in rps and axis in degrees; None where the method refuses, or the true axis is not known."""
+    if isinstance(truth, Truth):
+        return shot.error_against(truth, method) or (None, None)
+    found = shot.estimates[method].vector_rps
+    if found is None:
+        return None, None
+    if truth.spin_rps is None or not truth.rps:
+        return abs(float(np.linalg.norm(found)) - truth.rps), None
+    return spin_errors(found, np.array(truth.spin_rps))
 
 
 COLUMNS = ("method", "n", "success", "right", "of those with logo", "magnitude error [rps]", "axis error [deg]")
@@ -78,5 +115,5 @@ def method_lines(rows: Sequence[Row], *labels: Cell) -> list[tuple[Cell, ...]]:
         part = where(rows, method=method)
         magnitude, axis = (summary(part, name) for name in ERRORS)
         seen = share(where(part, visible=True), is_answer)
-        lines.append((*labels, method, len(part), axis.success, share(part, is_right), seen, magnitude, axis))
+        lines.append((*labels, method, len(part), magnitude.success, share(part, is_right), seen, magnitude, axis))
     return lines

@@ -115,7 +115,7 @@ def flight_figure(rows: Sequence[Row]) -> Figures:
         for panel, name in zip(axes[0], ERRORS, strict=False):
             curve(panel, part, "bin_rps", name, method, color=color)
         bins = sorted(distinct(part, "bin_rps"))
-        success = [summary(where(part, bin_rps=b), "axis_error_deg").success for b in bins]
+        success = [summary(where(part, bin_rps=b), "magnitude_error_rps").success for b in bins]
         axes[0, 2].plot(bins, success, color=f"C{color}", marker="o", markersize=3, label=method)
     axes[0, 2].set_ylim(0.0, 1.05)
     for panel, label in zip(axes[0], (*LABELS, "success rate"), strict=True):

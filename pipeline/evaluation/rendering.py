@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 from ..biases import PAPER, BiasParameters
-from ..camera import Camera
+from ..camera import Camera, CameraParameters
 from ..errors import RecordingError
 from ..recordings import open_recording
 from ..simulated_recordings import description_in, write_simulation
 from ..simulator import Lens, Scene, SensorModel, SimulatedRecording, default_camera, simulate_scene
 from .tasks import TaskContext, digest, make_folder, text_digest
+
+
+def camera_of(context: TaskContext) -> Camera:
+    """The paper's camera, with the lens that the user chose."""
+    lens_mm = context.scene.lens_mm
+    if lens_mm is None:
+        return default_camera()
+    return replace(default_camera(), focal_px=lens_mm * 1000.0 / CameraParameters().pixel_um)
 
 
 def render(
@@ -23,8 +31,8 @@ def render(
     camera: Camera | None = None,
     lens: Lens | None = None,
 ) -> SimulatedRecording:
-    """The scene before a camera (the paper's by default), from the cache where it is there."""
-    camera, lens = camera or default_camera(), lens or Lens()
+    """The scene before a camera (`camera_of` by default), from the cache where it is there."""
+    camera, lens = camera or camera_of(context), lens or Lens()
     if context.cache is None:
         return simulate_scene(scene, camera=camera, sensor=sensor, lens=lens, seed=seed)
     array = SensorModel.of(sensor) if isinstance(sensor, BiasParameters) else sensor

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from joblib import Parallel
 
+from ..errors import ParameterError, SpinscopeError
 from ..extensions import Registry
+from ..recordings.recording import file_identity
+from .lab_recordings import LabFolder, LabRecording, recordings_table
 from .plots import Figures
 from .tables import ResultTable, Row
-from .tasks import Progress, Task, TaskContext, run
+from .tasks import Progress, SceneChoices, Task, TaskContext, run
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +32,13 @@ class Suite:
         Tables that summarise the rows of all tasks, and matplotlib figures of them by name.
     timed : bool
         Whether the tasks measure run times, so that they run one by one in this process.
+    takes_scene_choices : bool
+        Whether another ball or lens can be chosen for the scenes.
+    real_kinds : tuple of str
+        Kinds of real recordings that the suite runs on; empty where it runs on simulated ones only.
+    real : callable or None
+        `real(context, recording)`: rows of a LabRecording; raises SpinscopeError, with a remedy, where something is
+        missing.
     """
 
     name: str
@@ -37,6 +48,9 @@ class Suite:
     tables: Callable[[Sequence[Row]], list[ResultTable]]
     figures: Callable[[Sequence[Row]], Figures]
     timed: bool = False
+    takes_scene_choices: bool = False
+    real_kinds: tuple[str, ...] = ()
+    real: Callable[[TaskContext, LabRecording], list[Row]] | None = None
 
 
 SUITES: Registry[Suite] = Registry("suite")
@@ -44,19 +58,29 @@ SUITES: Registry[Suite] = Registry("suite")
 
 @dataclass(frozen=True)
 class Report:
-    """Results of a suite, thinned or not: one measurement a row, and tables that summarise them."""
+    """Results of a suite, thinned or not: one measurement a row, and tables that summarise them.
+
+    `folder` is that of the real recordings, None where they were simulated.
+    """
 
     suite: Suite
     quick: bool
     rows: list[Row]
     tables: list[ResultTable]
+    folder: Path | None = None
+
+    @property
+    def title(self) -> str:
+        """Heading of the results."""
+        return self.suite.label if self.folder is None else f"{self.suite.label}, real recordings"
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return {
             "suite": self.suite.name,
-            "title": self.suite.label,
+            "title": self.title,
             "quick": self.quick,
+            "real": self.folder is not None,
             "tables": [table.as_dict() for table in self.tables],
             "rows": self.rows,
         }
@@ -89,5 +113,71 @@ def evaluate(
         For an unknown suite, or a cache that cannot be written.
     """
     suite = SUITES[name]
+    if context.scene != SceneChoices() and not suite.takes_scene_choices:
+        raise ParameterError(f"the suite {name} has balls and lenses of its own: leave --ball and --lens-mm out")
     rows = run(suite.tasks(quick), context, None if suite.timed else parallel, on_progress)
     return Report(suite, quick, rows, suite.tables(rows))
+
+
+def evaluate_real(
+    name: str,
+    folder: Path,
+    context: TaskContext,
+    *,
+    parallel: Parallel | None = None,
+    on_progress: Progress | None = None,
+) -> Report:
+    """Run a suite on the real recordings of a folder, with truth from their sidecars.
+
+    A recording that cannot be used is left out and named in the first table, with the reason.
+
+    Parameters
+    ----------
+    name : str
+    folder : Path
+        With its recordings, those in folders below, and their sidecars.
+    context, parallel, on_progress
+        As of `evaluate`.
+
+    Raises
+    ------
+    SpinscopeError
+        For an unknown suite, one of simulated recordings only, or a folder without recordings.
+    """
+    suite = SUITES[name]
+    if suite.real is None:
+        able = ", ".join(one.name for one in SUITES if one.real)
+        raise ParameterError(f"the suite {name} runs on simulated recordings only: real ones are for {able}")
+    found = LabFolder.of(folder, context.choices, context.scene.ball)
+    tasks = [
+        Task(
+            real_rows,
+            {
+                "suite": name,
+                "recording": recording.path.relative_to(folder).as_posix(),
+                "path": str(recording.path.absolute()),
+                "content": [file_identity(recording.path), recording.sidecar.digest],
+            },
+            keep=not suite.timed,
+        )
+        for recording in found.recordings
+        if recording.kind in suite.real_kinds
+    ]
+    every = run(tasks, context, None if suite.timed else parallel, on_progress)
+    rows = [row for row in every if "error" not in row]
+    tables = [table for table in suite.tables(rows) if table.rows] if rows else []
+    return Report(suite, False, rows, [recordings_table(found, suite.real_kinds, every), *tables], folder)
+
+
+def real_rows(context: TaskContext, suite: str, recording: str, path: str, content: list[str]) -> list[Row]:
+    """Rows of a suite of one real recording; a single one with the `error` where it cannot be used.
+
+    `content` tells versions of recording and sidecar apart when rows are kept.
+    """
+    measure = SUITES[suite].real
+    assert measure is not None
+    try:
+        rows = measure(context, LabRecording.of(Path(path), context.choices))
+    except SpinscopeError as error:
+        rows = [{"error": str(error)}]
+    return [{"recording": recording, **row} for row in rows]

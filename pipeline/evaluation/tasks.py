@@ -7,7 +7,7 @@ import importlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from joblib import Parallel, delayed, parallel_config
 from ..errors import ParameterError
 from ..files import atomic_file
 from ..registry import Parameters
+from ..session import Choices
 from .tables import Row
 
 PIPELINE = Path(__file__).parents[1]
@@ -25,12 +26,41 @@ WORKER_IDLE_S = 5  # after so long without work a process ends, also when the on
 Progress = Callable[[float, str], None]  # share done (0..1) and what is being done
 
 
+@dataclass(frozen=True, slots=True)
+class SceneChoices:
+    """Choices of the user for the scenes of a suite; None = as the suite has it.
+
+    Attributes
+    ----------
+    ball : int or None
+        Number of the ball, 1 to 7: the seat of its logo. Of recordings of a folder, those of this ball.
+    lens_mm : float or None
+        Focal length of the simulated camera's lens.
+    """
+
+    ball: int | None = None
+    lens_mm: float | None = None
+
+
 @dataclass(frozen=True)
 class TaskContext:
-    """Folder for recordings and rows (None keeps nothing), and parameters of the pipeline under evaluation."""
+    """Everything that goes for all tasks of a run.
+
+    Attributes
+    ----------
+    cache : Path or None
+        Folder for recordings and rows; None keeps nothing.
+    parameters : Parameters
+        Of the pipeline under evaluation.
+    choices : Choices
+        The options that gave the parameters: for recordings that state camera and ball themselves.
+    scene : SceneChoices
+    """
 
     cache: Path | None = None
     parameters: Parameters = field(default_factory=Parameters)
+    choices: Choices = Choices()
+    scene: SceneChoices = SceneChoices()
 
 
 @dataclass(frozen=True)
@@ -119,7 +149,7 @@ def _perform(context: TaskContext, task: Task, number: int) -> tuple[int, list[R
     """Run a task and keep its rows; its number tells results apart that come in any order."""
     rows = task.function(context, **task.arguments)
     path = _path(context, task)
-    if path is not None:
+    if path is not None and not any("error" in row for row in rows):  # what failed is tried again
         write_whole(path, json.dumps(rows))
     return number, rows
 
@@ -144,6 +174,8 @@ def _path(context: TaskContext, task: Task) -> Path | None:
     everything = [name, dict(task.arguments), *(text_digest(part) for part in task.needs)]
     if "" in task.needs:
         everything.append(context.parameters.as_dict())
+    if (context.choices, context.scene) != (Choices(), SceneChoices()):
+        everything += [list(context.choices.assignments), asdict(context.scene)]
     return context.cache / "results" / f"{digest(everything)}.json"
 
 

@@ -29,21 +29,21 @@ STATED = ("magnitude_std_rps", "axis_std_deg")
 
 def is_answer(row: Row) -> bool:
     """Whether there is an estimate in the row."""
-    return row["axis_error_deg"] is not None
+    return row["magnitude_error_rps"] is not None
 
 
 def is_gross(row: Row) -> bool:
     """Whether an answer is far off."""
     magnitude, axis = row["magnitude_error_rps"], row["axis_error_deg"]
-    return isinstance(magnitude, float) and isinstance(axis, float) and (magnitude > GROSS_RPS or axis > GROSS_DEG)
+    return isinstance(magnitude, float) and (magnitude > GROSS_RPS or (isinstance(axis, float) and axis > GROSS_DEG))
 
 
 def is_right(row: Row) -> bool:
-    """Whether there is an answer near the truth, of `rps`."""
+    """Whether there is an answer near the truth, of `rps`; by the magnitude alone where the true axis is not known."""
     magnitude, axis, rps = row["magnitude_error_rps"], row["axis_error_deg"], row["rps"]
-    if not (isinstance(magnitude, float) and isinstance(axis, float) and isinstance(rps, float)):
+    if not (isinstance(magnitude, float) and isinstance(rps, float)):
         return False
-    return magnitude <= RIGHT_SHARE * rps and axis <= RIGHT_DEG
+    return magnitude <= RIGHT_SHARE * rps and (not isinstance(axis, float) or axis <= RIGHT_DEG)
 
 
 def is_within_stated(estimate: SpinEstimate, magnitude_error_rps: float, axis_error_deg: float) -> bool:
@@ -146,6 +146,8 @@ def refusals(groups: Sequence[tuple[str, Sequence[Row]]], method: str) -> Result
     lines: list[tuple[Cell, ...]] = []
     for label, rows in groups:
         visible = where(rows, method=method, visible=True)
+        if not visible:
+            continue
         said = (str(row["reason"]) for row in visible if not is_answer(row))
         reasons = Counter(re.split(r"[:(\d]", reason)[0].strip() for reason in said)  # without the numbers
         lines += [(label, reason, count, count / len(visible)) for reason, count in reasons.most_common()]

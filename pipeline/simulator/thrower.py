@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ..camera import Camera
 from ..errors import ParameterError
 from .scene import Scene
 from .scenes import flight
@@ -68,23 +69,42 @@ def thrower_spin(velocity_setting: int, spin_setting: int, side: bool) -> tuple[
     return math.sqrt(magnitude**2 - top**2), top
 
 
-def thrown(velocity_setting: int, spin_setting: int, *, side: bool = False, seed: int = 0) -> Scene:
-    """A shot of the paper's ball thrower: speed and spin of its settings, place and logo from the seed."""
+def thrown(
+    velocity_setting: int,
+    spin_setting: int,
+    *,
+    side: bool = False,
+    ball: int | None = None,
+    camera: Camera | None = None,
+    seed: int = 0,
+) -> Scene:
+    """A shot of the paper's ball thrower: speed and spin of its settings, place and logo from the seed.
+
+    `ball` and `camera` are as of `flight`.
+    """
     left, top = thrower_spin(velocity_setting, spin_setting, side)
     random = np.random.default_rng([seed, 4])
     heading = 90.0 + float(random.normal(0, 2.0))  # a thrower repeats its direction within a few degrees
     forward = np.array([math.cos(math.radians(heading)), math.sin(math.radians(heading)), 0.0])
     up = np.array([0.0, 0.0, -1.0])
     spin = left * up + top * np.cross(up, forward)
-    return flight(spin_rps=spin.tolist(), speed_m_s=THROWER_SPEED_M_S[velocity_setting], heading_deg=heading, seed=seed)
+    return flight(
+        spin_rps=spin.tolist(),
+        speed_m_s=THROWER_SPEED_M_S[velocity_setting],
+        heading_deg=heading,
+        ball=ball,
+        camera=camera,
+        seed=seed,
+    )
 
 
-def human_shot(*, seed: int = 0) -> Scene:
-    """A shot as people play them: log-normal speed and spin with the published quantiles."""
+def human_shot(*, ball: int | None = None, camera: Camera | None = None, seed: int = 0) -> Scene:
+    """A shot as people play them: log-normal speed and spin with the published quantiles; see `flight`."""
     random = np.random.default_rng([seed, 5])
     values = []
     for median, high, cap in (HUMAN_SPIN_RPS, HUMAN_SPEED_M_S):
         sigma = math.log(high / median) / 1.645  # the standard normal's 95th percentile
         values.append(min(median * math.exp(sigma * float(random.standard_normal())), cap))
     kind = str(random.choice(["top", "back", "mixed"]))
-    return flight(kind=kind, magnitude_rps=values[0], speed_m_s=max(values[1], 2.0), seed=seed)
+    speed_m_s = max(values[1], 2.0)
+    return flight(kind=kind, magnitude_rps=values[0], speed_m_s=speed_m_s, ball=ball, camera=camera, seed=seed)

@@ -16,5 +16,8 @@ for _found in iter_modules(__path__):
             tables=_module.tables,
             figures=_module.figures,
             timed=getattr(_module, "TIMED", False),
+            takes_scene_choices=getattr(_module, "TAKES_SCENE_CHOICES", False),
+            real_kinds=getattr(_module, "REAL_KINDS", ()),
+            real=getattr(_module, "real", None),
         )
     )

@@ -10,14 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...biases import PAPER, BiasParameters
+from ...camera import Camera
+from ...errors import RecordingError
 from ...simulator import Background, Scene, SimulatedRecording, flight, simulate_scene
 from ...simulator.sensor import LOGO
+from ..lab_recordings import FLIGHT, SPINNER, LabRecording
 from ..plots import Figures, curve, label_axes, panels
+from ..rendering import camera_of
 from ..tables import Cell, ResultTable, Row, distinct, summary, where
 from ..tasks import Task, TaskContext
 
 LABEL = "Biases: event rates and pictures of the logo"
 HELP = "Event rates of noise and ball against each bias, and pictures of the logo (supplement)."
+
+TAKES_SCENE_CHOICES = True
+REAL_KINDS = (FLIGHT, SPINNER)
 
 SEED = 322_591
 FLIGHTS = 5  # the paper averages over 5 samples
@@ -56,7 +63,7 @@ def _set(sweep: str, value: int) -> BiasParameters:
     return PAPER.with_values(dict.fromkeys(SWEEPS[sweep][0], value))
 
 
-def _row(what: str, sweep: str, value: int, seed: int, made: SimulatedRecording | None = None) -> Row:
+def _row(what: str, sweep: str, value: int, seed: int | None, made: SimulatedRecording | None = None) -> Row:
     """The columns of every row; the rates are those of the recording, None without one."""
     paper = all(getattr(PAPER, name) == value for name in SWEEPS[sweep][0])
     row: Row = {"what": what, "sweep": sweep, "value": value, "paper": paper, "seed": seed}
@@ -67,6 +74,31 @@ def _row(what: str, sweep: str, value: int, seed: int, made: SimulatedRecording 
     return row
 
 
+def real(context: TaskContext, recording: LabRecording) -> list[Row]:
+    """Event rates of a real recording, of noise where no ball is found in it, in every sweep that it belongs to.
+
+    It belongs to the sweep of a bias where all others are the paper's.
+    """
+    biases, session = recording.biases, recording.session
+    sweeps = [
+        (sweep, getattr(biases, names[0]))
+        for sweep, (names, _, _) in SWEEPS.items()
+        if len({getattr(biases, name) for name in names}) == 1
+        and all(getattr(biases, name) == getattr(PAPER, name) for name in biases.tunables() if name not in names)
+    ]
+    if not sweeps:
+        changed = ", ".join(f"{name} {value}" for name, value in biases.as_dict().items())
+        raise RecordingError(
+            f"its biases ({changed}) differ from the paper's in more than one of {', '.join(SWEEPS)}: change one at a "
+            "time"
+        )
+    start_us, end_us = session.source.start_us, session.source.end_us
+    on, seconds = session.source.between(start_us, end_us).on, (end_us - start_us) * 1e-6
+    what = "ball" if session.estimate("triplet").shots else "noise"
+    rates: Row = {"on_hz": float(on.sum()) / seconds, "off_hz": float((~on).sum()) / seconds}
+    return [_row(what, sweep, value, None) | rates for sweep, value in sweeps]
+
+
 def measure_noise(context: TaskContext, sweep: str, value: int, seed: int) -> list[Row]:
     """Events a second of a scene in which nothing moves."""
     scene = Scene(STATIC_S, (), background=Background())
@@ -74,26 +106,33 @@ def measure_noise(context: TaskContext, sweep: str, value: int, seed: int) -> li
     return [_row("noise", sweep, value, seed, made)]
 
 
-def _flying(seed: int, duration_ms: int | None) -> Scene:
-    scene = flight(kind="top", magnitude_rps=SPIN_RPS, speed_m_s=SPEED_M_S, seed=seed)
+def _flying(context: TaskContext, seed: int, duration_ms: int | None) -> Scene:
+    scene = flight(
+        kind="top",
+        magnitude_rps=SPIN_RPS,
+        speed_m_s=SPEED_M_S,
+        ball=context.scene.ball,
+        camera=camera_of(context),
+        seed=seed,
+    )
     duration_s = scene.duration_s if duration_ms is None else min(scene.duration_s, duration_ms / 1000)
     return dataclasses.replace(scene, duration_s=duration_s)
 
 
 def measure_ball(context: TaskContext, sweep: str, value: int, seed: int, duration_ms: int | None) -> list[Row]:
     """Events a second of everything while a ball flies through, as the supplement counts them, and of its logo."""
-    scene = _flying(seed, duration_ms)
-    made = simulate_scene(scene, sensor=_set(sweep, value), seed=seed)
+    scene = _flying(context, seed, duration_ms)
+    made = simulate_scene(scene, camera=camera_of(context), sensor=_set(sweep, value), seed=seed)
     logo_hz = float(made.logo_events) / scene.duration_s
     return [_row("ball", sweep, value, seed, made) | {"logo_hz": logo_hz}]
 
 
 def take_picture(context: TaskContext, sweep: str, value: int, duration_ms: int | None) -> list[Row]:
     """The ball at the moment when its logo makes most events (at the paper's biases)."""
-    scene = _flying(SEED, duration_ms)
+    scene, camera = _flying(context, SEED, duration_ms), camera_of(context)
     span_us = PICTURES[sweep][1]
-    at_us = _busiest(scene, span_us)
-    made = simulate_scene(scene, sensor=_set(sweep, value), seed=SEED)
+    at_us = _busiest(scene, camera, span_us)
+    made = simulate_scene(scene, camera=camera, sensor=_set(sweep, value), seed=SEED)
     shown = made.events.between(at_us - span_us, at_us)
     truth = made.truth
     x, y = (
@@ -117,9 +156,9 @@ def picture_of(row: Row) -> NDArray[np.float64]:
     return flat.reshape(PICTURE_PX, PICTURE_PX) / 127.0
 
 
-def _busiest(scene: Scene, span_us: int) -> int:
+def _busiest(scene: Scene, camera: Camera, span_us: int) -> int:
     """End of the span with most logo events, the whole ball being in view."""
-    made = simulate_scene(scene, sensor=PAPER, seed=SEED)
+    made = simulate_scene(scene, camera=camera, sensor=PAPER, seed=SEED)
     x, y, half = made.truth.x_px, made.truth.y_px, PICTURE_PX / 2
     seen = (x > half) & (x < made.width_px - half) & (y > half) & (y < made.height_px - half)
     ends = made.truth.t_us[seen & (made.truth.t_us >= span_us)]
@@ -133,10 +172,12 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
     result = []
     for sweep in distinct(rows, "sweep"):
         lines: list[tuple[Cell, ...]] = []
-        for value in sorted(distinct(where(rows, sweep=sweep, what="ball"), "value")):
+        for value in sorted(distinct([row for row in rows if row["what"] != "picture"], "value")):
             noise = where(rows, sweep=sweep, value=value, what="noise")
             ball = where(rows, sweep=sweep, value=value, what="ball")
-            mark = f"{value} (paper)" if ball[0]["paper"] else str(value)
+            if not noise and not ball:
+                continue
+            mark = f"{value} (paper)" if (noise + ball)[0]["paper"] else str(value)
             rates = [summary(noise, name).mean for name in ("on_hz", "off_hz")]
             lines.append((mark, *rates, *(summary(ball, name) for name in ("on_hz", "off_hz", "logo_hz"))))
         columns = ("bias", "noise ON [1/s]", "noise OFF [1/s]", "ball ON [1/s]", "ball OFF [1/s]", "logo [1/s]")

@@ -15,12 +15,14 @@ from ...stages.track_kalman import OBSERVED, BallFilter
 from .. import paper
 from ..estimation import chain_over
 from ..plots import Figures, curve, label_axes, panels
-from ..rendering import render
+from ..rendering import camera_of, render
 from ..tables import Cell, ResultTable, Row, Summary, distinct, share, summary, where
 from ..tasks import Task, TaskContext
 
 LABEL = "Ball detector: error against speed"
 HELP = "Errors of the ball's place, size and velocity against its speed (section 4.2)."
+
+TAKES_SCENE_CHOICES = True
 
 SEED = 882_541  # of this suite alone
 SPEEDS_M_S = tuple(float(speed) for speed in range(4, 21, 2))
@@ -51,7 +53,16 @@ def tasks(quick: bool) -> list[Task]:
 def measure(context: TaskContext, scene: str, speed_m_s: float, seed: int) -> list[Row]:
     """Every stage's errors in every tick in which all of the ball is in view."""
     two, arm = scene == "two balls", scene == "arm"
-    shown = flight(kind="top", magnitude_rps=40.0, speed_m_s=speed_m_s, second_ball=two, arm=arm, seed=seed)
+    shown = flight(
+        kind="top",
+        magnitude_rps=40.0,
+        speed_m_s=speed_m_s,
+        second_ball=two,
+        arm=arm,
+        ball=context.scene.ball,
+        camera=camera_of(context),
+        seed=seed,
+    )
     recording = render(context, shown, seed=seed)
     about: Row = {"scene": scene, "speed_m_s": speed_m_s, "seed": seed}
     chain = chain_over(recording)

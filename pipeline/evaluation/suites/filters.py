@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...chain import Chain
 from ...events import EventBatch
-from ...registry import STAGES
+from ...registry import STAGES, Parameters
 from ...results import Packet
 from ..estimation import COLUMNS, chain_over, estimate_rows, estimated, method_lines
+from ..lab_recordings import FLIGHT, LabRecording
 from ..plots import LABELS, Figures, curve, label_axes, panels
-from ..tables import Cell, ResultTable, Row, distinct, summary, where
+from ..tables import Cell, ResultTable, Row, Value, distinct, summary, where
 from ..tasks import Task, TaskContext
 from ..uncertainty_calibration import ERRORS
 from .thrower import flight_of, flights
 
 LABEL = "Filters: events kept, and the spin"
 HELP = "Events that each filter keeps, and what that does to the spin (supplement)."
+
+TAKES_SCENE_CHOICES = True
+REAL_KINDS = (FLIGHT,)
 
 FILTERS = ("stc", "trail", "stc_cut_trail")
 THRESHOLDS_US = (100, 200, 500, 1000, 2000, 5000, 10_000, 20_000)
@@ -36,7 +42,7 @@ def tasks(quick: bool) -> list[Task]:
     spin = [
         Task(measure_spin, {**flight, "mode": mode, "threshold_us": threshold_us})
         for flight in chosen
-        for mode, threshold_us in [("off", 1), *((m, t) for m in FILTERS for t in thresholds)]
+        for mode, threshold_us in _filters(thresholds)
     ]
     return kept + spin
 
@@ -44,25 +50,49 @@ def tasks(quick: bool) -> list[Task]:
 def measure_kept(context: TaskContext, **flight: Any) -> list[Row]:
     """The share of events that each filter keeps at each threshold, by cause."""
     recording, about = flight_of(context, **flight)
-    label = recording.truth.label
     packet = Packet(0, 0, recording.duration_us, recording.events)
+    return _kept_rows(chain_over(recording), context.parameters, packet, recording.truth.label, about["seed"])
+
+
+def _kept_rows(
+    chain: Chain, parameters: Parameters, packet: Packet, label: NDArray[np.uint8] | None, seed: Value
+) -> list[Row]:
+    """Shares kept of a packet's events; by cause where they have labels (n,)."""
     rows: list[Row] = []
     for mode in FILTERS:
         for threshold_us in THRESHOLDS_US:
-            parameters = context.parameters.filter.with_values(
+            filter_parameters = parameters.filter.with_values(
                 {"mode": mode, "threshold_us": threshold_us, "logo_mode": mode, "logo_threshold_us": threshold_us}
             )
             stage = STAGES["filter"]
-            state = chain_over(recording).start(context.parameters.with_groups(filter=parameters), stage)
-            passed = stage.step(parameters, state, packet).surface_events
-            kept = np.isin(_keys(recording.events), _keys(passed))
-            row: Row = {"question": "kept", "seed": about["seed"], "mode": mode, "threshold_us": threshold_us}
+            state = chain.start(parameters.with_groups(filter=filter_parameters), stage)
+            passed = stage.step(filter_parameters, state, packet).surface_events
+            kept = np.isin(_keys(packet.events), _keys(passed))
+            row: Row = {"question": "kept", "seed": seed, "mode": mode, "threshold_us": threshold_us}
             row["kept_all"] = float(kept.mean())
             for name, labels in (("noise", NOISE), ("ball", BALL), ("logo", LOGO)):
-                of_these = np.isin(label, labels)
-                row[f"kept_{name}"] = float(kept[of_these].mean()) if of_these.any() else None
+                of_these = None if label is None else np.isin(label, labels)
+                row[f"kept_{name}"] = None if of_these is None or not of_these.any() else float(kept[of_these].mean())
             rows.append(row)
     return rows
+
+
+def real(context: TaskContext, recording: LabRecording) -> list[Row]:
+    """Both questions about a real flight; the events' causes are not known."""
+    truth, session = recording.stated, recording.session
+    start_us, end_us = session.source.start_us, session.source.end_us
+    packet = Packet(0, start_us, end_us, session.source.between(start_us, end_us))
+    rows = _kept_rows(session.chain, session.parameters, packet, None, None)
+    for mode, threshold_us in _filters(SPIN_THRESHOLDS_US):
+        filtered = {"filter": {"logo_mode": mode, "logo_threshold_us": threshold_us}}
+        result = replace(session, parameters=session.parameters.with_values(filtered)).estimate()
+        about: Row = {"question": "spin", "mode": mode, "threshold_us": threshold_us, "rps": truth.rps}
+        rows += estimate_rows(result, truth, about | {"visible": None})
+    return rows
+
+
+def _filters(thresholds_us: Sequence[int]) -> list[tuple[str, int]]:
+    return [("off", 1), *((mode, threshold_us) for mode in FILTERS for threshold_us in thresholds_us)]
 
 
 def measure_spin(context: TaskContext, mode: str, threshold_us: int, **flight: Any) -> list[Row]:

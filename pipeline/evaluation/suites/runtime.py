@@ -8,16 +8,21 @@ from typing import Any
 
 import numpy as np
 
+from ...chain import Chain
 from ...registry import STAGES as REGISTERED
+from ...registry import Parameters
 from .. import paper
 from ..estimation import chain_over
+from ..lab_recordings import FLIGHT, SPINNER, LabRecording
 from ..plots import Figures, label_axes, panels
-from ..tables import Cell, ResultTable, Row, distinct, summary, where
+from ..tables import Cell, ResultTable, Row, Value, distinct, summary, where
 from ..tasks import Task, TaskContext
 from .thrower import flight_of, flights
 
 LABEL = "Run times"
 HELP = "Latency up to the logo's events, and processing time over recording time (section 4.4)."
+TAKES_SCENE_CHOICES = True
+REAL_KINDS = (FLIGHT, SPINNER)
 TIMED = True  # its tasks measure run times
 
 # The paper's "from the moment the events are received": up to the logo's events; the rest is spin estimation.
@@ -38,17 +43,32 @@ def tasks(quick: bool) -> list[Task]:
 def measure(context: TaskContext, tick_us: int, **flight: Any) -> list[Row]:
     """Milliseconds of every stage in every tick, the kernels being loaded before."""
     recording, about = flight_of(context, **flight)
-    parameters = context.parameters.with_values({"track": {"tick_us": tick_us}})
-    for _ in chain_over(recording).run(parameters, forget=STAGES):
-        pass
     chain = chain_over(recording, clock=time.thread_time)  # other work of the machine does not count
+    return _timed_rows(chain_over(recording), chain, context.parameters, tick_us, about["seed"])
+
+
+def real(context: TaskContext, recording: LabRecording) -> list[Row]:
+    """The same of a real recording, for each length of tick; no truth is needed."""
+    rows: list[Row] = []
+    for tick_us in TICKS_US:
+        session = recording.session
+        warm_up, chain = Chain(session.source), Chain(session.source, clock=time.thread_time)
+        rows += _timed_rows(warm_up, chain, session.parameters, tick_us, recording.path.name)
+    return rows
+
+
+def _timed_rows(warm_up: Chain, chain: Chain, parameters: Parameters, tick_us: int, seed: Value) -> list[Row]:
+    """Rows of a chain that measures its time, after one over the same events; `seed` tells recordings apart."""
+    parameters = parameters.with_values({"track": {"tick_us": tick_us}})
+    for _ in warm_up.run(parameters, forget=STAGES):
+        pass
     rows: list[Row] = []
     before = dict.fromkeys(STAGES, 0.0)
     for tick in chain.run(parameters, forget=STAGES):
         taken_ms = {name: (chain.seconds[name] - before[name]) * 1e3 for name in STAGES}
         before = dict(chain.seconds)
         packet, latency_ms = tick.packet, sum(taken_ms[name] for name in LATENCY_STAGES)
-        row: Row = {"tick_us": tick_us, "seed": about["seed"], "t_us": packet.end_us}
+        row: Row = {"tick_us": tick_us, "seed": seed, "t_us": packet.end_us}
         row |= {"tick_ms": (packet.end_us - packet.start_us) / 1e3, "events": len(packet.events)}
         row |= {"has_ball": tick.track.has_ball, "latency_ms": latency_ms}
         rows.append(row | {f"{name}_ms": value for name, value in taken_ms.items()})

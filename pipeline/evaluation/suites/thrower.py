@@ -11,18 +11,23 @@ from typing import Any
 
 import numpy as np
 
+from ...session import Result
 from ...simulator import SimulatedRecording, human_shot, thrown
 from ...simulator.thrower import THROWER_BACKTOP_RPS, THROWER_SIDE_RPS, THROWER_SPEED_M_S
 from .. import paper
-from ..estimation import COLUMNS, estimate_rows, estimated, logo_events, longest, method_lines
+from ..estimation import COLUMNS, PRESET_NOTE, estimated, logo_events, longest, method_lines, rows_of_both_presets
+from ..lab_recordings import FLIGHT, SIDE, LabRecording
 from ..plots import Figures, coverage_figure, flight_figure
-from ..rendering import render
+from ..rendering import camera_of, render
 from ..tables import ResultTable, Row, distinct, where
 from ..tasks import Task, TaskContext
 from ..uncertainty_calibration import RIGHT_NOTE, Goal, calibration_table, goals, refusals
 
 LABEL = "Ball thrower: the paper's table 2"
 HELP = "Spin of flying balls: the thrower's settings and shots as people play them (table 2)."
+
+TAKES_SCENE_CHOICES = True
+REAL_KINDS = (FLIGHT,)
 
 SEED = 360_550  # of this suite alone
 HUMAN_SEED = 880_697
@@ -62,23 +67,40 @@ def measure(context: TaskContext, **flight: Any) -> list[Row]:
 
 def measure_human(context: TaskContext, seed: int) -> list[Row]:
     """The same in a shot as people play them."""
-    recording = render(context, human_shot(seed=seed), seed=seed)
+    scene = human_shot(ball=context.scene.ball, camera=camera_of(context), seed=seed)
+    recording = render(context, scene, seed=seed)
     about: Row = {"velocity_setting": None, "spin_setting": None, "side": None, "seed": seed, "by": HUMAN}
     about["speed_m_s"] = float(np.linalg.norm(recording.truth.velocity_m_s[0]))
     about["rps"] = float(np.linalg.norm(recording.truth.spin_rps[0]))
     return _measured(context, recording, about | _visibility(recording))
 
 
+def real(context: TaskContext, recording: LabRecording) -> list[Row]:
+    """The same of a real recording of one flight; of several the longest counts."""
+    truth = recording.stated
+    session, kind = recording.session, recording.kind_of_spin
+    about: Row = {"velocity_setting": None, "spin_setting": None, "side": None if kind is None else kind == SIDE}
+    about |= {"seed": None, "by": THROWER, "speed_m_s": truth.speed_m_s, "rps": truth.rps}
+    about["duration_ms"] = (session.source.end_us - session.source.start_us) / 1000
+    about |= {"logo_events": None, "visible": None}
+    result = session.estimate()
+    return rows_of_both_presets(result, truth, about | _tracked(result))
+
+
 def _measured(context: TaskContext, recording: SimulatedRecording, about: Row) -> list[Row]:
     result = estimated(recording, context.parameters)
+    return rows_of_both_presets(result, recording.truth, about | _tracked(result))
+
+
+def _tracked(result: Result) -> Row:
     shot = longest(result)
-    about["tracked_ms"] = 0.0 if shot is None else (shot.end_us - shot.start_us) / 1000
-    return estimate_rows(result, recording.truth, about)
+    return {"tracked_ms": 0.0 if shot is None else (shot.end_us - shot.start_us) / 1000}
 
 
 def flight_of(context: TaskContext, velocity: int, spin: int, side: bool, seed: int) -> tuple[SimulatedRecording, Row]:
     """The recording of a flight at these settings of the thrower, and the columns that tell flights apart."""
-    recording = render(context, thrown(velocity, spin, side=side, seed=seed), seed=seed)
+    scene = thrown(velocity, spin, side=side, ball=context.scene.ball, camera=camera_of(context), seed=seed)
+    recording = render(context, scene, seed=seed)
     about: Row = {"velocity_setting": velocity, "spin_setting": spin, "side": side, "seed": seed, "by": THROWER}
     about["speed_m_s"] = THROWER_SPEED_M_S[velocity]
     about["rps"] = (THROWER_SIDE_RPS if side else THROWER_BACKTOP_RPS)[velocity][spin]
@@ -97,7 +119,7 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
     players = [(who, part) for who in (THROWER, HUMAN) if (part := where(both, by=who))]
     return [
         ResultTable("Table 2: flying balls", COLUMNS, [*paper.TABLE_2, *method_lines(rows)], NOTE),
-        _by(rows, "speed [m/s]", "speed_m_s", {speed: str(speed) for speed in THROWER_SPEED_M_S.values()}),
+        _by(rows, "speed [m/s]", "speed_m_s", {speed: str(speed) for speed in _stated(rows, "speed_m_s")}),
         _by(rows, "spin", "side", {True: "side", False: "top/back"}),
         ResultTable(
             "Flying balls as people play them",
@@ -129,8 +151,13 @@ def _goals(own: Sequence[Row]) -> ResultTable:
 
 NOTE = (
     f"'of those with logo': flights with at least {VISIBLE} logo events. Without a ball, or where a method refuses, "
-    "an answer counts as failed. " + RIGHT_NOTE
+    "an answer counts as failed. " + PRESET_NOTE + RIGHT_NOTE
 )
+
+
+def _stated(rows: Sequence[Row], name: str) -> list[Any]:
+    """The values of a column that are known, rising."""
+    return sorted(value for value in distinct(rows, name) if value is not None)
 
 
 def _by(rows: Sequence[Row], header: str, column: str, labels: Mapping[Any, str]) -> ResultTable:
