@@ -12,7 +12,6 @@ from .recording import Recording
 from .sensor import stated_resolution
 
 UNREADABLE = {
-    b"#!AER-DAT": "AEDAT",
     b"#ROSBAG": "ROS bag",
     b"SQLite format 3": "ROS 2 bag (SQLite)",
     b"\x1f\x8b": "gzip-packed",

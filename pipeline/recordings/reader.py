@@ -53,6 +53,7 @@ class Damage:
     untimed_events: int = _count("{} events without a sure time or row were dropped")
     outside_events: int = _count("{} events outside the sensor were dropped")
     lost_bytes: int = _count("{} bytes at the end make no whole word: the file was cut")
+    broken_ends: int = _count("the file is damaged or cut at {} place, and nothing behind it could be read")
 
     def sentences(self) -> list[str]:
         """One sentence for people for every kind that occurred."""

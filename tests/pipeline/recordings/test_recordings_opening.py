@@ -14,7 +14,8 @@ from spinscope.pipeline.recordings.sensor import KNOWN_SENSORS, smallest_known
 from tests.pipeline.recordings.test_recordings_raw import assert_same_events, moving_edge
 
 HEADS = {
-    "a.aedat4": (b"#!AER-DAT4.0\r\n", "AEDAT file is not read here"),
+    "a.aedat4": (b"#!AER-DAT4.0\r\n", "AEDAT4 file is damaged or was cut"),
+    "a.aedat": (b"#!AER-DAT2.0\r\n", "AEDAT of version 2 is not read: convert it to AEDAT4"),
     "a.bag": (b"#ROSBAG V2.0\n", "ROS bag file is not read here"),
     "a.db3": (b"SQLite format 3\0", "ROS 2 bag"),
     "a.npy": (b"\x93NUMPY\x01\x00", "NPY file is damaged or was cut"),

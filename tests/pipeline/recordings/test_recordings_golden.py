@@ -1,0 +1,56 @@
+"""Real recordings against counts and sums that two or more independent decoders agree on."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from spinscope.pipeline.recordings import open_recording
+
+FOLDER = Path(os.environ.get("SPINSCOPE_REAL_RECORDINGS", ""))
+pytestmark = pytest.mark.skipif(
+    "SPINSCOPE_REAL_RECORDINGS" not in os.environ, reason="SPINSCOPE_REAL_RECORDINGS names no folder of recordings"
+)
+
+# Format, size of the sensor; number of events, first and last time, sums of x, y and p; number of triggers.
+GEN31 = (640, 480), (343474, 7139845, 9218023, 116731888, 80879209, 125183), 4157
+EVK = (1280, 720), (82469, 14224870, 15476187, 42078718, 31656267, 41439), 2
+GOLDEN = {
+    "gen31_cable_4157triggers_evt3.raw": ("EVT3 RAW", *GEN31),
+    "evk_1280x720_2triggers_evt3.raw": ("EVT3 RAW", *EVK),
+    "davis346.aedat4": (
+        "AEDAT4",
+        (346, 260),
+        (78830, 1589163147368868, 1589163149728813, 14861513, 15061593, 41257),
+        236,
+    ),
+    "davis.aedat4": (
+        "AEDAT4",
+        (346, 260),
+        (117667, 1633953690975950, 1633953691105949, 17676033, 10498046, 72363),
+        15,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", GOLDEN)
+def test_counts_and_sums_are_those_of_other_decoders(name: str) -> None:
+    format, size, sums, triggers = GOLDEN[name]
+    recording = open_recording(FOLDER / name)
+    events = recording.read()
+    columns = (events.x_px, events.y_px, events.on)
+    found = (len(events), int(events.t_us[0]), int(events.t_us[-1]), *(int(column.sum()) for column in columns))
+    assert (recording.format, (recording.width_px, recording.height_px), found) == (format, size, sums)
+    assert len(recording.triggers) == triggers and not recording.damage.sentences()
+
+
+def test_a_cut_aedat4_file_is_read_up_to_the_cut(tmp_path: Path) -> None:
+    whole = (FOLDER / "davis.aedat4").read_bytes()
+    (tmp_path / "cut.aedat4").write_bytes(whole[: len(whole) // 2])
+    recording, all_events = open_recording(tmp_path / "cut.aedat4"), open_recording(FOLDER / "davis.aedat4").read()
+    events = recording.read()
+    assert 0.2 * len(all_events) < len(events) < 0.8 * len(all_events)
+    assert (events.x_px == all_events.x_px[: len(events)]).all()
+    assert recording.damage.broken_ends == 1
