@@ -12,8 +12,6 @@ from .recording import Recording
 from .sensor import stated_resolution
 
 UNREADABLE = {
-    b"#ROSBAG": "ROS bag",
-    b"SQLite format 3": "ROS 2 bag (SQLite)",
     b"\x1f\x8b": "gzip-packed",
     b"\xfd7zXZ": "xz-packed",
     b"7z\xbc\xaf": "7z-packed",

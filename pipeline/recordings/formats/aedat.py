@@ -10,7 +10,8 @@ import numpy as np
 
 from ...errors import RecordingError
 from ..optional_packages import optional_module
-from ..reader import FormatReader, ReadingOptions, ReadPass, Triggers, UncheckedEvents, file_errors
+from ..packets import foreign_errors, joined, undamaged
+from ..reader import FormatReader, ReadingOptions, ReadPass, Triggers, UncheckedEvents
 from ..sensor import resolution_or_none
 from .registry import FORMATS, RecordingFormat
 
@@ -54,50 +55,22 @@ class AedatReader(FormatReader):
 
     def columns(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
         """Yield the events of the packets before the first damaged one; packed files are only read from their start."""
-        held: list[UncheckedEvents] = []
-        events = 0
-        packets = self._packets(reading)
-        for packet in packets:
+        with foreign_errors(self.path, self.format):
+            yield from joined(self._events(reading), reading.max_events)
+        reading.report(1, 1)
+
+    def _events(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
+        for packet in undamaged(self._decoder(), reading):
             if "triggers" in packet:
                 reading.triggers.append(_triggers(packet["triggers"]))
             elif "events" in packet and packet["stream_id"] == self._stream:
                 found = packet["events"]
-                held.append(UncheckedEvents(found["t"].astype(np.int64), found["x"], found["y"], found["on"]))
-                events += len(found)
-            if events >= reading.max_events:
-                yield from _in_parts(held, reading.max_events)
-                held, events = [], 0
-        if events:
-            yield from _in_parts(held, reading.max_events)
-        reading.report(1, 1)
-
-    def _packets(self, reading: ReadPass) -> Iterator[dict[str, Any]]:
-        """Yield the packets; damage ends them, unless it is in the first."""
-        decoder, packets = self._decoder(), 0
-        with file_errors(self.path, self.format):
-            while True:
-                try:
-                    packet = next(decoder, None)
-                except Exception:  # noqa: BLE001  whatever the package raises
-                    if not packets:
-                        raise
-                    reading.damage.broken_ends += 1
-                    return
-                if packet is None:
-                    return
-                packets += 1
-                yield packet
+                yield UncheckedEvents(found["t"].astype(np.int64), found["x"], found["y"], found["on"])
 
     def _decoder(self) -> Any:
         aedat = optional_module("aedat", "aedat", "AEDAT4")
-        with file_errors(self.path, self.format):
+        with foreign_errors(self.path, self.format):
             return aedat.Decoder(str(self.path))
-
-
-def _in_parts(held: list[UncheckedEvents], most: int) -> Iterator[UncheckedEvents]:
-    together = UncheckedEvents.concatenate([part for part in held if len(part)])
-    for first in range(0, len(together), most):
-        yield together[first : first + most]
 
 
 def _triggers(found: Any) -> Triggers:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.recordings import open_recording
 
 FOLDER = Path(os.environ.get("SPINSCOPE_REAL_RECORDINGS", ""))
@@ -20,6 +21,8 @@ EVK = (1280, 720), (82469, 14224870, 15476187, 42078718, 31656267, 41439), 2
 GOLDEN = {
     "gen31_cable_4157triggers_evt3.raw": ("EVT3 RAW", *GEN31),
     "evk_1280x720_2triggers_evt3.raw": ("EVT3 RAW", *EVK),
+    "test_events_1.bag": ("ROS1 bag", *GEN31),
+    "test_data_evt3_trigger_0.db3": ("ROS2 bag (SQLite)", *EVK),
     "davis346.aedat4": (
         "AEDAT4",
         (346, 260),
@@ -44,6 +47,13 @@ def test_counts_and_sums_are_those_of_other_decoders(name: str) -> None:
     found = (len(events), int(events.t_us[0]), int(events.t_us[-1]), *(int(column.sum()) for column in columns))
     assert (recording.format, (recording.width_px, recording.height_px), found) == (format, size, sums)
     assert len(recording.triggers) == triggers and not recording.damage.sentences()
+
+
+def test_a_bag_that_is_cut_is_refused_in_one_line(tmp_path: Path) -> None:
+    whole = (FOLDER / "test_events_1.bag").read_bytes()
+    (tmp_path / "cut.bag").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(RecordingError, match=r"ROS1 bag file is damaged or was cut"):
+        open_recording(tmp_path / "cut.bag")
 
 
 def test_a_cut_aedat4_file_is_read_up_to_the_cut(tmp_path: Path) -> None:

@@ -16,8 +16,8 @@ from tests.pipeline.recordings.test_recordings_raw import assert_same_events, mo
 HEADS = {
     "a.aedat4": (b"#!AER-DAT4.0\r\n", "AEDAT4 file is damaged or was cut"),
     "a.aedat": (b"#!AER-DAT2.0\r\n", "AEDAT of version 2 is not read: convert it to AEDAT4"),
-    "a.bag": (b"#ROSBAG V2.0\n", "ROS bag file is not read here"),
-    "a.db3": (b"SQLite format 3\0", "ROS 2 bag"),
+    "a.bag": (b"#ROSBAG V2.0\n", "ROS1 bag file is damaged or was cut"),
+    "a.db3": (b"SQLite format 3\0", "ROS2 bag (SQLite) file is damaged or was cut"),
     "a.npy": (b"\x93NUMPY\x01\x00", "NPY file is damaged or was cut"),
     "a.h5.gz": (b"\x1f\x8b\x08\x00", "gzip-packed"),
     "a.h5": (b"version https://git-lfs.github.com", "file named .h5 is no HDF5 file"),
