@@ -274,3 +274,22 @@ def _ecf_columns(x: list[int]) -> bytes:
                 k += 1
         out += struct.pack("<H", word)
     return out
+
+
+def write_event_stream(path: Path, events: list[Event], *, width_px: int, height_px: int, is_atis: bool) -> None:
+    """Write Event Stream 2.0, with five resets between events now and then, and exposure measurements in ATIS."""
+    out = bytearray(b"Event Stream" + bytes([2, 0, 0, 2 if is_atis else 1]) + struct.pack("<2H", width_px, height_px))
+    now, full = 0, 63 if is_atis else 127
+    for number, (t, x, y, on) in enumerate(events):
+        if number % 10 == 3:
+            out += bytes([0xFC if is_atis else 0xFE]) * 5
+        if is_atis and number % 10 == 5:
+            out += struct.pack("<BHH", 0b11, 1, 2)
+        overflows, left = divmod(t - now, full)
+        if is_atis:
+            out += bytes([0xFF]) * (overflows // 3) + (bytes([0xFC | overflows % 3]) if overflows % 3 else b"")
+            out += struct.pack("<BHH", left << 2 | int(on) << 1, x, y)
+        else:
+            out += bytes([0xFF]) * overflows + struct.pack("<BHH", left << 1 | int(on), x, y)
+        now = t
+    path.write_bytes(bytes(out))
