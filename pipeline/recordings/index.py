@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..errors import RecordingError
 from ..events import EventBatch
 from ..files import atomic_file
+from .clock_segments import ClockSegments
 from .order import NO_TIME_US, TimeOrder
 from .reader import FILE_ERRORS, Damage, Place, ReadPass, Triggers, UncheckedEvents
 from .sensor import Resolution
@@ -23,7 +24,7 @@ from .sensor import Resolution
 PLACE_EVENTS = 1 << 19
 SAMPLED_EVENTS = 1 << 12  # every so many events a time is kept: a hundredth of what a pixel of an overview shows
 INDEX_VERSION = 4  # to be raised whenever readers or the index change what they say of the same file
-ARRAYS = ("sampled_us", "offsets", "states", "cut_us", "before")
+ARRAYS = ("sampled_us", "offsets", "states", "shifts_us", "cut_us", "before")
 INDEXES_KEPT = 200  # of 1 MB for 100 million events
 
 
@@ -45,6 +46,8 @@ class RecordingIndex:
         Time of every SAMPLED_EVENTS-th event, from the first on.
     offsets, states : (n,) int64, (n, m) int64
         The places, in order; none where the format cannot begin anywhere but at the file's start.
+    shifts_us : (n,) int64
+        Added to the times of the file behind the place, see `ClockSegments`.
     cut_us : (n,) int64
         All events before the place are earlier than this.
     before : (n,) int64
@@ -61,18 +64,27 @@ class RecordingIndex:
     sampled_us: NDArray[np.int64]
     offsets: NDArray[np.int64]
     states: NDArray[np.int64]
+    shifts_us: NDArray[np.int64]
     cut_us: NDArray[np.int64]
     before: NDArray[np.int64]
     damage: Damage
     triggers: Triggers
 
-    def place(self, start_us: int) -> tuple[Place | None, int]:
-        """The last place with no event of `start_us` or later before it, and the latest time there may be before."""
+    def place(self, start_us: int) -> tuple[Place | None, int, int]:
+        """The last place with no event of `start_us` or later before it.
+
+        Returns
+        -------
+        place : Place or None
+            None for the start of the file.
+        latest_us, shift_us : int
+            Latest time there may be before, and what has to be added to the times of the file.
+        """
         row = int(np.searchsorted(self.cut_us, start_us, side="right")) - 1
         if row < 0:
-            return None, NO_TIME_US
+            return None, NO_TIME_US, 0
         state = tuple(self.states[row].tolist())
-        return Place(int(self.offsets[row]), state), int(self.cut_us[row]) - 1
+        return Place(int(self.offsets[row]), state), int(self.cut_us[row]) - 1, int(self.shifts_us[row])
 
     def counts_before(self, times_us: NDArray[np.int64]) -> NDArray[np.float64]:
         """Numbers of events before times, interpolated between the sampled ones."""
@@ -122,6 +134,7 @@ class IndexBuilder:
 
     def __init__(self) -> None:
         self._places: list[Place] = []
+        self._shifts_us: list[int] = []
         self._cut_us: list[int] = []
         self._before: list[int] = []
         self._sampled_us: list[NDArray[np.int64]] = []
@@ -129,16 +142,17 @@ class IndexBuilder:
         self._first_us = self._last_us = 0
 
     def noting_places(
-        self, parts: Iterable[UncheckedEvents], reading: ReadPass, order: TimeOrder
+        self, parts: Iterable[UncheckedEvents], reading: ReadPass, segments: ClockSegments, order: TimeOrder
     ) -> Iterator[UncheckedEvents]:
-        """Hand a reader's parts on to `order`, noting places behind them."""
+        """Hand a reader's parts on to `segments` and with these to `order`, noting places behind them."""
         since = 0
         for part in parts:
             yield part
             since += len(part)
-            if since >= PLACE_EVENTS and reading.place is not None:
+            if since >= PLACE_EVENTS and reading.place is not None and segments.is_settled:
                 since = 0
                 self._places.append(reading.place)
+                self._shifts_us.append(segments.shift_us)
                 self._cut_us.append(order.latest_us + 1)
 
     def add(self, batch: EventBatch) -> None:
@@ -166,6 +180,7 @@ class IndexBuilder:
             sampled_us=np.concatenate([np.empty(0, np.int64), *self._sampled_us]),
             offsets=np.array([place.offset for place in self._places], np.int64),
             states=np.array([place.state for place in self._places], np.int64).reshape(places, -1 if places else 0),
+            shifts_us=np.array(self._shifts_us, np.int64),
             cut_us=np.array(self._cut_us, np.int64),
             before=np.array([*self._before, *[self._events] * (places - len(self._before))], np.int64),
             damage=reading.damage,

@@ -49,6 +49,10 @@ class Damage:
     backward_steps: int = _count("time steps backwards {} times; events up to 10 ms late were put in order")
     # Of these; only in RAW files, others are refused.
     late_events: int = _count("{} events more than 10 ms behind earlier ones were dropped")
+    stale_events: int = _count("{} events of an earlier time, before the camera's clock started, were dropped")
+    clock_resets: int = _count(
+        "the camera's clock was set back {} times: the events after it were put behind those before it, without a gap"
+    )
     time_jumps: int = _count("{} times that those after them contradict were ignored")
     untimed_events: int = _count("{} events without a sure time or row were dropped")
     outside_events: int = _count("{} events outside the sensor were dropped")

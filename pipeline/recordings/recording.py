@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import RecordingError
 from ..events import EventBatch
 from ..results import Truth
+from .clock_segments import ClockSegments
 from .index import IndexBuilder, RecordingIndex
 from .order import NO_TIME_US, TimeOrder
 from .reader import CHUNK_EVENTS, Damage, FormatReader, Place, Progress, ReadPass, Triggers, UncheckedEvents
@@ -257,26 +258,28 @@ class Recording:
         asked = "" if self._asked is None else f"-{self._asked.width_px}x{self._asked.height_px}"
         return f"{self.identity()}{asked}"
 
-    def _start(self, reading: ReadPass) -> tuple[Place | None, int]:
-        """Place to begin at, and the latest time there may be before it."""
+    def _start(self, reading: ReadPass) -> tuple[Place | None, int, int]:
+        """Place to begin at, the latest time there may be before it, and the shift of times; see `RecordingIndex`."""
         if reading.start_us is None or not self.seeks:
-            return None, NO_TIME_US
+            return None, NO_TIME_US, 0
         index = self.known_index()
         if index is None:
             place = self._reader.place_before(reading.start_us)
             if place is not None or not self.is_large:
-                return place, NO_TIME_US
+                return place, NO_TIME_US, 0
             index = self.index(reading.on_progress)
         return index.place(reading.start_us)
 
     def _batches(self, reading: ReadPass) -> Iterator[EventBatch]:
-        reading.place, latest_us = self._start(reading)
+        reading.place, latest_us, shift_us = self._start(reading)
+        segments = ClockSegments(reading, latest_us, shift_us)
         order = TimeOrder(self.path, reading, self._reader.strict_order, latest_us)
         whole = reading.start_us is None and reading.end_us is None
         start_us = NO_TIME_US if reading.start_us is None else reading.start_us
         end_us = 2**63 - 1 if reading.end_us is None else reading.end_us
         builder = IndexBuilder()
-        for columns in order.sorted(builder.noting_places(self._reader.columns(reading), reading, order)):
+        parts = builder.noting_places(self._reader.columns(reading), reading, segments, order)
+        for columns in order.sorted(parts if self._reader.strict_order else segments.joined(parts)):
             batch = self._on_sensor(columns, reading).between(start_us, end_us)
             for first in range(0, len(batch), reading.max_events):
                 part = batch[first : first + reading.max_events]

@@ -293,3 +293,30 @@ def write_event_stream(path: Path, events: list[Event], *, width_px: int, height
             out += bytes([0xFF]) * overflows + struct.pack("<BHH", left << 1 | int(on), x, y)
         now = t
     path.write_bytes(bytes(out))
+
+
+def naive_segments(events: list[Event], run: int) -> tuple[list[Event], int, int]:
+    """Events of segments joined to one, how many were stale, and how often the clock was set back."""
+    out: list[Event] = []
+    stale = resets = shift = count = at = 0
+    latest = None  # of the segment, times as in the file
+    while at < len(events):
+        t = events[at][0]
+        if latest is not None and t < latest - MAX_DISORDER_US:
+            following = [event[0] for event in events[at : at + run]]
+            in_order = all(b >= max(following[: k + 1]) - MAX_DISORDER_US for k, b in enumerate(following))
+            if len(following) == run and in_order and max(following) < latest - MAX_DISORDER_US:
+                if resets == 0 and count < run:
+                    stale, out = stale + count, []
+                else:
+                    resets, shift = resets + 1, shift + latest - t
+                latest, count = t, 0
+            else:  # late ones, all of which stay where they are
+                while at < len(events) and events[at][0] < latest - MAX_DISORDER_US:
+                    out.append((events[at][0] + shift, *events[at][1:]))
+                    count, at = count + 1, at + 1
+                continue
+        latest = t if latest is None else max(latest, t)
+        out.append((t + shift, *events[at][1:]))
+        count, at = count + 1, at + 1
+    return out, stale, resets

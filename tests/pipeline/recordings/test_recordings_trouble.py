@@ -52,6 +52,21 @@ def test_an_implausible_rate_is_warned_of_with_its_remedy(name: str, unit: str) 
     assert any(f"--time-unit {unit}" in warning for warning in open_recording(FOLDER / name).warnings)
 
 
+def test_events_before_the_clock_starts_are_dropped_and_said() -> None:
+    recording = open_recording(FOLDER / "21b_evt2_stale_start_5s.raw")
+    events = recording.read()
+    assert (len(events), int(events.t_us[0]), int(events.t_us[-1])) == (9917, 31, 99_937)
+    assert recording.damage.stale_events == 60 and "60 events of an earlier time" in " ".join(recording.warnings)
+
+
+def test_both_halves_around_a_clock_reset_are_kept() -> None:
+    recording = open_recording(FOLDER / "23_evt3_clock_reset_mid.raw")
+    events = recording.read()
+    plain = open_recording(FOLDER / "20_evt3_plain.raw").read()
+    assert np.array_equal(events.x_px, plain.x_px) and np.array_equal(events.y_px, plain.y_px)
+    assert recording.damage.clock_resets == 1 and "set back 1 times" in " ".join(recording.warnings)
+
+
 def test_a_text_cut_in_its_last_line_is_read_up_to_it() -> None:
     recording = open_recording(FOLDER / "08b_events.txt")
     assert len(recording.read()) == 6820 and recording.sensor_from == "file"
