@@ -24,6 +24,7 @@ from .options import RECORDING, reading_options, window_option
     metavar="X Y W H",
     help="Write only the events in this rectangle, px; size of the sensor and coordinates stay.",
 )
+@click.option("--encoding", metavar="EVT2|EVT3", help="Encoding of a RAW file; EVT3 by default.")
 @reading_options
 def convert(
     source: Path,
@@ -31,6 +32,7 @@ def convert(
     reading: ReadingOptions,
     window: tuple[int, int] | None,
     roi: tuple[int, int, int, int] | None,
+    encoding: str | None,
 ) -> None:
     """Convert a recording."""
     from spinscope.pipeline.recordings import convert as converted
@@ -42,6 +44,7 @@ def convert(
             options=reading,
             window_us=window,
             roi_px=roi,
+            encoding=encoding,
             on_progress=lambda share: bar(share, "converting"),
         )
     for loss in losses:

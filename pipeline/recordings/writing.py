@@ -13,14 +13,14 @@ from ..errors import RecordingError
 from ..events import EventBatch
 from ..files import atomic_file
 from ..results import Truth
-from .formats.registry import RecordingContent, RecordingFormat, format_to_write
+from .formats.registry import RecordingContent, RecordingFormat, encoding_to_write, format_to_write
 from .opening import open_recording
 from .reader import Progress, ReadingOptions, Triggers
 from .recording import Recording
 from .sensor import Resolution, check_resolution
 
 # Attributes about the encoding of a file, which every format states itself.
-ENCODING_KEYS = ("format", "evt", "geometry", "width", "height", "end")
+ENCODING_KEYS = ("format", "evt", "geometry", "width", "height", "end", "Data", "Version", "Width", "Height")
 
 
 def write_recording(
@@ -33,11 +33,12 @@ def write_recording(
     truth: Truth | None = None,
     triggers: Triggers | None = None,
     t_offset_us: int | None = None,
+    encoding: str | None = None,
 ) -> None:
     """Write a recording in the format of the suffix; the file appears under its name only when complete.
 
-    HDF5 (.h5, .hdf5) holds all that is given, RAW (.raw, EVT3) the attributes and triggers, NPZ (.npz) only the
-    sensor's size.
+    HDF5 (.h5, .hdf5) holds all that is given, RAW (.raw) sensor, attributes and triggers, DAT (.dat) and NPZ (.npz)
+    sensor and attributes, CSV (.csv) the events alone.
 
     Parameters
     ----------
@@ -49,6 +50,8 @@ def write_recording(
         Simulator's truth, whose label has one value an event.
     t_offset_us : int, optional
         Offset of the file's time in DSEC recordings.
+    encoding : str, optional
+        EVT2 or EVT3 of RAW files.
 
     Raises
     ------
@@ -65,6 +68,7 @@ def write_recording(
             triggers=lambda: triggers or Triggers.empty(),
             truth=lambda: truth,
             t_offset_us=t_offset_us,
+            encoding=encoding_to_write(Path(path), encoding),
         )
     )
 
@@ -76,6 +80,7 @@ def convert(
     options: ReadingOptions = ReadingOptions(),  # noqa: B008  frozen
     window_us: tuple[int, int] | None = None,
     roi_px: tuple[int, int, int, int] | None = None,
+    encoding: str | None = None,
     on_progress: Progress | None = None,
 ) -> list[str]:
     """Write the recording `source` to `target`, in the format of its suffix, in constant memory.
@@ -92,6 +97,8 @@ def convert(
     roi_px : (x, y, width, height), optional
         Only the events in this rectangle are written. Coordinates and size of the sensor stay as they are, and with
         them the camera's principal point.
+    encoding : str, optional
+        EVT2 or EVT3 of RAW files.
     on_progress : callable, optional
         Called with the share done, 0..1.
 
@@ -106,7 +113,7 @@ def convert(
         What the source holds and the target does not, in sentences.
     """
     source, target = Path(source), Path(target)
-    format = format_to_write(target)  # fails before the source is read
+    format, encoding = format_to_write(target), encoding_to_write(target, encoding)  # fail before the source is read
     recording = open_recording(source, **asdict(options))
     if target.exists() and os.path.samefile(source, target):
         raise RecordingError(f"a recording cannot be converted onto itself: give another name: {target}")
@@ -139,6 +146,7 @@ def convert(
             triggers=triggers,
             truth=truth,
             t_offset_us=recording.t_offset_us,
+            encoding=encoding,
         )
     )
     return _losses(recording, format, truth())

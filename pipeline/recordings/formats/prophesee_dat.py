@@ -11,10 +11,12 @@ from ...errors import RecordingError
 from ..prophesee_header import MAX_HEADER_BYTES, parse_header
 from ..reader import FormatReader, Place, ReadingOptions, ReadPass, UncheckedEvents, file_errors
 from ..sensor import resolution_or_none
-from .registry import FORMATS, RecordingFormat
+from .registry import FORMATS, RecordingContent, RecordingFormat
 
 EVENT_BYTES = 8
 EVENT_KINDS = (0x00, 0x0C)  # 2D events of version 1 and CD events of version 2
+LAST_US = (1 << 32) - 1
+FIELDS = np.dtype([("t", "<u4"), ("pixel", "<u4")])  # pixel: x 14 bits, y 14 bits, polarity 4 bits
 
 
 class DatReader(FormatReader):
@@ -79,6 +81,33 @@ def is_dat(path: Path, head: bytes) -> bool:
     )
 
 
+def write_dat(path: Path, content: RecordingContent) -> None:
+    """Write a new file; raises RecordingError for times that do not fit in 32 bits."""
+    lines = {**content.attributes, "Version": 2, "Width": content.width_px, "Height": content.height_px}
+    text = "".join(f"% {name} {' '.join(str(value).split())}\n" for name, value in lines.items())
+    with open(path, "xb") as file:
+        file.write(f"% Data file containing CD events\n{text}% end\n".encode() + bytes((EVENT_KINDS[1], EVENT_BYTES)))
+        for batch in content.batches:
+            first_us, last_us = int(batch.t_us[0]), int(batch.t_us[-1])
+            if first_us < 0 or last_us > LAST_US:
+                raise RecordingError(
+                    f"times from {first_us} to {last_us} us do not fit in DAT, which goes from 0 to {LAST_US} us "
+                    f"(71 minutes): write HDF5 (.h5) or a part (--window): {content.path}"
+                )
+            words = np.empty(len(batch), FIELDS)
+            words["t"] = batch.t_us
+            words["pixel"] = batch.on.astype(np.uint32) << 28 | batch.y_px.astype(np.uint32) << 14 | batch.x_px
+            file.write(words.tobytes())
+
+
 FORMATS.register(
-    RecordingFormat(name="prophesee_dat", label="Prophesee DAT", suffixes=(".dat",), sniff=is_dat, open=DatReader)
+    RecordingFormat(
+        name="prophesee_dat",
+        label="Prophesee DAT",
+        suffixes=(".dat",),
+        sniff=is_dat,
+        open=DatReader,
+        write=write_dat,
+        keeps=frozenset({"sensor", "attributes"}),
+    )
 )

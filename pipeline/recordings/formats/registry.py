@@ -31,6 +31,8 @@ class RecordingContent:
         Simulator's truth, to be called after the batches were read: None if its labels do not fit the events.
     t_offset_us : int or None
         Offset of the file's time in DSEC recordings.
+    encoding : str
+        One of the format's `encodings`; empty where it has none.
     """
 
     path: Path
@@ -41,6 +43,7 @@ class RecordingContent:
     triggers: Callable[[], Triggers]
     truth: Callable[[], Truth | None]
     t_offset_us: int | None
+    encoding: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +67,8 @@ class RecordingFormat:
         has to be picklable before and after a pass, and `open` a function of a module.
     keeps : frozenset of str
         What written files hold beside the events: of "sensor", "attributes", "triggers", "truth" and "t_offset".
+    encodings : tuple of str
+        Those among which a writer can be asked to choose, the usual one first.
     generic : bool
         Whether other kinds of files look alike and have these suffixes, too: the format is asked last, and in a folder
         the content tells.
@@ -77,6 +82,7 @@ class RecordingFormat:
     write: Callable[[Path, RecordingContent], None] | None = None
     isolated: bool = False
     keeps: frozenset[str] = frozenset({"sensor"})
+    encodings: tuple[str, ...] = ()
     generic: bool = False
 
     @property
@@ -115,6 +121,19 @@ def readable_suffixes() -> tuple[str, ...]:
 def writable_suffixes() -> tuple[str, ...]:
     """Suffixes of the formats that can be written."""
     return tuple(suffix for format in FORMATS if format.write for suffix in format.suffixes)
+
+
+def encoding_to_write(path: Path, asked: str | None) -> str:
+    """Encoding for a file to be written, `asked` or the usual one; raises RecordingError for one there is not."""
+    format = format_to_write(path)
+    known = [*format.encodings, ""]
+    if asked is None:
+        return known[0]
+    for encoding in format.encodings:
+        if encoding.lower() == asked.lower():
+            return encoding
+    there = f"one of {', '.join(format.encodings)}" if format.encodings else "none, it has one encoding only"
+    raise RecordingError(f"{format.label} is not written in the encoding {asked!r}: give {there}: {path}")
 
 
 def format_to_write(path: Path) -> RecordingFormat:

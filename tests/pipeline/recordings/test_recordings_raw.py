@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from spinscope.pipeline.recordings.reader import ReadPass
 from tests.reference.recordings import NaiveDecoded, columns, naive_evt2, naive_evt3, naive_order, write_evt2
 
 EVT3_HEADER = b"% evt 3.0\n% format EVT3;height=720;width=1280\n% geometry 1280x720\n% end\n"
-WRITE = {"EVT3": write_recording, "EVT2": write_evt2}
+WRITE = {"EVT3": write_recording, "EVT2": partial(write_recording, encoding="EVT2")}
 KINDS = [0x0, 0x2, 0x2, 0x3, 0x4, 0x5, 0x6, 0x6, 0x8, 0x8, 0xA, 0x1, 0x7, 0xE, 0xF, 0xC]
 HIGHS = st.one_of(st.integers(0, 4), st.integers(4090, 4095), st.integers(0, 4095))
 
@@ -219,6 +220,24 @@ def test_raw_round_trip_is_exact(
         np.testing.assert_array_equal(getattr(recording.triggers, name), getattr(triggers, name))
     assert not recording.damage.sentences()
     assert recording.format == f"{format} RAW"
+
+
+@settings(max_examples=30)
+@given(recordings())
+def test_evt2_is_written_as_by_its_twin(
+    tmp_path_factory: pytest.TempPathFactory, recorded: tuple[EventBatch, Triggers]
+) -> None:
+    folder = tmp_path_factory.mktemp("raw")
+    for name, write in (("a.raw", WRITE["EVT2"]), ("b.raw", write_evt2)):
+        write(folder / name, recorded[0], width_px=2048, height_px=2048, triggers=recorded[1])
+    assert (folder / "a.raw").read_bytes() == (folder / "b.raw").read_bytes()
+
+
+def test_evt2_holds_gaps_of_days(tmp_path: Path) -> None:
+    t = np.array([0, 1, 9 * 3_600_000_000, 30 * 3_600_000_000, 30 * 3_600_000_000 + 63])
+    events = EventBatch(t, t.astype(np.uint16) * 0 + 5, t.astype(np.uint16) * 0 + 6, t % 2 == 0)
+    WRITE["EVT2"](tmp_path / "a.raw", events, width_px=640, height_px=480)
+    assert_same_events(open_recording(tmp_path / "a.raw").read(), events)
 
 
 def raw_of_words(path: Path, words: list[int], header: bytes = EVT3_HEADER) -> Recording:

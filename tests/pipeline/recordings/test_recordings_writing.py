@@ -39,6 +39,36 @@ def test_round_trips_are_exact(tmp_path_factory: pytest.TempPathFactory, events:
     assert recording.warnings == [] and recording.events == len(events)
 
 
+def test_dat_round_trip_is_exact(tmp_path: Path) -> None:
+    events = moving_edge(2000)
+    late = EventBatch(events.t_us + ((1 << 32) - 4_250_001), events.x_px, events.y_px, events.on)
+    for batch in (events, late, moving_edge(0)):
+        attributes: dict[str, str | float] = {"camera.focal_length_mm": 16.0}
+        write_recording(tmp_path / "a.dat", batch, width_px=1280, height_px=720, attributes=attributes)
+        recording = open_recording(tmp_path / "a.dat")
+        assert_same_events(recording.read(), batch)
+        assert (recording.format, recording.width_px, recording.height_px) == ("DAT", 1280, 720)
+        assert recording.attributes["camera.focal_length_mm"] == "16.0" and not recording.damage.sentences()
+    convert(tmp_path / "a.dat", tmp_path / "b.dat")
+    assert (tmp_path / "a.dat").read_bytes() == (tmp_path / "b.dat").read_bytes()
+    with pytest.raises(RecordingError, match="do not fit in DAT"):
+        beyond = EventBatch(events.t_us + (1 << 32), events.x_px, events.y_px, events.on)
+        write_recording(tmp_path / "c.dat", beyond, width_px=1280, height_px=720)
+
+
+def test_raw_is_written_in_the_encoding_asked_for(tmp_path: Path) -> None:
+    events = moving_edge(300)
+    write_recording(tmp_path / "a.h5", events, width_px=1280, height_px=720)
+    for encoding, format in (("evt2", "EVT2 RAW"), ("EVT3", "EVT3 RAW"), (None, "EVT3 RAW")):
+        convert(tmp_path / "a.h5", tmp_path / "b.raw", encoding=encoding)
+        recording = open_recording(tmp_path / "b.raw")
+        assert recording.format == format
+        assert_same_events(recording.read(), events)
+    for name in ("b.raw", "b.csv"):
+        with pytest.raises(RecordingError, match=r"not written in the encoding 'EVT4': give (one of EVT3, EVT2|none)"):
+            convert(tmp_path / "a.h5", tmp_path / name, encoding="EVT4")
+
+
 def some_truth(events: EventBatch) -> Truth:
     rng = np.random.default_rng(0)
     n = 7

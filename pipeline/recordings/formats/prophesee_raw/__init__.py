@@ -1,4 +1,4 @@
-"""Prophesee RAW: EVT2, EVT2.1 and EVT3 are read, EVT3 is written."""
+"""Prophesee RAW: EVT2, EVT2.1 and EVT3 are read, EVT2 and EVT3 are written."""
 
 from __future__ import annotations
 
@@ -33,6 +33,7 @@ FORMATS.register(
         sniff=_sniff,
         open=_open,
         write=_write,
+        encodings=("EVT3", "EVT2"),
         keeps=frozenset({"sensor", "attributes", "triggers"}),
     )
 )

@@ -12,6 +12,7 @@ from .decoding import MAX_COORDINATE, TIME_HIGH, Decoded, take_time_high
 CD_OFF, CD_ON, EXT_TRIGGER, OTHERS, CONTINUED = 0x0, 0x1, 0xA, 0xE, 0xF
 HIGH_BITS, LOW_BITS = 28, 6
 HIGH_MASK, LOW_MASK = (1 << HIGH_BITS) - 1, (1 << LOW_BITS) - 1
+TIME_SHIFT, X_SHIFT, TRIGGER_ID_SHIFT = 22, 11, 8  # places in a word
 UNCHECKED_STEPS = 155  # 9920 us: within the 10 ms that are put in order
 MAX_EVENTS_PER_WORD = 32
 
@@ -39,8 +40,8 @@ def decode_evt2(out: Decoded, heads: NDArray[np.uint32], masks: NDArray[np.uint3
         word = int(heads[i])
         kind = word >> HIGH_BITS
         if kind in (CD_OFF, CD_ON):
-            x, y = (word >> 11) & 0x7FF, word & 0x7FF
-            now_us = high_us | ((word >> 22) & LOW_MASK)
+            x, y = (word >> X_SHIFT) & 0x7FF, word & 0x7FF
+            now_us = high_us | ((word >> TIME_SHIFT) & LOW_MASK)
             mask = int(masks[i]) if vectors else 1
             while mask:
                 if mask & 1:
@@ -63,9 +64,9 @@ def decode_evt2(out: Decoded, heads: NDArray[np.uint32], masks: NDArray[np.uint3
             high_us, time_known = state[decoding.HIGH] << LOW_BITS, state[decoding.TIME_KNOWN] != 0
         elif kind == EXT_TRIGGER:
             if time_known:
-                out.trigger_t_us[triggers] = high_us | ((word >> 22) & LOW_MASK)
+                out.trigger_t_us[triggers] = high_us | ((word >> TIME_SHIFT) & LOW_MASK)
                 out.trigger_value[triggers] = word & 1
-                out.trigger_id[triggers] = (word >> 8) & 0x1F
+                out.trigger_id[triggers] = (word >> TRIGGER_ID_SHIFT) & 0x1F
                 triggers += 1
         elif kind not in (OTHERS, CONTINUED):
             state[decoding.BAD_WORDS] += 1
