@@ -13,17 +13,20 @@ from numba import njit
 from numpy.typing import NDArray
 
 from .reader import MAX_DISORDER_US
+from .sensor import MAX_SIDE_PX
 
 TURN_US = 1 << 32  # times are counted modulo this
 X_BITS = Y_BITS = 14  # of the second word; the polarity has the four above
 COORDINATE_MASK = (1 << X_BITS) - 1
-# Random times go on from each other over n events with a probability of 1 / (n + 1)!: 3 in a million.
-CONFIRMING_EVENTS = 8
+MAX_COORDINATE = MAX_SIDE_PX - 1  # an event beyond it is none, and its time means nothing
+# Random times go on from each other over n events with a probability of 1 / (n + 1)!: never in gigabytes.
+CONFIRMING_EVENTS = 12
 LOOK_AHEAD_EVENTS = 1 << 16  # half a megabyte of copies of one event, like zeros from a disk, confirm nothing
 UNCONFIRMED_JUMP_US = 1_000_000  # longest step believed of the last event, which nothing can confirm
 
-NOW, EVENTS, TIME_JUMPS = 0, 1, 2  # indices of `DatEvents.state`: last time or -1, numbers of the last call
-STATE_SIZE = 3
+# Indices of `DatEvents.state`: last time or -1, numbers of the last call.
+NOW, EVENTS, TIME_JUMPS, OUTSIDE = 0, 1, 2, 3
+STATE_SIZE = 4
 
 UNREAD = -1  # what decides is in the part of the file that is not read yet
 
@@ -62,10 +65,14 @@ def decode_dat(out: DatEvents, words: NDArray[np.uint32], final: bool) -> int:
     taken unless `_goes_on` denies it; one of more than half a turn ahead is a step back (but not to before 0).
     """
     state = out.state
-    now, events, jumps, done = state[NOW], 0, 0, words.shape[0]
+    now, events, jumps, outside, done = state[NOW], 0, 0, 0, words.shape[0]
     ignored = -1  # index of the last event that was
     for i in range(words.shape[0]):
         value, pixel = np.int64(words[i, 0]), words[i, 1]
+        x_px, y_px = pixel & COORDINATE_MASK, (pixel >> X_BITS) & COORDINATE_MASK
+        if x_px > MAX_COORDINATE or y_px > MAX_COORDINATE:
+            outside += 1
+            continue
         t = value
         ahead = (value - now) & (TURN_US - 1)
         if now >= 0 and ahead <= MAX_DISORDER_US:
@@ -89,11 +96,10 @@ def decode_dat(out: DatEvents, words: NDArray[np.uint32], final: bool) -> int:
                     t -= TURN_US
         now = t
         out.t_us[events] = t
-        out.x_px[events] = pixel & COORDINATE_MASK
-        out.y_px[events] = (pixel >> X_BITS) & COORDINATE_MASK
+        out.x_px[events], out.y_px[events] = x_px, y_px
         out.on[events] = pixel >> (X_BITS + Y_BITS) != 0
         events += 1
-    state[NOW], state[EVENTS], state[TIME_JUMPS] = now, events, jumps
+    state[NOW], state[EVENTS], state[TIME_JUMPS], state[OUTSIDE] = now, events, jumps, outside
     return int(done)
 
 
@@ -110,7 +116,9 @@ def _goes_on(words: NDArray[np.uint32], at: int, now: int, final: bool) -> int:
     confirming = 0
     end = min(words.shape[0], at + 1 + LOOK_AHEAD_EVENTS)
     for i in range(at + 1, end):
-        if _is_copy(words, i):
+        pixel = words[i, 1]
+        outside = max(pixel & COORDINATE_MASK, (pixel >> X_BITS) & COORDINATE_MASK) > MAX_COORDINATE
+        if outside or _is_copy(words, i):
             continue
         value = np.int64(words[i, 0])
         step = (value - before) & (TURN_US - 1)

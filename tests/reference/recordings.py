@@ -62,9 +62,20 @@ class NaiveClock:
         self.high, self.sure = self.high + ahead, True
 
 
-def next_high(words: list[int], at: int, shift: int, mask: int) -> int | None:
-    """Value of the first TIME_HIGH word after `at`."""
-    return next((w & mask for w in words[at + 1 :] if w >> shift == 0x8), None)
+def judging_high(words: list[int], at: int, high: int | None, shift: int, unit_us: int) -> int | None:
+    """Value of the TIME_HIGH word by which the one at `at` is judged, None without later ones.
+
+    The first, of it and the next 256, from which the two after it go on by 65 ms at most, else the next one; the word's
+    own value when no step up to there is longer than a quarter turn.
+    """
+    mask = (1 << shift) - 1
+    own, *later = [word & mask for word in words[at:] if word >> shift == 0x8][:257]
+    steps = [((b - a) & mask) * unit_us for a, b in pairwise([own, *later])]
+    runs = [k for k, both in enumerate(pairwise(steps)) if max(both) <= 1 << 16]
+    way = [own if high is None else high, own, *(later[: runs[0]] if runs else later)]
+    if later and all((b - a) & mask <= 1 << shift - 2 for a, b in pairwise(way)):
+        return own
+    return [own, *later][runs[0]] if runs else next(iter(later), None)
 
 
 def naive_evt3(words: list[int]) -> NaiveDecoded:
@@ -99,7 +110,7 @@ def naive_evt3(words: list[int]) -> NaiveDecoded:
             low = value
         elif kind == 0x8:
             before = clock.high
-            clock.take(value, next_high(words, at, 12, 0xFFF))
+            clock.take(value, judging_high(words, at, clock.high, 12, 4096))
             if clock.high != before:
                 low = 0
         elif kind == 0xA:
@@ -128,7 +139,7 @@ def naive_evt2(heads: list[int], masks: list[int] | None = None) -> NaiveDecoded
                     else:
                         out.events.append((clock.high * 64 + low, x, word & 0x7FF, kind == 0x1))
         elif kind == 0x8:
-            clock.take(word & 0xFFFFFFF, next_high(heads, at, 28, 0xFFFFFFF))
+            clock.take(word & 0xFFFFFFF, judging_high(heads, at, clock.high, 28, 64))
         elif kind == 0xA:
             if clock.sure:
                 out.triggers.append((clock.high * 64 + low, word & 1, (word >> 8) & 0x1F))
@@ -138,13 +149,16 @@ def naive_evt2(heads: list[int], masks: list[int] | None = None) -> NaiveDecoded
 
 
 def naive_dat(words: list[tuple[int, int]]) -> NaiveDecoded:
-    """Events of DAT words (time, pixel); a time far from the one before is taken if the next eight go on from it."""
+    """Events of DAT words (time, pixel); a time far from the one before is taken if the next twelve go on from it."""
     out = NaiveDecoded()
     turn, now = 1 << 32, None
     for i, (value, pixel) in enumerate(words):
+        if not _is_pixel(pixel):
+            out.outside += 1
+            continue
         followed = [value]
         for word, before in zip(words[i + 1 :], words[i:], strict=False):
-            if word != before and len(followed) <= 8:
+            if word != before and _is_pixel(word[1]) and len(followed) <= 12:
                 followed.append(word[0])
         if now is None:
             t, way, limit, near = value, 0, turn // 2, False
@@ -164,6 +178,10 @@ def naive_dat(words: list[tuple[int, int]]) -> NaiveDecoded:
         else:
             out.time_jumps += 1
     return out
+
+
+def _is_pixel(pixel: int) -> bool:
+    return pixel & 0x3FFF < 8192 and (pixel >> 14) & 0x3FFF < 8192
 
 
 def write_evt2(

@@ -45,7 +45,7 @@ class DatReader(FormatReader):
 
     def columns(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
         """Yield the events; times that the following ones contradict are left out, as `decode_dat` says."""
-        from ..dat_decoding import EVENTS, NOW, STATE_SIZE, TIME_JUMPS, DatEvents, decode_dat  # numba: 0.3 s to load
+        from ..dat_decoding import EVENTS, NOW, OUTSIDE, STATE_SIZE, TIME_JUMPS, DatEvents, decode_dat  # loads numba
 
         place = reading.place or Place(self._start, (-1,))
         state = np.zeros(STATE_SIZE, np.int64)
@@ -63,6 +63,7 @@ class DatReader(FormatReader):
                 done = int(decode_dat(out, words, final)) * EVENT_BYTES
                 offset, rest = offset + done, data[done:]
                 reading.damage.time_jumps += int(state[TIME_JUMPS])
+                reading.damage.outside_events += int(state[OUTSIDE])
                 reading.place = Place(offset, (int(state[NOW]),))
                 if state[EVENTS]:
                     yield UncheckedEvents(out.t_us, out.x_px, out.y_px, out.on)[: int(state[EVENTS])]

@@ -137,7 +137,7 @@ def test_words_of_other_kinds_change_nothing_and_unknown_ones_are_counted() -> N
 
 def test_a_long_step_is_back_only_when_it_does_not_lead_to_before_0() -> None:
     """More than half a turn ahead: at the start of a file it is ahead, after a turn it is back."""
-    first = [0x8005, 0x8005, 0x0005, 0x2001, 0x8BB8, 0x2001, 0x8BB9, 0x2002]
+    first = [0x8005, 0x8005, 0x8005, 0x0005, 0x2001, 0x8BB8, 0x2001, 0x8BB9, 0x2002]
     found = decoded("EVT3", False, np.array(first, "<u2").tobytes(), [])
     assert (
         [event[0] >> 12 for event in found.events] == [5, 3000, 3001] == [e[0] >> 12 for e in naive_evt3(first).events]
