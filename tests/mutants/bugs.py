@@ -445,6 +445,12 @@ RECORDINGS = [
         "tests/pipeline/recordings/test_recordings_writing.py",
     ),
     Mutant(
+        "pipeline/recordings/formats/prophesee_raw/decoding.py",
+        "if steps == 2 or count == LOOK_AHEAD_STEPS:",
+        "if steps == 1 or count == LOOK_AHEAD_STEPS:",
+        RAW,
+    ),
+    Mutant(
         "pipeline/recordings/dat_decoding.py",
         "if ahead > TURN_US >> 1 and t >= TURN_US:",
         "if t >= TURN_US:",

@@ -38,44 +38,43 @@ class NaiveClock:
         self.high: int | None = None
         self.sure = False
 
-    def take(self, value: int, following: int | None) -> None:
-        """A TIME_HIGH word with the value of the next one in the file, None at its end."""
-        if self.high is None:
-            if following is not None and (following - value) % self.turn >= self.turn // 2:
+    def take(self, value: int, later: list[int]) -> None:
+        """A TIME_HIGH word with the values of the next ones in the file."""
+        ahead = value if self.high is None else (value - self.high) % self.turn
+        if self.high is None or ahead > self.free_steps:
+            if later and not self.is_borne_out(value, later[:256]):
                 self.decoded.time_jumps += 1
-            else:
-                self.high, self.sure = value, True
-            return
-        ahead = (value - self.high) % self.turn
-        if ahead > self.free_steps:
-            if following is None:
-                believed = ahead * self.unit_us <= 1_000_000
-                contradicted = False
-            else:
-                believed, contradicted = True, (following - self.high) % self.turn < ahead
-            if not believed or contradicted:
-                self.decoded.time_jumps += 1
-                self.sure = self.sure and contradicted
                 return
-        if ahead > self.turn // 2 and self.high + ahead - self.turn >= 0:
+            if not later and self.high is not None and ahead * self.unit_us > 1_000_000:
+                self.decoded.time_jumps += 1
+                self.sure = False
+                return
+        high = self.high or 0
+        if ahead > self.turn // 2 and high + ahead - self.turn >= 0:
             ahead -= self.turn
-        self.high, self.sure = self.high + ahead, True
+        self.high, self.sure = high + ahead, True
+
+    def is_borne_out(self, own: int, later: list[int]) -> bool:
+        """Whether later values go on from this one, judged by the first that two more follow closely."""
+        values = [own, *later]
+        steps = [(b - a) % self.turn * self.unit_us for a, b in pairwise(values)]
+        steady = [k for k, both in enumerate(pairwise(steps)) if max(both) <= 1 << 16]
+        way = values[: steady[0] + 1] if steady else values
+        if self.high is not None:
+            way = [self.high, *way]
+        if all((b - a) % self.turn <= self.turn // 4 for a, b in pairwise(way)):
+            return True
+        witness = values[steady[0]] if steady else later[0]
+        if self.high is None:
+            return witness == own if steady else (witness - own) % self.turn <= self.turn // 2
+        is_present = bool(steady) and (self.high - witness) % self.turn * self.unit_us <= 1 << 16
+        is_between = (witness - self.high) % self.turn < (own - self.high) % self.turn
+        return (bool(steady) and witness == own) or not (is_present or is_between)
 
 
-def judging_high(words: list[int], at: int, high: int | None, shift: int, unit_us: int) -> int | None:
-    """Value of the TIME_HIGH word by which the one at `at` is judged, None without later ones.
-
-    The first, of it and the next 256, from which the two after it go on by 65 ms at most, else the next one; the word's
-    own value when no step up to there is longer than a quarter turn.
-    """
-    mask = (1 << shift) - 1
-    own, *later = [word & mask for word in words[at:] if word >> shift == 0x8][:257]
-    steps = [((b - a) & mask) * unit_us for a, b in pairwise([own, *later])]
-    runs = [k for k, both in enumerate(pairwise(steps)) if max(both) <= 1 << 16]
-    way = [own if high is None else high, own, *(later[: runs[0]] if runs else later)]
-    if later and all((b - a) & mask <= 1 << shift - 2 for a, b in pairwise(way)):
-        return own
-    return [own, *later][runs[0]] if runs else next(iter(later), None)
+def later_highs(words: list[int], at: int, shift: int) -> list[int]:
+    """Values of the TIME_HIGH words after the one at `at`."""
+    return [word & ((1 << shift) - 1) for word in words[at + 1 :] if word >> shift == 0x8]
 
 
 def naive_evt3(words: list[int]) -> NaiveDecoded:
@@ -110,7 +109,7 @@ def naive_evt3(words: list[int]) -> NaiveDecoded:
             low = value
         elif kind == 0x8:
             before = clock.high
-            clock.take(value, judging_high(words, at, clock.high, 12, 4096))
+            clock.take(value, later_highs(words, at, 12))
             if clock.high != before:
                 low = 0
         elif kind == 0xA:
@@ -139,7 +138,7 @@ def naive_evt2(heads: list[int], masks: list[int] | None = None) -> NaiveDecoded
                     else:
                         out.events.append((clock.high * 64 + low, x, word & 0x7FF, kind == 0x1))
         elif kind == 0x8:
-            clock.take(word & 0xFFFFFFF, judging_high(heads, at, clock.high, 28, 64))
+            clock.take(word & 0xFFFFFFF, later_highs(heads, at, 28))
         elif kind == 0xA:
             if clock.sure:
                 out.triggers.append((clock.high * 64 + low, word & 1, (word >> 8) & 0x1F))

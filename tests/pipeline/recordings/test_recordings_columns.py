@@ -389,38 +389,6 @@ def test_bombs_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind
         format.open(path, ReadingOptions())  # in this process, for the limit lowered here
 
 
-@pytest.mark.parametrize("kind", ["h5", "npz"])
-def test_flipped_bits_and_cuts_are_refused_or_read_in_order(tmp_path: Path, kind: str) -> None:
-    """400 damaged files: one line or events that keep the rules, never a traceback."""
-    events = EventBatch.checked(**_arguments(some_columns(400)), width_px=640, height_px=480)
-    path = tmp_path / f"a.{kind}"
-    write_recording(path, events, width_px=640, height_px=480, attributes={"lens": "x"})
-    whole = path.read_bytes()
-    rng = np.random.default_rng(5)
-    for k in range(400):
-        data = bytearray(whole)
-        if k % 6 == 0:
-            data = data[: int(rng.integers(1, len(data)))]
-        else:
-            for place in rng.integers(0, len(data), int(rng.integers(1, 8))):
-                data[place] ^= 1 << int(rng.integers(0, 8))
-        path.write_bytes(data)
-        try:
-            recording = open_recording(path)
-            found = recording.read()
-            recording.truth  # noqa: B018
-        except RecordingError as error:
-            assert "\n" not in str(error) and str(path) in str(error)
-            continue
-        assert np.all(found.t_us[1:] >= found.t_us[:-1])
-        if len(found):
-            assert found.x_px.max() < recording.width_px and found.y_px.max() < recording.height_px
-
-
-def _arguments(columns: dict[str, Any]) -> dict[str, Any]:
-    return {"t_us": columns["t"], "x_px": columns["x"], "y_px": columns["y"], "on": columns["p"]}
-
-
 def test_an_unfinished_file_is_refused(tmp_path: Path) -> None:
     """Space for all events, but only some blocks written: HDF5 itself would read zeros."""
     with h5py.File(tmp_path / "a.h5", "w") as file:

@@ -137,14 +137,14 @@ def test_words_of_other_kinds_change_nothing_and_unknown_ones_are_counted() -> N
 
 def test_a_long_step_is_back_only_when_it_does_not_lead_to_before_0() -> None:
     """More than half a turn ahead: at the start of a file it is ahead, after a turn it is back."""
-    first = [0x8005, 0x8005, 0x8005, 0x0005, 0x2001, 0x8BB8, 0x2001, 0x8BB9, 0x2002]
+    first = [0x8050, 0x8050, 0x8050, 0x0005, 0x2001, 0x8BB8, 0x2001, 0x8BB9, 0x2002]
     found = decoded("EVT3", False, np.array(first, "<u2").tobytes(), [])
     assert (
-        [event[0] >> 12 for event in found.events] == [5, 3000, 3001] == [e[0] >> 12 for e in naive_evt3(first).events]
+        [event[0] >> 12 for event in found.events] == [80, 3000, 3001] == [e[0] >> 12 for e in naive_evt3(first).events]
     )
     later = [*first, 0x8FFF, 0x8000, 0x8001, 0x2003, 0x8FF0, 0x8FF1, 0x2004]
     found = decoded("EVT3", False, np.array(later, "<u2").tobytes(), [])
-    assert [event[0] >> 12 for event in found.events] == [5, 3000, 3001, 4097, 4081]
+    assert [event[0] >> 12 for event in found.events] == [80, 3000, 3001, 4097, 4081]
     assert found == naive_evt3(later) and found.time_jumps == 0
 
 

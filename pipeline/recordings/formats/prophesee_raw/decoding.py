@@ -33,7 +33,7 @@ UNCONFIRMED_JUMP_US = 1_000_000  # longest step believed of the last TIME_HIGH, 
 MAX_COORDINATE = 2047  # 11 bits in all encodings
 
 MISSING = -1  # no further TIME_HIGH word
-UNREAD = -2  # it may come in the part of the file that is not read yet
+UNREAD = -2  # they may come in the part of the file that is not read yet
 
 
 class Decoded(NamedTuple):
@@ -60,12 +60,13 @@ def initial_state() -> NDArray[np.int64]:
 
 
 @njit(cache=True, nogil=True)
-def _witness(words: NDArray[Any], at: int, high: int, bits: int, low_bits: int, final: bool) -> int:
-    """Value of the TIME_HIGH word by which words[at] is judged.
+def _is_borne_out(words: NDArray[Any], at: int, high: int, bits: int, low_bits: int, final: bool) -> int:
+    """Whether later TIME_HIGH words go on from words[at]: 1, 0, MISSING without any, UNREAD if not among these words.
 
-    That is the first one from `at` on from which the two after it go on, or where there is none the first one after
-    `at`. It is words[at] itself if no step from `high` (unless negative) over it up to there is longer than a quarter
-    turn: so gaps of many turns are written. MISSING without later words, UNREAD when they may not be among these.
+    The witness is the first one, from `at` on, from which the two after it go on; the first one after `at` where there
+    is none. A value is wrong if the witness lies before it on the way round from `high`, the present time; before that
+    is known (`high` < 0), if it is not the witness itself. It is right if no step over it up to the witness is longer
+    than a quarter turn: so gaps of many turns are written.
     """
     mask, quarter, longest_step = (1 << bits) - 1, 1 << bits - 2, GOING_ON_US >> low_bits
     own = int(words[at] & mask)
@@ -81,18 +82,25 @@ def _witness(words: NDArray[Any], at: int, high: int, bits: int, low_bits: int, 
         steps += 1
         if step > longest_step:
             witness, steps = value, 0
-        if steps == 2:
-            return own if orderly else witness
         orderly = orderly and step <= quarter
         first = value if first == MISSING else first
         before = value
         count += 1
-        if count == LOOK_AHEAD_STEPS:
+        if steps == 2 or count == LOOK_AHEAD_STEPS:
             break
     else:
         if end == words.size and not final:
             return UNREAD
-    return own if orderly and first != MISSING else first
+    if first == MISSING:
+        return MISSING
+    if orderly:
+        return 1
+    if high < 0:
+        return int(witness == own if steps == 2 else (first - own) & mask <= 2 * quarter)
+    if steps < 2:
+        return int((first - high) & mask >= (own - high) & mask)
+    is_present = (high - witness) & mask <= longest_step  # or just behind it
+    return int(witness == own or not (is_present or (witness - high) & mask < (own - high) & mask))
 
 
 @njit(cache=True, nogil=True)
@@ -117,8 +125,8 @@ def take_time_high(
 
     Notes
     -----
-    A value is ignored when that of the witness lies before it on the way round from the present time. One that is not
-    ignored and lies more than half a turn ahead is a step back (but not to before 0).
+    A value that later ones do not bear out is ignored. One that is not ignored and lies more than half a turn ahead is
+    a step back (but not to before 0).
     """
     turn = np.int64(1) << bits
     value = np.int64(words[at]) & (turn - 1)
@@ -127,23 +135,18 @@ def take_time_high(
     if high >= 0 and ahead <= unchecked_steps:
         state[HIGH], state[TIME_KNOWN] = high + ahead, 1
         return True
-    witness = _witness(words, at, high, bits, low_bits, final)
-    if witness == UNREAD:
+    borne_out = _is_borne_out(words, at, high, bits, low_bits, final)
+    if borne_out == UNREAD:
         return False
-    if high < 0:
-        if witness >= 0 and ((witness - value) & (turn - 1)) >= turn >> 1:
-            state[TIME_JUMPS] += 1
-        else:
-            state[HIGH], state[TIME_KNOWN] = value, 1
+    if borne_out == MISSING and high >= 0 and ahead << low_bits > UNCONFIRMED_JUMP_US:
+        state[TIME_JUMPS] += 1
+        state[TIME_KNOWN] = 0
         return True
-    if witness == MISSING:
-        if ahead << low_bits > UNCONFIRMED_JUMP_US:
-            state[TIME_JUMPS] += 1
-            state[TIME_KNOWN] = 0
-            return True
-    elif ((witness - high) & (turn - 1)) < ahead:
+    if borne_out == 0:
         state[TIME_JUMPS] += 1
         return True
+    if high < 0:
+        high, ahead = np.int64(0), value
     if ahead > turn >> 1 and high + ahead >= turn:
         ahead -= turn
     state[HIGH], state[TIME_KNOWN] = high + ahead, 1
