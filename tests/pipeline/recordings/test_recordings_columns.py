@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.events import EventBatch
-from spinscope.pipeline.recordings import FORMATS, ReadingOptions, Recording, open_recording, write_recording
+from spinscope.pipeline.recordings import FORMATS, ReadingOptions, Recording, open_recording
 from tests.reference.recordings import ecf_block, naive_order
 
 N = 5000
