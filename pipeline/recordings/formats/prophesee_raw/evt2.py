@@ -28,21 +28,34 @@ def decode_evt2(out: Decoded, heads: NDArray[np.uint32], masks: NDArray[np.uint3
     masks : (n,) uint32
         EVT2.1's other half, bit k = there is an event at x + k; (0,) for EVT2.
     """
+    t_us, x_px, y_px, on = out.t_us, out.x_px, out.y_px, out.on
     state = out.state
-    last_start, trigger_room = out.t_us.size - MAX_EVENTS_PER_WORD, out.trigger_t_us.size
-    events, triggers, done = 0, 0, heads.size
+    last_start, trigger_room = np.uint64(t_us.size - MAX_EVENTS_PER_WORD), out.trigger_t_us.size
+    events, triggers, at, size = np.uint64(0), 0, np.uint64(0), np.uint64(heads.size)  # unsigned as in `decode_evt3`
+    one = np.uint64(1)
     high_us, time_known = state[decoding.HIGH] << LOW_BITS, state[decoding.TIME_KNOWN] != 0
     vectors = masks.size > 0
-    for i in range(heads.size):
-        if events > last_start or triggers >= trigger_room:
-            done = i
-            break
-        word = int(heads[i])
+    while at < size and events <= last_start and triggers < trigger_room:
+        if time_known and not vectors:
+            upto = min(size, at + last_start + one - events)
+            while at < upto:
+                word = np.int64(heads[at])
+                if word >> HIGH_BITS > CD_ON:
+                    break
+                t_us[events] = high_us | ((word >> TIME_SHIFT) & LOW_MASK)
+                x_px[events] = (word >> X_SHIFT) & 0x7FF
+                y_px[events] = word & 0x7FF
+                on[events] = word >> HIGH_BITS != CD_OFF
+                events += one
+                at += one
+            if at == upto:
+                continue
+        word = np.int64(heads[at])
         kind = word >> HIGH_BITS
         if kind in (CD_OFF, CD_ON):
             x, y = (word >> X_SHIFT) & 0x7FF, word & 0x7FF
             now_us = high_us | ((word >> TIME_SHIFT) & LOW_MASK)
-            mask = int(masks[i]) if vectors else 1
+            mask = np.int64(masks[at]) if vectors else 1
             while mask:
                 if mask & 1:
                     if not time_known:
@@ -50,16 +63,15 @@ def decode_evt2(out: Decoded, heads: NDArray[np.uint32], masks: NDArray[np.uint3
                     elif x > MAX_COORDINATE:
                         state[decoding.OUTSIDE] += 1
                     else:
-                        out.t_us[events] = now_us
-                        out.x_px[events] = x
-                        out.y_px[events] = y
-                        out.on[events] = kind == CD_ON
-                        events += 1
+                        t_us[events] = now_us
+                        x_px[events] = x
+                        y_px[events] = y
+                        on[events] = kind == CD_ON
+                        events += one
                 mask >>= 1
                 x += 1
         elif kind == TIME_HIGH:
-            if not take_time_high(state, heads, i, HIGH_BITS, LOW_BITS, UNCHECKED_STEPS, final):
-                done = i
+            if not take_time_high(state, heads, int(at), HIGH_BITS, LOW_BITS, UNCHECKED_STEPS, final):
                 break
             high_us, time_known = state[decoding.HIGH] << LOW_BITS, state[decoding.TIME_KNOWN] != 0
         elif kind == EXT_TRIGGER:
@@ -70,5 +82,6 @@ def decode_evt2(out: Decoded, heads: NDArray[np.uint32], masks: NDArray[np.uint3
                 triggers += 1
         elif kind not in (OTHERS, CONTINUED):
             state[decoding.BAD_WORDS] += 1
+        at += one
     state[decoding.EVENTS], state[decoding.TRIGGERS] = events, triggers
-    return done
+    return int(at)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,11 +88,11 @@ class RawDecoder:
 
     def feed(self, block: bytes, final: bool) -> Iterator[UncheckedEvents]:
         """Yield the events of the next bytes of the file; final: there are no more."""
-        data = self._rest + block
-        count = len(data) // self._word_bytes
+        data = self._rest + block if self._rest else block
+        heads, masks = self._words(data)
         done = 0
-        while done < count:
-            used, columns = self._decode(data[done * self._word_bytes : count * self._word_bytes], final)
+        while done < heads.size:
+            used, columns = self._decode(heads[done:], masks[done:], final)
             done += used
             self._reading.place = Place(self._offset + done * self._word_bytes, tuple(self._state.tolist()))
             if len(columns):
@@ -107,28 +108,28 @@ class RawDecoder:
             damage.outside_events += state[OUTSIDE]
             damage.lost_bytes = len(self._rest)
 
-    def _decode(self, data: bytes, final: bool) -> tuple[int, UncheckedEvents]:
+    def _words(self, data: bytes) -> tuple[NDArray[Any], NDArray[np.uint32]]:
+        """All whole words, the masks of EVT2.1 apart; no masks in other encodings."""
+        count = len(data) // self._word_bytes
+        if self._encoding != "EVT2.1":
+            return np.frombuffer(data, f"<u{self._word_bytes}", count), np.empty(0, np.uint32)
+        first, second = np.ascontiguousarray(np.frombuffer(data, "<u4", 2 * count).reshape(-1, 2).T)
+        return (first, second) if self._legacy else (second, first)
+
+    def _decode(self, heads: NDArray[Any], masks: NDArray[np.uint32], final: bool) -> tuple[int, UncheckedEvents]:
         room = max(self._reading.max_events, 4096)
         columns = (np.empty(room, dtype) for dtype in (np.int64, np.uint16, np.uint16, np.bool_))
         edges = (np.empty(TRIGGER_ROOM, dtype) for dtype in (np.int64, np.uint8, np.uint8))
         out = Decoded._make([*columns, *edges, self._state])
         if self._encoding == "EVT3":
-            used = int(decode_evt3(out, np.frombuffer(data, "<u2"), final))
+            used = int(decode_evt3(out, heads, final))
         else:
-            heads, masks = self._halves(data)
             used = int(decode_evt2(out, heads, masks, final))
         events, triggers = int(self._state[EVENTS]), int(self._state[TRIGGERS])
         if triggers:
             t_us, value, number = out.trigger_t_us, out.trigger_value, out.trigger_id
             self._reading.triggers.append(Triggers(t_us[:triggers], value[:triggers], number[:triggers]))
         return used, UncheckedEvents(out.t_us[:events], out.x_px[:events], out.y_px[:events], out.on[:events])
-
-    def _halves(self, data: bytes) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
-        words = np.frombuffer(data, "<u4")
-        if self._encoding == "EVT2":
-            return words, np.empty(0, np.uint32)
-        first, second = np.ascontiguousarray(words.reshape(-1, 2).T)
-        return (first, second) if self._legacy else (second, first)
 
 
 def format_options(header: dict[str, str]) -> dict[str, str]:
