@@ -17,7 +17,7 @@ from ..errors import RecordingError
 from ..events import EventBatch
 from .opening import open_recording
 from .reader import Progress
-from .recording import Recording
+from .recording import Recording, TooManyEvents
 from .writing import write_recording
 
 HELD_EVENTS = 1 << 23  # events that are simply held in memory: 109 MB, twice that while they are joined
@@ -118,17 +118,10 @@ def events_of(
         The recording cannot be read.
     """
     known = recording.known_index()
-    whole = start_us is None and end_us is None
-    if not (whole and known is not None and known.events > HELD_EVENTS):
-        parts, events = [], 0
-        for batch in recording.chunks(start_us, end_us, on_progress=on_progress):
-            parts.append(batch)
-            events += len(batch)
-            if events > HELD_EVENTS:
-                break
-        else:
-            return EventBatch.concatenate(parts)
-        del parts
+    is_long = start_us is None and end_us is None and known is not None and known.events > HELD_EVENTS
+    with suppress(TooManyEvents):
+        if not is_long:
+            return recording.read(start_us, end_us, on_progress, HELD_EVENTS)
     if not recording.seeks:
         recording = copy_that_seeks(recording, on_progress)
         on_progress = None

@@ -17,7 +17,7 @@ from .decoding import BAD_WORDS, EVENTS, OUTSIDE, TIME_HIGH, TIME_JUMPS, TRIGGER
 from .evt2 import HIGH_BITS, HIGH_MASK, decode_evt2
 from .evt3 import decode_evt3
 
-READ_BYTES = 4 << 20
+READ_BYTES = 512 << 10  # which the processor's caches hold, with the events that are decoded from it
 TRIGGER_ROOM = 1 << 14  # triggers decoded at once
 STEADY_STEPS = 16  # of 64 us between two TIME_HIGH words: sensors send one each 16 us to 1 ms
 WORD_BYTES = {"EVT2": 4, "EVT2.1": 8, "EVT3": 2}
@@ -46,7 +46,7 @@ class RawReader(FormatReader):
         """Yield the events; only the words before, or a decoder's state there, tell the time."""
         reading.place = reading.place or Place(self._start, tuple(initial_state().tolist()))
         decoder = RawDecoder(self._encoding, self._legacy, reading)
-        with file_errors(self.path, "RAW"), open(self.path, "rb") as file:
+        with file_errors(self.path, "RAW"), open(self.path, "rb", buffering=0) as file:
             size = file.seek(0, 2)
             file.seek(reading.place.offset)
             while block := file.read(READ_BYTES):
