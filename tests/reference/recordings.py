@@ -337,3 +337,19 @@ def naive_segments(events: list[Event], run: int) -> tuple[list[Event], int, int
         out.append((t + shift, *events[at][1:]))
         count, at = count + 1, at + 1
     return out, stale, resets
+
+
+def naive_hot_pixels(pixels: list[list[int]]) -> tuple[int, int]:
+    """Pixels with 10 events or more and over 10 times those of their second busiest neighbour, and their events."""
+    hot = []
+    for y, row in enumerate(pixels):
+        for x, events in enumerate(row):
+            around = [
+                pixels[v][u]
+                for v in (y - 1, y, y + 1)
+                for u in (x - 1, x, x + 1)
+                if (v, u) != (y, x) and 0 <= v < len(pixels) and 0 <= u < len(row)
+            ]
+            if events >= 10 and events > 10 * sorted([0, 0, *around])[-2]:
+                hot.append(events)
+    return len(hot), sum(hot)

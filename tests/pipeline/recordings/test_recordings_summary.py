@@ -10,10 +10,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays
+from numpy.typing import NDArray
 
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.recordings import open_recording, summary, write_recording
+from spinscope.pipeline.recordings.event_counts import count_hot_pixels
 from tests.pipeline.recordings.test_recordings_raw import moving_edge
+from tests.reference.recordings import naive_hot_pixels
 
 
 @settings(max_examples=40)
@@ -39,6 +43,16 @@ def test_summary_is_what_plain_sums_say(tmp_path_factory: pytest.TempPathFactory
     assert info.peak_rate_hz == max(Counter((t // 1000).tolist()).values()) * 1000
     assert info.mean_rate_hz == (None if t[0] == t[-1] else pytest.approx(n / (t[-1] - t[0]) * 1e6))
     assert info.triggers == 0 and set(info.damage.values()) == {0} and info.warnings == []
+
+
+@settings(max_examples=60)
+@given(
+    arrays(np.int64, array_shapes(min_dims=2, max_dims=2, max_side=6), elements=st.sampled_from([0, 1, 9, 10, 11, 100]))
+)
+def test_hot_pixels_are_those_of_the_twin(pixels: NDArray[np.int64]) -> None:
+    found = np.full(2, -1, np.int64)
+    count_hot_pixels(found, pixels)
+    assert tuple(found.tolist()) == naive_hot_pixels(pixels.tolist())
 
 
 def test_summary_is_ready_for_json(tmp_path: Path) -> None:
