@@ -22,15 +22,16 @@ Bytes = NDArray[np.uint8]
 ALL_PACKED, X_P_PACKED = 2, 1  # bits of the first word
 PAD_BYTES = 16  # zeros behind a block: a number cut off by its end is read from them, and found out later
 DAMAGED = -1
+SHORT_RUN = 4  # events; most runs are not longer
 
 
 class EcfBlock(NamedTuple):
-    """Arrays for the events of one block: t (n,) int64, x, y (n,) uint16, p (n,) uint8."""
+    """Arrays for the events of one block: t (n,) int64, x, y (n,) uint16, p (n,) int8."""
 
     t: NDArray[np.int64]
     x: NDArray[np.uint16]
     y: NDArray[np.uint16]
-    p: NDArray[np.uint8]
+    p: NDArray[np.int8]
 
 
 class EcfRows:
@@ -47,40 +48,49 @@ class EcfRows:
     def rows_of(self, first: int, upto: int) -> tuple[NDArray[Any], ...]:
         """Decode t, x, y and p of rows [first, upto)."""
         size = self._block_rows
-        parts = []
-        for block in range(first // size, -(-upto // size)):
-            start = block * size
-            rows = slice(max(first - start, 0), min(upto - start, size))
-            parts.append([column[rows] for column in self._block(start, rows.stop)])
-        if not parts:
-            return _empty_block(0)
-        return tuple(np.concatenate(columns) for columns in zip(*parts, strict=True))
+        begin = first - first % size
+        out = _empty_block(-(-max(upto - begin, 0) // size) * size)
+        for start in range(begin, upto, size):
+            block = EcfBlock._make(column[start - begin : start - begin + size] for column in out)
+            self._read_block(block, start, min(upto - start, size))
+        return tuple(column[first - begin : upto - begin] for column in out)
 
-    def _block(self, start: int, needed: int) -> EcfBlock:
+    def _read_block(self, out: EcfBlock, start: int, needed: int) -> None:
+        """Decode the block that begins with row `start`, of which at least the first `needed` rows have to be there."""
         mask, packed = self._data.id.read_direct_chunk((start,))
         if mask:  # stored as it is
-            records = np.frombuffer(packed, self._data.dtype)
-            return EcfBlock(records["t"], records["x"], records["y"], records["p"])
-        out = _empty_block(self._block_rows)
-        count = decode_ecf(out, np.frombuffer(packed + bytes(PAD_BYTES), np.uint8))
-        if count < needed:
+            records = np.frombuffer(packed, self._data.dtype, out.t.size)
+            for name, column in zip(EcfBlock._fields, out, strict=True):
+                column[:] = records[name]
+        elif decode_ecf(out, np.frombuffer(packed + bytes(PAD_BYTES), np.uint8)) < needed:
             raise RecordingError(
                 f"the block of events from {start} on is damaged: copy or export the file again: {self._path}"
             )
-        return out
 
 
 def _empty_block(events: int) -> EcfBlock:
-    return EcfBlock._make(np.empty(events, dtype) for dtype in (np.int64, np.uint16, np.uint16, np.uint8))
+    return EcfBlock._make(np.empty(events, dtype) for dtype in (np.int64, np.uint16, np.uint16, np.int8))
 
 
 @njit(cache=True, nogil=True)
 def _number(data: Bytes, at: int, size: int) -> int:
-    """Read a little-endian number of `size` bytes."""
-    value = 0
+    """Read a little-endian number of `size` bytes, `at` unsigned: signed indices are tested for being from the end."""
+    value, first = 0, np.uint64(at)
     for k in range(size):
-        value |= int(data[at + k]) << (8 * k)
+        value |= int(data[first + np.uint64(k)]) << (8 * k)
     return value
+
+
+@njit(cache=True, nogil=True)
+def _fill(values: NDArray[Any], first: int, upto: int, value: int) -> None:
+    """Set values[first:upto], and perhaps some behind them: short runs cost no branch that depends on their length."""
+    rest = first
+    if first + SHORT_RUN <= values.size:
+        for k in range(SHORT_RUN):
+            values[np.uint64(first) + np.uint64(k)] = value
+        rest = first + SHORT_RUN
+    for k in range(rest, upto):
+        values[k] = value
 
 
 @njit(cache=True, nogil=True)
@@ -127,9 +137,9 @@ def _times(t: NDArray[np.int64], count: int, data: Bytes, at: int, now: int) -> 
         if run == 15:
             run = _number(data, at, 2)
             at += 2
-        run = min(run, count - done)
-        t[done : done + run] = now
-        done += run
+        upto = min(done + run, count)
+        _fill(t, done, upto, now)
+        done = upto
     return at
 
 
@@ -147,9 +157,9 @@ def _runs(values: NDArray[Any], count: int, data: Bytes, at: int, size: int, run
         if run == full:
             run = _number(data, at, 2)
             at += 2
-        run = min(run, count - done)
-        values[done : done + run] = word >> run_bits
-        done += run
+        upto = min(done + run, count)
+        _fill(values, done, upto, word >> run_bits)
+        done = upto
     return at
 
 
