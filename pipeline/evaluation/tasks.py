@@ -5,6 +5,9 @@ from __future__ import annotations
 import hashlib
 import importlib
 import json
+import os
+import threading
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
@@ -22,7 +25,8 @@ from .tables import Row
 
 PIPELINE = Path(__file__).parents[1]
 CACHE_BYTES = 2 << 30  # a full run of all suites keeps some 200 MB; older versions' files go first
-WORKER_IDLE_S = 5  # after so long without work a process ends, also when the one that started it was killed
+WORKER_IDLE_S = 5  # after so long without work a process ends
+PARENT_CHECK_S = 1.0  # how often a process looks whether the one that started it still lives
 Progress = Callable[[float, str], None]  # share done (0..1) and what is being done
 
 
@@ -100,7 +104,7 @@ def executor(workers: int = 1, cluster: str | None = None) -> Iterator[Parallel]
     options: dict[str, Any] = {"return_as": "generator_unordered", "batch_size": 1}
     if cluster is None:
         if workers > 1:
-            options |= {"backend": "loky", "idle_worker_timeout": WORKER_IDLE_S}
+            options |= {"backend": "loky", "idle_worker_timeout": WORKER_IDLE_S, "initializer": end_with_parent}
         yield Parallel(max(workers, 1), **options)
         return
     try:
@@ -114,6 +118,18 @@ def executor(workers: int = 1, cluster: str | None = None) -> Iterator[Parallel]
         raise ParameterError(f"no Dask cluster answers at {cluster} ({reason}): is it running?") from error
     with client, parallel_config("dask"):
         yield Parallel(-1, **options)
+
+
+def end_with_parent() -> None:
+    """End this process when the one that started it has been killed, which joblib's processes do not notice."""
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(PARENT_CHECK_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def run(
