@@ -98,10 +98,55 @@ def spin_log_likelihoods(
                 row += information[i, j] * lift[j]
             linear += pull[i] * lift[i]
             quadratic += 2.0 * row * lift[i]
-        spread = 1.0 + variance * quadratic
-        values[k] = (
-            linear - 0.5 * quadratic + 0.5 * variance * (linear - quadratic) ** 2 / spread - 0.5 * math.log(spread)
-        )
+        values[k] = _averaged(linear, quadratic, variance)
+
+
+@njit(cache=True, nogil=True)
+def _averaged(linear: float, quadratic: float, variance: float) -> float:
+    """Logarithm of exp(linear s - quadratic s^2 / 2) averaged over scales s, normal around 1 with this variance."""
+    spread = 1.0 + variance * quadratic
+    return linear - 0.5 * quadratic + 0.5 * variance * (linear - quadratic) ** 2 / spread - 0.5 * math.log(spread)
+
+
+@njit(cache=True, nogil=True)
+def _lift_in_direction(
+    quadratic: Floats,
+    linear: Floats,
+    turn: Floats,
+    direction: Vector,
+    velocity_m_s: Floats,
+    information: Floats,
+    pull: Floats,
+    air: tuple[float, float, float],
+) -> None:
+    """Write what the likelihood of all spins in one direction has in common.
+
+    At node a the lift of magnitude m (rps) has tanh(m turn[a]) of its largest value; with these three factors s, the
+    logarithmic likelihood is s linear - 1/2 s quadratic s.
+    """
+    most, saturation, ball_radius_m = air
+    lift = np.zeros((3, 3))
+    for node in range(3):
+        vx, vy, vz = velocity_m_s[node, 0], velocity_m_s[node, 1], velocity_m_s[node, 2]
+        x = direction[1] * vz - direction[2] * vy
+        y = direction[2] * vx - direction[0] * vz
+        z = direction[0] * vy - direction[1] * vx
+        across = math.sqrt(x * x + y * y + z * z)
+        square = vx * vx + vy * vy + vz * vz
+        turn[node] = 0.0
+        if across > 0.0 and square > 0.0:
+            turn[node] = 2.0 * math.pi * ball_radius_m * across / (square * saturation)
+            factor = most * square / across
+            lift[node, 0], lift[node, 1], lift[node, 2] = factor * x, factor * y, factor * z
+    for a in range(3):
+        linear[a] = 0.0
+        for i in range(3):
+            linear[a] += pull[3 * a + i] * lift[a, i]
+        for b in range(3):
+            quadratic[a, b] = 0.0
+            for i in range(3):
+                for j in range(3):
+                    quadratic[a, b] += lift[a, i] * information[3 * a + i, 3 * b + j] * lift[b, j]
 
 
 @njit(cache=True, nogil=True)
@@ -137,7 +182,7 @@ def spin_grid(
     """
     velocity_m_s, information, pull, most, air, lift_std = likelihood
     directions, magnitudes = weights.shape
-    spins, values = np.empty((magnitudes, 3)), np.empty(magnitudes)
+    quadratic, linear, turn_per_rps, lift = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
     low, high = math.log(SLOWEST * max_spin_rps), math.log(max_spin_rps)
     begin, width = 0.0, 2.0 * math.pi
     step, turn, misfit = 0.0, 0.0, 0.0
@@ -145,12 +190,22 @@ def spin_grid(
         step, turn = (high - low) / magnitudes, width / directions
         for a in range(directions):
             cosine, sine = math.cos(begin + (a + 0.5) * turn), math.sin(begin + (a + 0.5) * turn)
+            direction = (
+                cosine * across[0][0] + sine * across[1][0],
+                cosine * across[0][1] + sine * across[1][1],
+                cosine * across[0][2] + sine * across[1][2],
+            )
+            _lift_in_direction(quadratic, linear, turn_per_rps, direction, velocity_m_s, information, pull, air)
             for m in range(magnitudes):
                 magnitude = math.exp(low + (m + 0.5) * step)
-                for c in range(3):
-                    spins[m, c] = magnitude * (cosine * across[0][c] + sine * across[1][c])
-            spin_log_likelihoods(values, spins, velocity_m_s, information, pull, air, lift_std)
-            weights[a] = values
+                for node in range(3):
+                    lift[node] = math.tanh(magnitude * turn_per_rps[node])
+                along, squared = 0.0, 0.0
+                for node in range(3):
+                    along += linear[node] * lift[node]
+                    for other in range(3):
+                        squared += lift[node] * quadratic[node, other] * lift[other]
+                weights[a, m] = _averaged(along, squared, lift_std * lift_std)
         best = weights.max()
         weights -= best
         misfit = max(2.0 * (most - best) / freedom, 0.0)
