@@ -1,7 +1,8 @@
-"""Drawing of the witnesses of a spin: the axis that each tells, with its 2 sigma ellipse, and its magnitudes."""
+"""Drawing of a spin's witnesses: each one's axis with its 2 sigma ellipse, its magnitudes, and its odds."""
 
 from __future__ import annotations
 
+import math
 from functools import cache
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from spinscope.pipeline.registry import STAGES
 from spinscope.pipeline.spin.combined.result import CombinedResult, Witness
 from spinscope.pipeline.spin.combined.stage import METHOD as COMBINED
+from spinscope.pipeline.spin.combined.stage import SPEAKS
 from spinscope.pipeline.stage import SpinMethod
 
 from . import entities as at
@@ -24,23 +26,27 @@ DISC_RADIUS_PX, GAP_PX = 100.0, 20.0
 WIDTH_PX = 4 * DISC_RADIUS_PX + GAP_PX
 BARS_TOP_PX, ROW_PX = 2 * DISC_RADIUS_PX + 30.0, 30.0
 NAMES_X_PX, MARGIN_PX = -118.0, 240.0
+ODDS_X_PX, ODDS_MARGIN_PX, MOST_ODDS = WIDTH_PX + 90.0, 190.0, 1e6
 MAX_RPS, GRID_RPS = 150.0, 50.0
 SIGMAS = 2.0
 ELLIPSE_POINTS = 49
-# Every witness that there may be, in the order of the chain, the combined answer last; the truth below all.
-NAMES = ("rate", "normal_flow", "contrast", "trajectory", COMBINED)
+# Every witness that there may be, the combined answer last; the truth below all.
+SIGHTINGS = "logo"
+NAMES = ("rate", "normal_flow", "contrast", "trajectory", SIGHTINGS, COMBINED)
 TRUTH = "truth"
 Strips = list[Floats]
 
 
 def witness_chunks(run: ViewedRun) -> list[Chunk]:
-    """Ellipses and bars at every tick; empty where a witness tells nothing."""
+    """Ellipses, bars and odds at every tick; empty where a witness tells nothing."""
     results = run.results(COMBINED)
     if not results:
         return []
     chunks = [*_frame()]
     for row, name in enumerate(NAMES):
-        chunks += _drawn(run, name, _colour(name), [_strips(_said(result, name), row) for result in results])
+        said = [_said(result, name) for result in results]
+        chunks += _drawn(run, name, _colour(name), [_strips(witness, row) for witness in said])
+        chunks += _odds(run, name, row, said)
     if run.true_spins_rps is not None:
         truth = [
             _strips(Witness(TRUTH, spin, np.zeros((3, 3)), float(np.linalg.norm(spin)), 0.5), len(NAMES))
@@ -65,7 +71,9 @@ def _said(result: CombinedResult, name: str) -> Witness | None:
 
 def _colour(name: str) -> at.Colour:
     stage = STAGES[name]
-    return stage.colour if isinstance(stage, SpinMethod) else at.RATE_COLOUR
+    if isinstance(stage, SpinMethod):
+        return stage.colour
+    return at.OTHERS_COLOUR if name == SIGHTINGS else at.RATE_COLOUR
 
 
 def _drawn(run: ViewedRun, name: str, colour: at.Colour, ticks: list[Strips]) -> list[Chunk]:
@@ -75,6 +83,27 @@ def _drawn(run: ViewedRun, name: str, colour: at.Colour, ticks: list[Strips]) ->
         styled(entity, rr.LineStrips2D, colors=colour, radii=-1.8),
         columns_at(entity, run.times_us, columns, [0, *map(len, ticks)]),
     ]
+
+
+def _odds(run: ViewedRun, name: str, row: int, said: list[Witness | None]) -> list[Chunk]:
+    """How much likelier a witness makes the combined spin than the next best one, where it speaks for or against it."""
+    entity = f"{at.WITNESSES}/{name}/odds"
+    texts = ["" if witness is None else odds_words(witness.log_odds) for witness in said]
+    shown = [text for text in texts if text]
+    place = ODDS_X_PX, BARS_TOP_PX + ROW_PX * (row + 0.2)
+    columns = rr.Points2D.columns(positions=np.full((len(shown), 2), place), labels=shown)
+    return [
+        styled(entity, rr.Points2D, colors=_colour(name), radii=-0.1, show_labels=True),
+        columns_at(entity, run.times_us, columns, [0, *(int(bool(text)) for text in texts)]),
+    ]
+
+
+def odds_words(log_odds: float) -> str:
+    """Odds for or against a spin, in words; empty where they are nearly even."""
+    if abs(log_odds) < SPEAKS:
+        return ""
+    odds = math.exp(min(abs(log_odds), math.log(MOST_ODDS)))
+    return f"{odds:,.0f} : 1 {'for it' if log_odds > 0 else 'against it'}"
 
 
 def _strips(witness: Witness | None, row: int) -> Strips:
@@ -133,7 +162,8 @@ def _frame() -> list[Chunk]:
     rims = [rim, rim + np.array([2 * DISC_RADIUS_PX + GAP_PX, 0.0])]
     labels = [(f"{mark:.0f} rps", (x, bottom + 16)) for mark, x in zip(marks, _bar_x(marks), strict=True)]
     labels += [("towards the camera", (DISC_RADIUS_PX, -16.0)), ("away from it", (3 * DISC_RADIUS_PX + GAP_PX, -16.0))]
-    names = [*(STAGES[name].label for name in NAMES), "Truth"]
+    labels.append(("odds over the next best spin", (ODDS_X_PX, BARS_TOP_PX - 18.0)))
+    names = [*("Logo seen or not" if name == SIGHTINGS else STAGES[name].label for name in NAMES), "Truth"]
     colours = [*map(_colour, NAMES), at.TRUTH_COLOUR]
     places = [(NAMES_X_PX, BARS_TOP_PX + ROW_PX * (row + 0.2)) for row in range(len(names))]
     return [
@@ -154,4 +184,4 @@ def _frame() -> list[Chunk]:
 def bounds() -> Floats:
     """Visible part of the picture, (2, 2), px: x and y, from and to."""
     bottom = BARS_TOP_PX + ROW_PX * (len(NAMES) + 1) + 36.0
-    return np.array([[-MARGIN_PX, WIDTH_PX + 30.0], [-36.0, bottom]])
+    return np.array([[-MARGIN_PX, WIDTH_PX + ODDS_MARGIN_PX], [-36.0, bottom]])

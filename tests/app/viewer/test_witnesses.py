@@ -11,7 +11,7 @@ import pytest
 from spinscope.app.viewer import entities
 from spinscope.app.viewer.rrd import write_rrd
 from spinscope.app.viewer.run import ViewedRun
-from spinscope.app.viewer.witnesses import DISC_RADIUS_PX, GAP_PX, MAX_RPS, WIDTH_PX
+from spinscope.app.viewer.witnesses import DISC_RADIUS_PX, GAP_PX, MAX_RPS, NAMES, WIDTH_PX, odds_words
 from tests.app.viewer.reading import Rows, read_back
 
 
@@ -54,6 +54,29 @@ def test_axis_and_magnitude_stand_where_the_witness_has_them(flight: ViewedRun, 
             np.testing.assert_allclose(np.mean(cross, axis=(0, 1)), place, atol=1e-3)
             shown += 1
     assert shown > len(flight.ticks) / 2
+
+
+def test_every_witness_has_a_row_and_its_odds_stand_there(flight: ViewedRun, logged: dict[str, Rows]) -> None:
+    said = [(tick.packet.end_us, one) for tick in flight.ticks for one in tick.results["combined"].witnesses]
+    assert {one.name for _, one in said} <= set(NAMES)
+    assert any(one.name == "logo" for _, one in said), "what was seen and not seen is a witness"
+    for t_us, one in said:
+        shown = logged[f"{entities.WITNESSES}/{one.name}/odds"].at("labels", t_us) or []
+        assert list(shown) == [words for words in [odds_words(one.log_odds)] if words]
+
+
+@pytest.mark.parametrize(
+    ("log_odds", "words"),
+    [
+        (math.log(2.9), ""),
+        (-math.log(2.9), ""),
+        (math.log(20), "20 : 1 for it"),
+        (-math.log(3000), "3,000 : 1 against it"),
+        (1e4, "1,000,000 : 1 for it"),
+    ],
+)
+def test_odds_in_words(log_odds: float, words: str) -> None:
+    assert odds_words(log_odds) == words
 
 
 def test_the_ellipse_is_two_sigma_of_the_axis(flight: ViewedRun, logged: dict[str, Rows]) -> None:
