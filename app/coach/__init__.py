@@ -1,0 +1,1 @@
+"""Session of shots for coaches: analysis in the background, comparison, report, video."""

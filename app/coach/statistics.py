@@ -1,0 +1,104 @@
+"""Statistics of series of shots: centre, spread, best, most constant, and whether it got better."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Trend = Literal["rose", "fell", "unclear", "too_few"]
+
+FEWEST = 3  # shots of a spread; with two it says nothing
+FEWEST_TREND = 6  # shots of a trend: three a half
+# Half-axes of the ellipse that holds two of three shots of a normal distribution in the plane: sqrt(-2 ln(1 - 0.68)).
+ELLIPSE_SIGMAS = math.sqrt(-2 * math.log(1 - 0.68))
+CLEAR_SIGMAS = 2.0  # of the difference's own error: chance does that once in twenty times
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SeriesStatistics:
+    """Statistics of the spin of a series of shots; None for what too few shots tell.
+
+    Attributes
+    ----------
+    count, unseen : int
+        Shots whose spin is known, and those whose spin is not seen.
+    median_rps, best_rps : float, optional
+        Middle value and largest one.
+    best_id : int, optional
+        The shot with the largest spin.
+    spread_rps : float, optional
+        Standard deviation.
+    median_speed_m_s : float, optional
+        Middle value of the speeds.
+    ellipse : list of (float, float), optional
+        Outline of the ellipse that holds two of three shots, see `spread_ellipse`.
+    trend : str
+        Whether the spin rose or fell from the earlier half of the series to the later.
+    change_rps, change_std_rps : float, optional
+        Mean of the later half less that of the earlier, and its standard error.
+    """
+
+    count: int
+    unseen: int
+    median_rps: float | None
+    best_rps: float | None
+    best_id: int | None
+    spread_rps: float | None
+    median_speed_m_s: float | None
+    ellipse: list[tuple[float, float]] | None
+    trend: Trend
+    change_rps: float | None
+    change_std_rps: float | None
+
+
+def series_statistics(shots: Sequence[Mapping[str, Any]]) -> SeriesStatistics:
+    """Statistics of shots (rows of a session) in order of time."""
+    known = [shot for shot in shots if shot["spin_rps"] is not None]
+    spins = np.array([shot["spin_rps"] for shot in known], np.float64)
+    moving = [shot for shot in known if shot["speed_m_s"] is not None]
+    speeds = np.array([shot["speed_m_s"] for shot in moving], np.float64)
+    best = max(known, key=lambda shot: shot["spin_rps"], default=None)
+    trend, change, change_std = _trend(spins)
+    return SeriesStatistics(
+        count=len(known),
+        unseen=len(shots) - len(known),
+        median_rps=float(np.median(spins)) if len(spins) else None,
+        best_rps=best["spin_rps"] if best else None,
+        best_id=best["id"] if best else None,
+        spread_rps=float(spins.std(ddof=1)) if len(spins) >= FEWEST else None,
+        median_speed_m_s=float(np.median(speeds)) if len(speeds) else None,
+        ellipse=spread_ellipse(speeds, np.array([shot["spin_rps"] for shot in moving], np.float64)),
+        trend=trend,
+        change_rps=change,
+        change_std_rps=change_std,
+    )
+
+
+def spread_ellipse(speeds_m_s: Floats, spins_rps: Floats, points: int = 48) -> list[tuple[float, float]] | None:
+    """Outline (speed in m/s, spin in rps) of the ellipse that holds two of three shots; None for too few of them."""
+    if len(speeds_m_s) < FEWEST:
+        return None
+    both = np.stack([speeds_m_s, spins_rps])
+    values, vectors = np.linalg.eigh(np.cov(both))
+    angle = np.linspace(0, 2 * np.pi, points, endpoint=False)
+    circle = np.stack([np.cos(angle), np.sin(angle)]) * ELLIPSE_SIGMAS * np.sqrt(np.clip(values, 0, None))[:, None]
+    outline = both.mean(axis=1)[:, None] + vectors @ circle
+    return [(float(speed), float(spin)) for speed, spin in outline.T]
+
+
+def _trend(spins_rps: Floats) -> tuple[Trend, float | None, float | None]:
+    """Whether the later half differs from the earlier by more than chance, the difference and its standard error."""
+    if len(spins_rps) < FEWEST_TREND:
+        return "too_few", None, None
+    earlier, later = spins_rps[: len(spins_rps) // 2], spins_rps[(len(spins_rps) + 1) // 2 :]
+    change = float(later.mean() - earlier.mean())
+    std = math.sqrt(earlier.var(ddof=1) / len(earlier) + later.var(ddof=1) / len(later))
+    if abs(change) < CLEAR_SIGMAS * std:
+        return "unclear", change, std
+    return "rose" if change > 0 else "fell", change, std
