@@ -10,6 +10,7 @@ from spinscope.pipeline.errors import SpinscopeError
 from spinscope.pipeline.session import DEFAULT_SAMPLE, Choices
 
 from .commands.analyze import analyze
+from .commands.coach import coach
 from .commands.convert import convert
 from .commands.evaluate import evaluate
 from .commands.info import info
@@ -38,7 +39,7 @@ def cli(context: click.Context) -> None:
         serve(DEFAULT_SAMPLE, Choices(), None, open_browser=True)
 
 
-for _command in (info, analyze, view, convert, tune, simulate, evaluate):
+for _command in (info, analyze, view, coach, convert, tune, simulate, evaluate):
     cli.add_command(_command)
 
 

@@ -1,7 +1,8 @@
 """Make the sample session of the coach's page anew: `uv run python sample_recordings/make_session.py [FOLDER]`.
 
-Two players, three days, 30 shots, simulated before a camera that looks down on the table beyond the
-net, and then analyzed like any recordings. The small recordings of the events are kept of the first KEPT shots only: the whole folder stays below 3 MB.
+Two players, three days, 30 shots, simulated before a camera that looks down on the table beyond the net, and then
+analyzed like any recordings. The small recordings of the events are kept of the first KEPT shots only: the whole folder
+stays below 3 MB.
 """
 
 from __future__ import annotations

@@ -6,29 +6,25 @@ import asyncio
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
-from typing import Any
 
 from fastapi import FastAPI, HTTPException, Response
-from fastapi.exceptions import RequestValidationError
-from fastapi.responses import FileResponse, JSONResponse, StreamingResponse
+from fastapi.responses import FileResponse, StreamingResponse
 from fastapi.staticfiles import StaticFiles
 from starlette.concurrency import run_in_threadpool
-from starlette.exceptions import HTTPException as StarletteHTTPException
 
 from spinscope.app.tuning.bias_sweep import bias_state
 from spinscope.app.viewer.rrd import layout_bytes
 from spinscope.app.viewer.run import ViewedRun
-from spinscope.pipeline.errors import SpinscopeError
 
 from .app_state import AppState
 from .assets import STATIC, chart_script, viewer_script, viewer_version, viewer_wasm
 from .client_session import ClientSession
+from .error_answers import add_error_handlers
 from .opening import opening, recording_description
 from .schemas import Done, Opening, OpenRequest, Reopened, RunRequest
 from .security import SecurityMiddleware
 from .tool_routes import add_tool_routes
 
-MESSAGE_MOST = 400
 SWEEP_UP_S = 5.0
 FOREVER = {"cache-control": "max-age=31536000, immutable"}
 NO_STORE = {"cache-control": "no-store"}
@@ -52,7 +48,7 @@ def application(state: AppState) -> FastAPI:
     # Without the pages of documentation, which load their scripts from elsewhere.
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None, lifespan=lifespan)
     app.add_middleware(SecurityMiddleware)
-    _add_error_handlers(app)
+    add_error_handlers(app)
     _add_assets(app)
 
     def session_of(session_id: str) -> ClientSession:
@@ -150,26 +146,3 @@ async def _close_lonely_sessions(state: AppState) -> None:
     while True:
         await asyncio.sleep(SWEEP_UP_S)
         state.close_lonely_sessions()
-
-
-def _add_error_handlers(app: FastAPI) -> None:
-    """Make every refusal one line of JSON: {"error": ...}."""
-
-    @app.exception_handler(SpinscopeError)
-    async def ours(_: Any, error: SpinscopeError) -> JSONResponse:
-        return _error(400, str(error))
-
-    @app.exception_handler(RequestValidationError)
-    async def malformed(_: Any, error: RequestValidationError) -> JSONResponse:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"] if part != "body")
-        return _error(422, f"{place or 'the request'}: {first['msg']}")
-
-    @app.exception_handler(StarletteHTTPException)
-    async def http(_: Any, error: StarletteHTTPException) -> JSONResponse:
-        return _error(error.status_code, str(error.detail))
-
-
-def _error(status: int, text: str) -> JSONResponse:
-    line = " ".join(text.split())
-    return JSONResponse({"error": line if len(line) <= MESSAGE_MOST else f"{line[:MESSAGE_MOST]} ..."}, status)

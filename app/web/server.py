@@ -13,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import uvicorn
+from fastapi import FastAPI
 
 from spinscope.app.terminal import ProgressBar, note
 from spinscope.pipeline.errors import ParameterError
@@ -20,6 +21,7 @@ from spinscope.pipeline.session import Choices
 
 from .app_state import AppState
 from .application import application
+from .coach_application import CoachState, coach_application
 from .open_recording import OpenRecording
 
 HOST = "127.0.0.1"
@@ -27,18 +29,18 @@ PORT = 8377  # free of well-known services; another one is taken when it is busy
 
 
 class _Server(uvicorn.Server):
-    """Announces its address once it answers, and ends the sessions before it waits for their connections to end."""
+    """Announces its address once it answers, and ends all work before it waits for the connections to end."""
 
-    def __init__(self, config: uvicorn.Config, state: AppState, announce: Callable[[], None]) -> None:
+    def __init__(self, config: uvicorn.Config, close: Callable[[], None], announce: Callable[[], None]) -> None:
         super().__init__(config)
-        self._state, self._announce = state, announce
+        self._close, self._announce = close, announce
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
         self._announce()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        self._state.close()
+        self._close()
         await super().shutdown(sockets)
 
 
@@ -73,20 +75,10 @@ def serve(
         recording = state.recording(on_progress=bar)
     # While the browser loads the page and the viewer, which takes longer.
     threading.Thread(target=_load_kernels, args=(recording,), name="kernels", daemon=True).start()
-    listening = listening_socket(PORT if port is None else port)
-    config = uvicorn.Config(
-        application(state),
-        log_level="error",
-        lifespan="on",
-        access_log=False,
-        server_header=False,
-        timeout_graceful_shutdown=2,
-    )
 
-    def announce() -> None:
-        own_port = listening.getsockname()[1]
+    def announce(own_port: int) -> None:
         address = f"http://{HOST}:{own_port}/"
-        tunnel = f"`ssh -L {own_port}:{HOST}:{own_port} THIS_MACHINE` brings it to your own machine"
+        tunnel = _tunnel(own_port)
         if tools:
             sys.stdout.write(f"{address}\n")
             sys.stdout.flush()
@@ -99,12 +91,49 @@ def serve(
 
     for warning in [] if tools else recording.session.warnings:
         note(f"warning: {warning}")
+    run_application(application(state), port, state.close, announce)
+
+
+def serve_coach(state: CoachState, port: int | None = None, *, open_browser: bool = True) -> None:
+    """Serve the coach's page until Ctrl-C; see `serve`."""
+    state.start()
+
+    def announce(own_port: int) -> None:
+        address = f"http://{HOST}:{own_port}/"
+        sys.stdout.write(f"{address}\n")
+        sys.stdout.flush()
+        if not (open_browser and show_in_browser(address)):
+            note(f"open the address in a browser; from elsewhere, {_tunnel(own_port)}")
+
+    run_application(coach_application(state), port, state.close, announce)
+
+
+def run_application(app: FastAPI, port: int | None, close: Callable[[], None], announce: Callable[[int], None]) -> None:
+    """Run an application on this machine until Ctrl-C.
+
+    Parameters
+    ----------
+    port : int or None
+        See `serve`.
+    close : callable
+        Ends all work that connections wait for.
+    announce : callable
+        Called with the port once the application answers.
+    """
+    listening = listening_socket(PORT if port is None else port)
+    config = uvicorn.Config(
+        app, log_level="error", lifespan="on", access_log=False, server_header=False, timeout_graceful_shutdown=2
+    )
     try:
-        _Server(config, state, announce).run([listening])
+        _Server(config, close, lambda: announce(listening.getsockname()[1])).run([listening])
     except KeyboardInterrupt:  # Ctrl-C is how it is meant to end
         return
     finally:
         listening.close()
+
+
+def _tunnel(port: int) -> str:
+    return f"`ssh -L {port}:{HOST}:{port} THIS_MACHINE` brings it to your own machine"
 
 
 def show_in_browser(address: str) -> bool:

@@ -1,4 +1,6 @@
 // Generated from app/web/schemas.py by `python -m tests.app.web.message_types`: do not edit.
+/** Work in the background: recordings done of all, and those that cannot be read. */
+export type AnalysisState = { total: number; done: number; is_working: boolean; failures: Record<string, string> };
 /** Declaration of one bias. */
 export type BiasRange = { low: number; high: number; default: number; help: string };
 /** Biases to simulate the scene with, or to write to a file. */
@@ -23,6 +25,8 @@ export type BiasesMessage = { kind: "biases"; state: "running" | "done" | "cance
 export type CancelRequest = { kind: "sweep" | "optimization" | "biases" | "bias_sweep" };
 /** Anything that the page offers by name. */
 export type Choice = { name: string; label: string; help: string };
+/** One shot of a session: its columns, and what follows from them. */
+export type CoachShot = { id: number; revision: number; recording: string; shot: number; start_us: number; end_us: number; recorded_s: number; began_by: string; ended_by: string; speed_m_s: number | null; spin_rps: number | null; spin_std_rps: number | null; axis_std_deg: number | null; topspin_rps: number | null; sidespin_rps: number | null; corkscrew_rps: number | null; told_by: "logo" | "rhythm" | "flight" | null; reason: string | null; has_picture: boolean; player: string | null; wing: string | null; stroke: string | null; drill: string | null; marked: boolean; deleted: boolean; kind: string[]; effect: number | null; effect_word: "spinny" | "neutral" | "speedy" | null; confidence: "sure" | "good" | "rough" | null; clock_hours: number | null; corkscrew_share: number | null };
 /** Declaration of one parameter, as its control needs it. */
 export type ControlInfo = { name: string; label: string; kind: string; default: any; optional: boolean; unit: string; low: number | null; high: number | null; step: number | null; choices: string[]; help: string; allowed: string; scale: "linear" | "logarithmic" | "cubic" | "none" };
 /** Answer without content. */
@@ -31,10 +35,18 @@ export type Done = {  };
 export type EstimateMetrics = { status: string; reason: string | null; magnitude_rps: number | null; magnitude_std_rps: number | null; axis: number[] | null; axis_std_deg: number | null; error_rps: number | null; error_deg: number | null; error_share: number | null };
 /** Event rate of the whole recording: counts of bins of equal length, and their edges. */
 export type EventRate = { counts: number[]; edges_us: number[] };
+/** The smoothed flight, metres. */
+export type FlightPath = { frame: "table" | "hitter"; t_us: number[]; points_m: [number, number, number][]; net_clearance_m: number | null; landing_m: [number, number] | null };
+/** Revision after a change. */
+export type Kept = { revision: number };
 /** A spin method with its colour, as CSS. */
 export type MethodInfo = { name: string; label: string; help: string; colour: string };
 /** A metric of a run, shot or estimate: field name, label and unit (% for a share of 0 to 1). */
 export type MetricInfo = { name: string; label: string; unit: string };
+/** Names of a shot; None clears one. */
+export type Names = { player: string | null; wing: string | null; stroke: string | null; drill: string | null };
+/** Set names, marks, or that shots are deleted; what is not given stays. */
+export type NamesRequest = { ids: number[]; values: Record<string, string | boolean | null> };
 /** Open a session on a recording of the folder; None for the one the program was started with. */
 export type OpenRequest = { recording?: string | null };
 /** Everything that the page needs to know at first; without `tools` it shows the viewer alone, `tab` in front. */
@@ -49,6 +61,8 @@ export type OptimizationRequest = { parameters: Record<string, Record<string, an
 export type ParameterSweep = { name: string; total: number; points: SweepPoint[] };
 /** An .rrd picture that is ready to be fetched. */
 export type Picture = { id: string; size_bytes: number; start_us: number; end_us: number; opening_us: number };
+/** Camera's place over the table, see `flight_path`; None forgets it. */
+export type PoseRequest = { pose: Record<string, number[] | number[][]> | null };
 /** Parameters read from a preset, and notices of former names in it. */
 export type PresetValues = { parameters: Record<string, Record<string, any>>; notices: string[] };
 /** The opened recording, worked on shot by shot if it is long; `clip_us` is the first clip, [start, end). */
@@ -65,12 +79,26 @@ export type RunMetrics = { ticks: number; tracked_share: number; residual_px: nu
 export type RunRequest = { serial: number; parameters: Record<string, Record<string, any>>; pinned?: Record<string, Record<string, any>> | null; start_us: number; end_us: number; playhead_us?: number | null; interactive?: boolean; followed?: number | null };
 /** A group of controls; `is_setup` where it belongs to the set-up and not to the method. */
 export type SectionInfo = { title: string; is_setup: boolean; controls: ControlInfo[] };
+/** Statistics of the spin of a series of shots; None for what too few shots tell. */
+export type SeriesStatistics = { count: number; unseen: number; median_rps: number | null; best_rps: number | null; best_id: number | null; spread_rps: number | null; median_speed_m_s: number | null; ellipse: [number, number][] | null; trend: "rose" | "fell" | "unclear" | "too_few"; change_rps: number | null; change_std_rps: number | null };
+/** Sessions that are open. */
+export type SessionNames = { sessions: string[] };
+/** The shots of a session that have changed since a revision. */
+export type SessionShots = { revision: number; shots: CoachShot[]; analysis: AnalysisState; now: Names };
 /** Parameters, and the clip when it is not the first one of the recording. */
 export type SettingsRequest = { parameters: Record<string, Record<string, any>>; start_us?: number | null; end_us?: number | null };
+/** What the view of a shot draws; directions in the camera frame, `texture` a PNG in base64. */
+export type ShotDetail = { shot: CoachShot; spin_rps: number[] | null; reference_us: number; hitter: number[][] | null; texture: string | null; proof: SpinProofPoints | null; flight: FlightPath | null };
 /** One shot with the estimate of every method. */
 export type ShotMetrics = { start_us: number; end_us: number; logo_events: number; speed_m_s: number | null; best: string | null; best_reason: string | null; kind: string | null; sentence: string; spin: Record<string, EstimateMetrics> };
 /** Shots of a long recording found so far, [start, end) in us, and the share of it that was searched. */
 export type ShotsMessage = { kind: "shots"; share: number; shots: [number, number][]; error: string | null };
+/** The logo at two instants, and the first turned to the second: places on the disc as the camera sees it. */
+export type SpinProofPoints = { first_us: number; second_us: number; first: number[][]; second: number[][]; turned: number[][] };
+/** Statistics of series of shots, by their names. */
+export type Statistics = { series: Record<string, SeriesStatistics> };
+/** Statistics of series of shots by their names, each in order of time. */
+export type StatisticsRequest = { series: Record<string, number[]> };
 /** Progress of a parameter sweep. */
 export type SweepMessage = { kind: "sweep"; state: "running" | "done" | "cancelled" | "failed"; error: string | null; content: ParameterSweep | null };
 /** Metrics of a run with one value; only `error` where the value does not go with the others. */
@@ -113,4 +141,16 @@ export interface Posts {
   "/api/biases/read": { sent: TextRequest; answered: BiasValues };
   "/api/biases/write": { sent: BiasRequest; answered: BiasText };
   "/api/sessions": { sent: OpenRequest; answered: Opening };
+}
+/** POST requests of a session: what is sent and answered. */
+export interface CoachPosts {
+  "names": { sent: NamesRequest; answered: Kept };
+  "now": { sent: Names; answered: Kept };
+  "pose": { sent: PoseRequest; answered: Kept };
+  "statistics": { sent: StatisticsRequest; answered: Statistics };
+}
+/** GET requests of a session: what is sent and answered. */
+export interface CoachGets {
+  "shots": { sent: null; answered: SessionShots };
+  "shots/{shot_id}": { sent: null; answered: ShotDetail };
 }

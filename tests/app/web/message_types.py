@@ -12,6 +12,8 @@ from pydantic import TypeAdapter
 
 from spinscope.app.web.app_state import AppState
 from spinscope.app.web.application import application
+from spinscope.app.web.coach_application import SESSION as COACH
+from spinscope.app.web.coach_application import CoachState, coach_application
 from spinscope.app.web.schemas import ServerMessage
 from spinscope.pipeline.session import DEFAULT_SAMPLE, Choices
 
@@ -28,7 +30,12 @@ def declarations() -> str:
     api = application(state).openapi()
     state.drawings.close()
     messages = TypeAdapter(ServerMessage).json_schema(mode="serialization")
-    schemas: dict[str, Schema] = {**api["components"]["schemas"], **messages["$defs"]}
+    coach = coach_application(CoachState([])).openapi()
+    schemas: dict[str, Schema] = {
+        **api["components"]["schemas"],
+        **coach["components"]["schemas"],
+        **messages["$defs"],
+    }
     for validation in ("HTTPValidationError", "ValidationError"):
         schemas.pop(validation, None)
     parts = [HEAD, *(_interface(name, schemas[name]) for name in sorted(schemas))]
@@ -40,6 +47,8 @@ def declarations() -> str:
         _routes("SessionPosts", "post", api["paths"], SESSION),
         _routes("SessionGets", "get", api["paths"], SESSION),
         _routes("Posts", "post", {path: one for path, one in api["paths"].items() if not path.startswith(SESSION)}, ""),
+        _routes("CoachPosts", "post", coach["paths"], COACH),
+        _routes("CoachGets", "get", coach["paths"], COACH),
     ]
     return "\n".join(parts) + "\n"
 

@@ -24,7 +24,7 @@ def deno(command: str, folder: Path, cache: Path, *arguments: str) -> subprocess
         "NO_COLOR": "1",
         "HTTPS_PROXY": "http://127.0.0.1:9",
     }
-    sources = [str(path) for path in sorted((folder / "static").glob("*.js"))] if command == "check" else []
+    sources = [str(path) for path in sorted((folder / "static").rglob("*.js"))] if command == "check" else []
     return subprocess.run(
         [DENO, command, "--config", "deno.json", *arguments, *sources],
         cwd=folder,

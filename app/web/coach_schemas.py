@@ -1,0 +1,136 @@
+"""Messages between the server and the coach's page; `static/messages.d.ts` is generated from them, too."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from spinscope.app.coach.flight_path import FlightPath
+from spinscope.app.coach.statistics import SeriesStatistics
+
+from .schemas import Request, Response
+
+SHOTS_MOST = 10_000
+
+
+class Names(Request):
+    """Names of a shot; None clears one."""
+
+    player: str | None = None
+    wing: str | None = None
+    stroke: str | None = None
+    drill: str | None = None
+
+
+class NamesRequest(Request):
+    """Set names, marks, or that shots are deleted; what is not given stays."""
+
+    ids: list[int] = Field(max_length=SHOTS_MOST)
+    values: dict[str, str | bool | None] = Field(max_length=10)
+
+
+class StatisticsRequest(Request):
+    """Statistics of series of shots by their names, each in order of time."""
+
+    series: dict[str, list[int]] = Field(max_length=100)
+
+
+class PoseRequest(Request):
+    """Camera's place over the table, see `flight_path`; None forgets it."""
+
+    pose: dict[str, list[float] | list[list[float]]] | None
+
+
+class CoachShot(Response):
+    """One shot of a session: its columns, and what follows from them."""
+
+    id: int
+    revision: int
+    recording: str
+    shot: int
+    start_us: int
+    end_us: int
+    recorded_s: float
+    began_by: str
+    ended_by: str
+    speed_m_s: float | None
+    spin_rps: float | None
+    spin_std_rps: float | None
+    axis_std_deg: float | None
+    topspin_rps: float | None
+    sidespin_rps: float | None
+    corkscrew_rps: float | None
+    told_by: Literal["logo", "rhythm", "flight"] | None
+    reason: str | None
+    has_picture: bool
+    player: str | None
+    wing: str | None
+    stroke: str | None
+    drill: str | None
+    marked: bool
+    deleted: bool
+    kind: list[str]
+    effect: float | None
+    effect_word: Literal["spinny", "neutral", "speedy"] | None
+    confidence: Literal["sure", "good", "rough"] | None
+    clock_hours: float | None
+    corkscrew_share: float | None
+
+
+class AnalysisState(Response):
+    """Work in the background: recordings done of all, and those that cannot be read."""
+
+    total: int
+    done: int
+    is_working: bool
+    failures: dict[str, str]
+
+
+class SessionShots(Response):
+    """The shots of a session that have changed since a revision."""
+
+    revision: int
+    shots: list[CoachShot]
+    analysis: AnalysisState
+    now: Names
+
+
+class SpinProofPoints(Response):
+    """The logo at two instants, and the first turned to the second: places on the disc as the camera sees it."""
+
+    first_us: float
+    second_us: float
+    first: list[list[float]]
+    second: list[list[float]]
+    turned: list[list[float]]
+
+
+class ShotDetail(Response):
+    """What the view of a shot draws; directions in the camera frame, `texture` a PNG in base64."""
+
+    shot: CoachShot
+    spin_rps: list[float] | None
+    reference_us: float
+    hitter: list[list[float]] | None
+    texture: str | None
+    proof: SpinProofPoints | None
+    flight: FlightPath | None
+
+
+class SessionNames(Response):
+    """Sessions that are open."""
+
+    sessions: list[str]
+
+
+class Statistics(Response):
+    """Statistics of series of shots, by their names."""
+
+    series: dict[str, SeriesStatistics]
+
+
+class Kept(Response):
+    """Revision after a change."""
+
+    revision: int

@@ -1,0 +1,160 @@
+// Charts of series of shots in SVG: spin against speed with the ellipses of the spread, and shot by shot.
+
+/** @import { CoachShot, SeriesStatistics } from "../messages.d.ts" */
+
+import { drawing } from "../elements.js";
+import { chosen, dayOf, decimal, inSpeedUnit, inSpinUnit, kindWords, spinWords, text } from "./texts.js";
+
+// Okabe and Ito's palette, dark enough on white, told apart by shape as well.
+export const COLOURS = ["#0072b2", "#c24e00", "#007a5a", "#a3427d", "#6b5900", "#2c7da0", "#555555"];
+const SHAPES = ["circle", "square", "triangle", "diamond"];
+const WIDTH = 560, HEIGHT = 340, LEFT = 52, RIGHT = 12, TOP = 12, BOTTOM = 44;
+
+/** @typedef {{name: string, shots: CoachShot[], statistics: SeriesStatistics}} Series */
+
+/** @param {number} x @param {number} y @param {number} index @param {string} title @param {() => void} [open] */
+function mark(x, y, index, title, open) {
+  const fill = COLOURS[index % COLOURS.length], r = 4.6;
+  const shape = SHAPES[index % SHAPES.length];
+  const made = shape === "circle"
+    ? drawing("circle", { cx: x, cy: y, r, fill })
+    : shape === "square"
+    ? drawing("rect", { x: x - r, y: y - r, width: 2 * r, height: 2 * r, fill })
+    : drawing("path", {
+      d: shape === "triangle"
+        ? `M${x} ${y - r * 1.2}l${r * 1.2} ${r * 2.1}h${-r * 2.4}z`
+        : `M${x} ${y - r * 1.3}l${r * 1.3} ${r * 1.3}l${-r * 1.3} ${r * 1.3}l${-r * 1.3} ${-r * 1.3}z`,
+      fill,
+    });
+  made.append(drawing("title", {}, title));
+  made.classList.add("mark");
+  if (open) made.addEventListener("click", open);
+  return made;
+}
+
+/** A few round numbers in a range. @param {number} low @param {number} high */
+function rounds(low, high) {
+  const rough = (high - low) / 5, power = 10 ** Math.floor(Math.log10(rough || 1));
+  const step = [1, 2, 5, 10].map((one) => one * power).find((one) => one >= rough) ?? power;
+  const found = [];
+  for (let value = Math.ceil(low / step) * step; value <= high; value += step) found.push(value);
+  return found;
+}
+
+/**
+ * @param {string} label @param {string} xTitle @param {[number, number]} xRange @param {[number, number]} yRange
+ * @param {(value: number) => string} xWords
+ */
+function axes(label, xTitle, xRange, yRange, xWords) {
+  const x = (/** @type {number} */ v) => LEFT + (v - xRange[0]) / (xRange[1] - xRange[0]) * (WIDTH - LEFT - RIGHT);
+  const y = (/** @type {number} */ v) =>
+    HEIGHT - BOTTOM - (v - yRange[0]) / (yRange[1] - yRange[0]) * (HEIGHT - TOP - BOTTOM);
+  const svg = drawing("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": label, class: "chart" });
+  for (const value of rounds(...yRange)) {
+    svg.append(
+      drawing("line", { x1: LEFT, y1: y(value), x2: WIDTH - RIGHT, y2: y(value), class: "grid" }),
+      drawing("text", { x: LEFT - 6, y: y(value) + 4, class: "y" }, decimal(value)),
+    );
+  }
+  for (const value of rounds(...xRange)) {
+    svg.append(drawing("text", { x: x(value), y: HEIGHT - BOTTOM + 18, class: "x" }, xWords(value)));
+  }
+  svg.append(
+    drawing("line", { x1: LEFT, y1: HEIGHT - BOTTOM, x2: WIDTH - RIGHT, y2: HEIGHT - BOTTOM, class: "axis" }),
+    drawing("text", { x: (LEFT + WIDTH) / 2, y: HEIGHT - 6, class: "x title" }, xTitle),
+    drawing(
+      "text",
+      { x: -(HEIGHT - BOTTOM) / 2, y: 13, transform: "rotate(-90)", class: "x title" },
+      `${text("spin")} (${text(chosen.spin)})`,
+    ),
+  );
+  return { svg, x, y };
+}
+
+/** @param {number[]} values @returns {[number, number]} */
+function range(values, low = Infinity) {
+  const least = Math.min(low, ...values), most = Math.max(...values), margin = 0.06 * (most - least || 1);
+  return [low === 0 ? 0 : least - margin, most + margin];
+}
+
+/** Spin against speed. @param {Series[]} series @param {(shot: CoachShot) => void} open */
+export function spreadChart(series, open) {
+  const known = series.flatMap(({ shots }) => shots).filter((shot) =>
+    shot.spin_rps !== null && shot.speed_m_s !== null
+  );
+  if (!known.length) return null;
+  const outlines = series.flatMap(({ statistics }) => statistics.ellipse ?? []);
+  const speeds = [...known.map((shot) => shot.speed_m_s ?? 0), ...outlines.map(([speed]) => speed)].map(inSpeedUnit);
+  const spins = [...known.map((shot) => shot.spin_rps ?? 0), ...outlines.map(([, spin]) => spin)].map(inSpinUnit);
+  const title = `${text("speed")} (${text(chosen.speed)})`;
+  const { svg, x, y } = axes(text("spread"), title, range(speeds), range(spins, 0), (value) => decimal(value));
+  series.forEach(({ statistics }, index) => {
+    if (!statistics.ellipse) return;
+    const points = statistics.ellipse.map(([speed, spin]) => `${x(inSpeedUnit(speed))},${y(inSpinUnit(spin))}`).join(
+      " ",
+    );
+    const colour = COLOURS[index % COLOURS.length];
+    svg.append(drawing("polygon", { points, fill: colour, "fill-opacity": 0.1, stroke: colour, "stroke-width": 1.5 }));
+  });
+  series.forEach(({ name, shots }, index) => {
+    for (const shot of shots) {
+      if (shot.spin_rps === null || shot.speed_m_s === null) continue;
+      const title = `${name}: ${spinWords(shot.spin_rps)}, ${kindWords(shot.kind)}`;
+      svg.append(mark(x(inSpeedUnit(shot.speed_m_s)), y(inSpinUnit(shot.spin_rps)), index, title, () => open(shot)));
+    }
+  });
+  return svg;
+}
+
+/** Spin shot by shot, with the middle of each day. @param {Series[]} series @param {(shot: CoachShot) => void} open */
+export function trendChart(series, open) {
+  const seen = series.map(({ name, shots }) => ({ name, shots: shots.filter((shot) => shot.spin_rps !== null) }));
+  const all = [...new Set(seen.flatMap(({ shots }) => shots))].sort((a, b) => a.recorded_s - b.recorded_s);
+  if (all.length < 2) return null;
+  const place = new Map(all.map((shot, index) => [shot, index + 1]));
+  const spins = all.map((shot) => inSpinUnit(shot.spin_rps ?? 0));
+  const { svg, x, y } = axes(
+    text("trend"),
+    text("shots"),
+    [0, all.length + 1],
+    range(spins, 0),
+    (value) => Number.isInteger(value) ? decimal(value) : "",
+  );
+  let day = "";
+  for (const shot of all) {
+    if (dayOf(shot) === day) continue;
+    day = dayOf(shot);
+    const at = x((place.get(shot) ?? 0) - 0.5);
+    svg.append(
+      drawing("line", { x1: at, y1: TOP, x2: at, y2: HEIGHT - BOTTOM, class: "day" }),
+      drawing("text", { x: at + 4, y: TOP + 10, class: "day" }, day),
+    );
+  }
+  seen.forEach(({ name, shots }, index) => {
+    const colour = COLOURS[index % COLOURS.length];
+    for (const own of Map.groupBy(shots, dayOf).values()) {
+      const values = own.map((shot) => shot.spin_rps ?? 0).sort((a, b) => a - b);
+      const middle = y(inSpinUnit((values[(values.length - 1) >> 1] + values[values.length >> 1]) / 2));
+      const ends = [place.get(own[0]) ?? 0, place.get(own[own.length - 1]) ?? 0];
+      svg.append(
+        drawing("line", {
+          x1: x(ends[0] - 0.4),
+          y1: middle,
+          x2: x(ends[1] + 0.4),
+          y2: middle,
+          stroke: colour,
+          "stroke-width": 2,
+        }),
+      );
+    }
+    for (const shot of shots) {
+      const title = `${name}: ${spinWords(shot.spin_rps)}, ${dayOf(shot)}`;
+      svg.append(mark(x(place.get(shot) ?? 0), y(inSpinUnit(shot.spin_rps ?? 0)), index, title, () => open(shot)));
+    }
+  });
+  return svg;
+}
+
+/** The mark of a series, for legends. @param {number} index */
+export const legendMark = (index) =>
+  drawing("svg", { viewBox: "0 0 14 14", class: "legend", "aria-hidden": "true" }, mark(7, 7, index, ""));

@@ -1,0 +1,144 @@
+// Tests that can be repeated: a drill by a player on a day, with counts, best, middle, spread, beside the last time.
+
+/** @import { CoachShot, Names } from "../messages.d.ts" */
+/** @import { Shots } from "./shots.js" */
+
+import { attempt, element } from "../elements.js";
+import { seriesOf } from "./comparison.js";
+import { nameInputs, nameWords, valuesOf } from "./shot_list.js";
+import { dayOf, kindWords, speedWords, spinWords, term, text } from "./texts.js";
+
+const TARGET = 10; // balls of a test, as coaches ask for
+const PROTOCOLS = ["test_max_topspin", "test_backspin", "test_serves"];
+
+export class Protocols {
+  /** @param {{shots: Shots, go: (place: string) => void}} page */
+  constructor({ shots, go }) {
+    this.shots = shots;
+    this.go = go;
+    this.root = element("section.protocols");
+  }
+
+  async show() {
+    const drilled = this.shots.list.filter((shot) => shot.drill !== null);
+    const key = (/** @type {CoachShot} */ shot) => JSON.stringify([shot.drill, shot.player, dayOf(shot)]);
+    const series = await seriesOf(this.shots, drilled, key);
+    const drills = valuesOf(drilled, "drill");
+    this.root.replaceChildren(
+      this.#start(),
+      ...drills.map((drill) => this.#drill(drill, series.filter((one) => one.shots[0].drill === drill))),
+      drills.length
+        ? element("button.print", { onclick: () => print() }, text("print"))
+        : element("p.note", {}, text("no_tests")),
+    );
+    return this.root;
+  }
+
+  #start() {
+    const { now } = this.shots;
+    const inputs = nameInputs(this.shots, /** @type {any} */ (now));
+    const presets = PROTOCOLS.map((key) =>
+      element("button", {
+        type: "button",
+        onclick: () => inputs[3].querySelector("input").value = text(key),
+      }, text(key))
+    );
+    const values = () => /** @type {Names} */ (Object.fromEntries(
+      inputs.map((label) => label.querySelector("input")).map((input) => [input.name, input.value.trim() || null]),
+    ));
+    const form = element(
+      "form.names",
+      { "aria-label": text("now") },
+      inputs,
+      element("button.primary", {}, text("start_test")),
+    );
+    form.addEventListener("submit", (/** @type {Event} */ event) => {
+      event.preventDefault();
+      attempt(() => this.shots.playNow(values()));
+    });
+    const stop = element("button", {
+      type: "button",
+      onclick: () => attempt(() => this.shots.playNow({ player: null, wing: null, stroke: null, drill: null })),
+    }, text("stop_test"));
+    const running = now.drill === null
+      ? null
+      : this.shots.list.filter((shot) =>
+        shot.drill === now.drill && shot.player === now.player && dayOf(shot) === today()
+      ).length;
+    return element(
+      "div.card.start",
+      {},
+      element("h3", {}, text("start_test")),
+      element("div.row", {}, presets),
+      form,
+      running === null ? "" : element(
+        "p.large",
+        {},
+        `${nameWords(now.player)} – ${now.drill}: ${text("balls", { count: running, target: TARGET })} `,
+        stop,
+      ),
+      element("p.note", {}, text("now_help")),
+    );
+  }
+
+  /** @param {string} drill @param {import("./charts.js").Series[]} series */
+  #drill(drill, series) {
+    const head = ["player", "day", "count", "median", "deviation", "best", "speed", "last_time"].map((key) =>
+      element("th", { scope: "col" }, key === "median" || key === "deviation" ? term(key) : text(key))
+    );
+    const rows = series.map((one) => {
+      const { statistics, shots: [first] } = one;
+      const earlier = series.filter((other) =>
+        other.shots[0].player === first.player && other.shots[0].recorded_s < first.recorded_s
+      ).pop();
+      const change = earlier && statistics.median_rps !== null && earlier.statistics.median_rps !== null
+        ? statistics.median_rps - earlier.statistics.median_rps
+        : null;
+      return element(
+        "tr",
+        {},
+        element("th", { scope: "row" }, nameWords(first.player) || text("none")),
+        element("td", {}, dayOf(first)),
+        element(
+          "td",
+          {},
+          String(statistics.count) + (statistics.unseen ? ` (+${statistics.unseen} ${text("not_seen")})` : ""),
+        ),
+        element("td", {}, element("strong", {}, spinWords(statistics.median_rps))),
+        element("td", {}, spinWords(statistics.spread_rps)),
+        element(
+          "td",
+          {},
+          element(
+            "button.link",
+            { onclick: () => this.go(`shot/${statistics.best_id}`) },
+            spinWords(statistics.best_rps),
+          ),
+        ),
+        element("td", {}, speedWords(statistics.median_speed_m_s)),
+        element(
+          "td",
+          {},
+          change === null
+            ? text("first_time")
+            : text(change < 0 ? "less" : "more", { value: spinWords(Math.abs(change)) }),
+        ),
+      );
+    });
+    const kinds = [...new Set(series.flatMap(({ shots }) => shots.map((shot) => kindWords(shot.kind.slice(0, 1)))))]
+      .filter(Boolean);
+    return element(
+      "div.card",
+      {},
+      element("h3", {}, `${text("protocol")}: ${nameWords(drill)}`),
+      element("p.note", {}, kinds.join(", ")),
+      element(
+        "div.scroll",
+        { tabIndex: 0 },
+        element("table.statistics", {}, element("thead", {}, element("tr", {}, head)), element("tbody", {}, rows)),
+      ),
+    );
+  }
+}
+
+const today = () => dayOf(/** @type {CoachShot} */ ({ recorded_s: Date.now() / 1000 }));

@@ -1,0 +1,142 @@
+// The shots of the open session, kept up to date with the server, and the changes that can be undone.
+
+/** @import { AnalysisState, CoachGets, CoachPosts, CoachShot, Names, ShotDetail } from "../messages.d.ts" */
+
+const JSON_HEADERS = { "content-type": "application/json" };
+
+/** @param {Response} response */
+async function answered(response) {
+  if (response.ok) return response.json();
+  const { error } = await response.json().catch(() => ({ error: response.statusText }));
+  throw new Error(error);
+}
+
+// Events: `change` when shots, names or the work in the background have changed, `new` with a shot that has just ended,
+// `lost` and `back` with the connection.
+export class Shots extends EventTarget {
+  /** @type {Map<number, CoachShot>} */
+  #all = new Map();
+  /** @type {{ids: number[], values: Record<string, any>}[][]} */
+  #undo = [];
+  #revision = -1;
+  /** @type {EventSource | null} */
+  #stream = null;
+  /** @type {Map<number, {revision: number, detail: Promise<ShotDetail>}>} */
+  #details = new Map();
+  session = "";
+  /** @type {AnalysisState} */
+  analysis = { total: 0, done: 0, is_working: false, failures: {} };
+  /** @type {Names} */
+  now = { player: null, wing: null, stroke: null, drill: null };
+
+  /** @returns {Promise<string[]>} */
+  static async sessions() {
+    return (await answered(await fetch("/api/coach/sessions"))).sessions;
+  }
+
+  async open(/** @type {string} */ session) {
+    this.#stream?.close();
+    this.session = session;
+    this.#all.clear();
+    this.#details.clear();
+    this.#undo = [];
+    this.#revision = -1;
+    await this.update();
+    const stream = this.#stream = new EventSource(this.path("messages"));
+    stream.onmessage = () => this.update().catch(() => {});
+    stream.onerror = () => this.dispatchEvent(new Event("lost"));
+    stream.onopen = () => this.dispatchEvent(new Event("back"));
+  }
+
+  path(/** @type {string} */ rest) {
+    return `/api/coach/${encodeURIComponent(this.session)}/${rest}`;
+  }
+
+  /** All that are not deleted, in order of time. */
+  get list() {
+    return [...this.#all.values()].filter((shot) => !shot.deleted)
+      .sort((a, b) => a.recorded_s - b.recorded_s || a.id - b.id);
+  }
+
+  get deletedCount() {
+    return [...this.#all.values()].filter((shot) => shot.deleted).length;
+  }
+
+  get canUndo() {
+    return this.#undo.length > 0;
+  }
+
+  get(/** @type {number} */ id) {
+    return this.#all.get(id) ?? null;
+  }
+
+  /** The shot of the same ball before or after a bounce or hit. @param {CoachShot} shot @returns {CoachShot | null} */
+  neighbour(shot, before = true) {
+    const meets = (/** @type {CoachShot} */ other) =>
+      other.recording === shot.recording && !other.deleted &&
+      (before
+        ? other.ended_by === "bounce" && shot.began_by === "bounce" && other.end_us === shot.start_us
+        : other.began_by === "bounce" && shot.ended_by === "bounce" && other.start_us === shot.end_us);
+    return [...this.#all.values()].find(meets) ?? null;
+  }
+
+  async update() {
+    const isFirst = this.#revision < 0;
+    /** @type {CoachGets["shots"]["answered"]} */
+    const answer = await answered(await fetch(this.path(`shots?since=${this.#revision}`)));
+    this.#revision = answer.revision;
+    this.analysis = answer.analysis;
+    this.now = answer.now;
+    const fresh = answer.shots.filter((shot) => !this.#all.has(shot.id));
+    for (const shot of answer.shots) this.#all.set(shot.id, shot);
+    this.dispatchEvent(new Event("change"));
+    if (!isFirst) { for (const shot of fresh) this.dispatchEvent(new CustomEvent("new", { detail: shot })); }
+  }
+
+  /** @param {number} id */
+  detail(id) {
+    const revision = this.#all.get(id)?.revision ?? -1;
+    const kept = this.#details.get(id);
+    if (kept?.revision === revision) return kept.detail;
+    const detail = fetch(this.path(`shots/${id}`)).then(answered);
+    this.#details.set(id, { revision, detail });
+    return detail;
+  }
+
+  /**
+   * @template {keyof CoachPosts} P
+   * @param {P} rest
+   * @param {CoachPosts[P]["sent"]} content
+   * @returns {Promise<CoachPosts[P]["answered"]>}
+   */
+  async post(rest, content) {
+    return answered(
+      await fetch(this.path(rest), { method: "POST", headers: JSON_HEADERS, body: JSON.stringify(content) }),
+    );
+  }
+
+  /**
+   * Changes names, marks or deletion, and remembers how to undo it.
+   * @param {number[]} ids
+   * @param {Record<string, string | boolean | null>} values
+   */
+  async change(ids, values) {
+    const before = ids.map((id) => {
+      const shot = /** @type {any} */ (this.#all.get(id));
+      return { ids: [id], values: Object.fromEntries(Object.keys(values).map((name) => [name, shot[name]])) };
+    });
+    await this.post("names", { ids, values });
+    this.#undo.push(before);
+    await this.update();
+  }
+
+  async undo() {
+    for (const { ids, values } of this.#undo.pop() ?? []) await this.post("names", { ids, values });
+    await this.update();
+  }
+
+  async playNow(/** @type {Names} */ now) {
+    await this.post("now", now);
+    await this.update();
+  }
+}

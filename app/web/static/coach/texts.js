@@ -1,0 +1,114 @@
+// Texts, numbers and units in the language and units that were chosen; both are remembered by the browser.
+
+/** @import { CoachShot } from "../messages.d.ts" */
+
+import { element } from "../elements.js";
+
+/** @type {Record<string, Record<string, string>>} */
+let table = {};
+
+/** @param {string} name @param {string} usual @param {string[]} allowed */
+function remembered(name, usual, allowed) {
+  const kept = localStorage.getItem(`spinscope.coach.${name}`);
+  return kept !== null && allowed.includes(kept) ? kept : usual;
+}
+
+export const chosen = {
+  language: remembered("language", navigator.language.startsWith("de") ? "de" : "en", ["en", "de"]),
+  spin: remembered("spin", "rps", ["rps", "rpm"]),
+  speed: remembered("speed", "km_h", ["km_h", "m_s"]),
+};
+
+/** @param {"language" | "spin" | "speed"} name @param {string} value */
+export function choose(name, value) {
+  chosen[name] = value;
+  localStorage.setItem(`spinscope.coach.${name}`, value);
+  document.documentElement.lang = chosen.language;
+}
+
+export async function loadTexts() {
+  table = await (await fetch("/api/coach/texts")).json();
+  document.documentElement.lang = chosen.language;
+}
+
+/** The text of a key, with {name} replaced. @param {string} key @param {Record<string, any>} values */
+export function text(key, values = {}) {
+  const found = table[chosen.language][key] ?? key;
+  return found.replace(/\{(\w+)\}/g, (_, name) => String(values[name] ?? ""));
+}
+
+export const hasText = (/** @type {string} */ key) => key in table[chosen.language];
+
+/** A word with its explanation on hover, focus and touch. @param {string} key @param {string} [about] */
+export function term(key, about = key) {
+  const explanation = text(`about.${about}`);
+  const open = (/** @type {any} */ event) => {
+    event.stopPropagation();
+    const shown = made.classList.contains("open");
+    for (const other of document.querySelectorAll(".term.open")) other.classList.remove("open");
+    made.classList.toggle("open", !shown);
+  };
+  const made = element(
+    "span.term",
+    { tabIndex: 0, role: "button", "aria-label": `${text(key)}: ${explanation}`, onclick: open },
+    text(key),
+    element("span.about", { "aria-hidden": "true" }, explanation),
+  );
+  made.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => event.key === "Enter" && open(event));
+  return made;
+}
+
+/** @param {number} value @param {number} digits */
+export const decimal = (value, digits = 0) =>
+  value.toLocaleString(chosen.language, { minimumFractionDigits: digits, maximumFractionDigits: digits });
+
+export const inSpinUnit = (/** @type {number} */ rps) => (chosen.spin === "rpm" ? 60 * rps : rps);
+export const inSpeedUnit = (/** @type {number} */ m_s) => (chosen.speed === "km_h" ? 3.6 * m_s : m_s);
+
+/** @param {number | null} rps */
+export const spinNumber = (rps) => rps === null ? "–" : decimal(inSpinUnit(rps));
+
+/** @param {number | null} rps */
+export const spinWords = (rps) => rps === null ? "–" : `${spinNumber(rps)} ${text(chosen.spin)}`;
+
+/** @param {number | null} m_s */
+export const speedWords = (m_s) =>
+  m_s === null ? "–" : `${decimal(inSpeedUnit(m_s), chosen.speed === "km_h" ? 0 : 1)} ${text(chosen.speed)}`;
+
+/** The kind with what else is in it: "topspin with some right sidespin". @param {string[]} kind */
+export function kindWords(kind) {
+  return kind.map((code) => code.split(" ").map((part) => text(part)).join(" ")).join(" ");
+}
+
+/** Main component of a shot's kind; null where the spin is not seen. @param {CoachShot} shot */
+export const mainKind = (shot) => shot.kind[0] ?? null;
+
+/** @param {CoachShot} shot */
+export const capitalized = (shot) => {
+  const words = kindWords(shot.kind);
+  return words.charAt(0).toUpperCase() + words.slice(1);
+};
+
+/** What is said of a shot's spin beside its number. @param {CoachShot} shot */
+export function toldBy(shot) {
+  if (shot.told_by === "flight") return term("from_flight");
+  if (shot.told_by === "rhythm") return term("from_rhythm");
+  return null;
+}
+
+/** Time of day, or with the day. @param {CoachShot} shot */
+export const timeWords = (shot, withDay = false) =>
+  new Date(1000 * shot.recorded_s).toLocaleString(
+    chosen.language,
+    withDay
+      ? { day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" }
+      : { hour: "2-digit", minute: "2-digit", second: "2-digit" },
+  );
+
+/** @param {CoachShot} shot */
+export const dayOf = (shot) =>
+  new Date(1000 * shot.recorded_s).toLocaleDateString(chosen.language, {
+    year: "numeric",
+    month: "short",
+    day: "numeric",
+  });
