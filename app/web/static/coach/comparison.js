@@ -3,11 +3,10 @@
 /** @import { CoachShot } from "../messages.d.ts" */
 /** @import { Series } from "./charts.js" */
 /** @import { Shots } from "./shots.js" */
-/** @import { ShotFilter } from "./shot_list.js" */
 
 import { element } from "../elements.js";
 import { legendMark, spreadChart, trendChart } from "./charts.js";
-import { nameWords } from "./shot_list.js";
+import { nameWords, ShotFilter } from "./shot_list.js";
 import { dayOf, mainKind, speedWords, spinWords, term, text } from "./texts.js";
 
 const GROUPINGS = ["player", "kind", "wing", "stroke", "drill", "day"];
@@ -36,7 +35,7 @@ export function answers(series) {
   const strongest = [...large].sort((a, b) => (b.statistics.median_rps ?? 0) - (a.statistics.median_rps ?? 0))[0];
   if (large.length > 1 && strongest) {
     const kinds = new Set(large.flatMap(({ shots }) => shots.map(mainKind)).filter((kind) => kind !== null));
-    const kind = kinds.size === 1 ? text([...kinds][0] ?? "spin") : text("spin");
+    const kind = text(kinds.size === 1 ? [...kinds][0] ?? "spin_noun" : "spin_noun");
     sentences.push(
       text("answer_more", { group: strongest.name, kind, value: spinWords(strongest.statistics.median_rps) }),
     );
@@ -50,17 +49,21 @@ export function answers(series) {
 export class Comparison {
   #by = "player";
 
-  /** @param {{shots: Shots, filter: ShotFilter, go: (place: string) => void}} page */
-  constructor({ shots, filter, go }) {
+  filter = new ShotFilter();
+  #hasBegun = false;
+
+  /** @param {{shots: Shots, go: (place: string) => void}} page */
+  constructor({ shots, go }) {
     this.shots = shots;
-    this.filter = filter;
     this.go = go;
     this.root = element("section.comparison");
     this.content = element("div.content");
-    filter.addEventListener("change", () => this.root.isConnected && this.#fill());
+    this.filter.addEventListener("change", () => this.#fill());
   }
 
   show() {
+    if (!this.#hasBegun) this.filter.values.kind = this.#usualKind();
+    this.#hasBegun = true;
     const by = element(
       "select",
       { name: "by", onchange: () => (this.#by = by.value, this.#fill()) },
@@ -76,6 +79,12 @@ export class Comparison {
     this.root.replaceChildren(bar, this.content);
     this.#fill();
     return this.root;
+  }
+
+  // Spins of different kinds are not compared unless somebody wishes it.
+  #usualKind() {
+    const groups = [...Map.groupBy(this.shots.list, (shot) => mainKind(shot) ?? "not_seen").entries()];
+    return groups.sort(([, a], [, b]) => b.length - a.length)[0]?.[0] ?? "";
   }
 
   async #fill() {

@@ -49,7 +49,7 @@ export function clock(hours) {
   const at = (/** @type {number} */ radius, a = angle) => [50 + radius * Math.sin(a), 50 - radius * Math.cos(a)];
   const whole = Math.round(hours * 60) % 720;
   const time = `${Math.floor(whole / 60) || 12}:${String(whole % 60).padStart(2, "0")}`;
-  const [x, y] = at(33);
+  const [x, y] = at(24);
   const ticks = Array.from({ length: 12 }, (_, i) => {
     const [x1, y1] = at(44, i * Math.PI / 6), [x2, y2] = at(i % 3 ? 41 : 38, i * Math.PI / 6);
     return drawing("line", { x1, y1, x2, y2, class: "tick" });

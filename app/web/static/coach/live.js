@@ -4,7 +4,7 @@
 /** @import { Shots } from "./shots.js" */
 
 import { attempt, element } from "../elements.js";
-import { nameInputs } from "./shot_list.js";
+import { nameInputs, namesIn } from "./shot_list.js";
 import { headline } from "./shot_view.js";
 import { chosen, kindWords, speedWords, spinWords, text, timeWords } from "./texts.js";
 
@@ -35,10 +35,7 @@ export class Live {
     );
     form.addEventListener("submit", (/** @type {Event} */ event) => {
       event.preventDefault();
-      const values = Object.fromEntries(
-        inputs.map((label) => label.querySelector("input")).map((input) => [input.name, input.value.trim() || null]),
-      );
-      attempt(() => this.shots.playNow(/** @type {any} */ (values)));
+      attempt(() => this.shots.playNow(/** @type {any} */ (namesIn(inputs))));
     });
     this.root.replaceChildren(this.newest, element("label.check", {}, speak, text("speak")), form);
     const last = this.shots.list.sort((a, b) => a.id - b.id).pop();

@@ -1,15 +1,15 @@
 // Tests that can be repeated: a drill by a player on a day, with counts, best, middle, spread, beside the last time.
 
-/** @import { CoachShot, Names } from "../messages.d.ts" */
+/** @import { CoachShot } from "../messages.d.ts" */
 /** @import { Shots } from "./shots.js" */
 
 import { attempt, element } from "../elements.js";
 import { seriesOf } from "./comparison.js";
-import { nameInputs, nameWords, valuesOf } from "./shot_list.js";
+import { nameInputs, namesIn, nameWords, valuesOf } from "./shot_list.js";
 import { dayOf, kindWords, speedWords, spinWords, term, text } from "./texts.js";
 
 const TARGET = 10; // balls of a test, as coaches ask for
-const PROTOCOLS = ["test_max_topspin", "test_backspin", "test_serves"];
+const PROTOCOLS = ["maximum topspin", "backspin rally", "serves"];
 
 export class Protocols {
   /** @param {{shots: Shots, go: (place: string) => void}} page */
@@ -43,9 +43,6 @@ export class Protocols {
         onclick: () => inputs[3].querySelector("input").value = text(key),
       }, text(key))
     );
-    const values = () => /** @type {Names} */ (Object.fromEntries(
-      inputs.map((label) => label.querySelector("input")).map((input) => [input.name, input.value.trim() || null]),
-    ));
     const form = element(
       "form.names",
       { "aria-label": text("now") },
@@ -54,7 +51,7 @@ export class Protocols {
     );
     form.addEventListener("submit", (/** @type {Event} */ event) => {
       event.preventDefault();
-      attempt(() => this.shots.playNow(values()));
+      attempt(() => this.shots.playNow(/** @type {any} */ (namesIn(inputs))));
     });
     const stop = element("button", {
       type: "button",
@@ -74,7 +71,7 @@ export class Protocols {
       running === null ? "" : element(
         "p.large",
         {},
-        `${nameWords(now.player)} – ${now.drill}: ${text("balls", { count: running, target: TARGET })} `,
+        `${nameWords(now.player)} – ${nameWords(now.drill)}: ${text("balls", { count: running, target: TARGET })} `,
         stop,
       ),
       element("p.note", {}, text("now_help")),

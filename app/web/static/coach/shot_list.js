@@ -21,6 +21,24 @@ import {
 
 export const NAMES = ["player", "wing", "stroke", "drill"];
 const COLUMNS = ["time", "player", "kind", "spin", "speed", "effect", "confidence"];
+// Names that are offered, and translated.
+const OUR_NAMES = [
+  "forehand",
+  "backhand",
+  "topspin",
+  "backspin",
+  "push",
+  "serve",
+  "smash",
+  "maximum topspin",
+  "backspin rally",
+  "serves",
+];
+const OFFERED = {
+  wing: ["forehand", "backhand"],
+  stroke: ["topspin", "push", "serve", "smash"],
+  drill: ["maximum topspin", "backspin rally", "serves"],
+};
 const CONFIDENCE = ["rough", "good", "sure"];
 /** @type {Record<string, (shot: CoachShot) => string | number | null>} */
 const SORT_BY = {
@@ -39,22 +57,38 @@ export const notSeen = (shot) => element("span.unseen", { title: shot.reason ?? 
 /** A name in the language, where it is one of ours. @param {string | null} name */
 export const nameWords = (name) => name === null ? "" : hasText(name) ? text(name) : name;
 
+/** A name as it is kept: ours by its key, in whatever language it was written. @param {string} words @returns {string | null} */
+export const nameCode = (words) => OUR_NAMES.find((key) => text(key) === words.trim()) ?? (words.trim() || null);
+
 /** Values of a name among shots, in alphabetical order. @param {CoachShot[]} shots @param {string} name @returns {string[]} */
 export const valuesOf = (shots, name) =>
   [...new Set(shots.map((shot) => /** @type {any} */ (shot)[name]).filter((value) => value !== null))].sort();
+
+/** What stands in the inputs of `nameInputs`. @param {any[]} inputs @returns {Record<string, string | null>} */
+export const namesIn = (inputs) =>
+  Object.fromEntries(
+    inputs.map((label) => label.querySelector("input")).map((input) => [input.name, nameCode(input.value)]),
+  );
 
 /** Inputs of the four names, with those in use as suggestions. @param {Shots} shots @param {Record<string, string | null>} values */
 export function nameInputs(shots, values) {
   return NAMES.map((name) => {
     const options = new Set(valuesOf(shots.list, name));
-    if (name === "wing") ["forehand", "backhand"].forEach((wing) => options.add(wing));
+    /** @type {Record<string, string[]>} */ (OFFERED)[name]?.forEach((value) => options.add(value));
     const id = `names-${name}-${Math.random().toString(36).slice(2)}`;
+    const input = element("input", {
+      name,
+      value: nameWords(values[name] ?? null),
+      maxLength: 80,
+      autocomplete: "off",
+    });
+    input.setAttribute("list", id);
     return element(
       "label.name",
       {},
       text(name),
-      element("input", { name, value: values[name] ?? "", maxLength: 80, autocomplete: "off", list: id }),
-      element("datalist", { id }, [...options].map((value) => element("option", { value }, nameWords(value)))),
+      input,
+      element("datalist", { id }, [...options].map((value) => element("option", { value: nameWords(value) }))),
     );
   });
 }
@@ -73,7 +107,7 @@ export class ShotFilter extends EventTarget {
       Object.entries(values).every(([name, value]) =>
         value === "" ||
         (name === "kind"
-          ? shot.kind.some((code) => code.split(" ").pop() === value) || (value === "not_seen" && !shot.kind.length)
+          ? (mainKind(shot) ?? "not_seen") === value
           : name === "day"
           ? dayOf(shot) === value
           : /** @type {any} */ (shot)[name] === value)
@@ -324,11 +358,7 @@ export class ShotList {
     );
     form.addEventListener("submit", (/** @type {Event} */ event) => {
       event.preventDefault();
-      const given = Object.fromEntries(
-        inputs.map((label) => label.querySelector("input")).filter((input) => input.value.trim()).map((
-          input,
-        ) => [input.name, input.value]),
-      );
+      const given = Object.fromEntries(Object.entries(namesIn(inputs)).filter(([, value]) => value !== null));
       attempt(() => this.shots.change(ids, given));
     });
     const remove = () =>

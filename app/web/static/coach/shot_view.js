@@ -5,7 +5,7 @@
 
 import { attempt, element } from "../elements.js";
 import { clock, componentBars, FlightDrawing, proofDiscs } from "./drawings.js";
-import { nameInputs, nameWords } from "./shot_list.js";
+import { nameCode, nameInputs, nameWords } from "./shot_list.js";
 import {
   capitalized,
   decimal,
@@ -159,7 +159,7 @@ export function numbers(shot) {
     ],
   ];
   if (kind !== null) {
-    rows.push([text("kind"), [term(kind), ...shot.kind.slice(1).map((code) => [" ", term(code.split(" ")[1])])]]);
+    rows.push([text("kind"), [term(kind), ...shot.kind.slice(1).flatMap((code) => [", ", term(code.split(" ")[1])])]]);
   }
   return element(
     "dl.numbers",
@@ -232,22 +232,22 @@ export class ShotView {
       picture.append(player.root);
     }
     const isNamed = shot.kind.length > 0 && shot.clock_hours !== null;
+    const card = (/** @type {string} */ key, /** @type {any[]} */ ...children) =>
+      element("div.card", {}, element("h3", {}, text(key)), children);
+    const parts = isNamed
+      ? card("components", element("div.parts", {}, componentBars(shot), clock(shot.clock_hours ?? 0)))
+      : "";
+    const proof = shot.spin_rps === null ? "" : card("proof", proofDiscs(detail.proof));
     this.root.replaceChildren(
       bar,
-      picture,
-      element("div.facts", {}, headline(shot), numbers(shot), this.#names(shot)),
-      isNamed
-        ? element(
-          "div.card.parts",
-          {},
-          element("h3", {}, text("components")),
-          componentBars(shot),
-          clock(shot.clock_hours ?? 0),
-        )
-        : "",
-      element("div.card", {}, element("h3", {}, text("flight")), flight.root),
-      shot.spin_rps === null ? "" : element("div.card", {}, element("h3", {}, text("proof")), proofDiscs(detail.proof)),
-      this.#bounce(shot) ?? "",
+      element("div.column", {}, picture, parts, proof),
+      element(
+        "div.column",
+        {},
+        element("div.facts", {}, headline(shot), numbers(shot), this.#names(shot)),
+        card("flight", flight.root),
+        this.#bounce(shot) ?? "",
+      ),
     );
     return this.root;
   }
@@ -269,7 +269,7 @@ export class ShotView {
     });
     const change = (/** @type {Event} */ event) => {
       const input = /** @type {HTMLInputElement} */ (event.target);
-      attempt(() => this.shots.change([shot.id], { [input.name]: input.value || null }));
+      attempt(() => this.shots.change([shot.id], { [input.name]: nameCode(input.value) }));
     };
     const star = element(
       "button.star",

@@ -77,7 +77,11 @@ export const speedWords = (m_s) =>
 
 /** The kind with what else is in it: "topspin with some right sidespin". @param {string[]} kind */
 export function kindWords(kind) {
-  return kind.map((code) => code.split(" ").map((part) => text(part)).join(" ")).join(" ");
+  const words = (/** @type {string} */ code) => code.split(" ").map((part) => text(part)).join(" ");
+  const [main, second, third] = kind;
+  if (!third) return [main, second].filter(Boolean).map(words).join(" ");
+  // "with some right corkscrew and topspin": the last two as one addition
+  return `${words(main)} ${words(second)} ${text("and")} ${text(third.split(" ")[1])}`;
 }
 
 /** Main component of a shot's kind; null where the spin is not seen. @param {CoachShot} shot */
@@ -91,9 +95,8 @@ export const capitalized = (shot) => {
 
 /** What is said of a shot's spin beside its number. @param {CoachShot} shot */
 export function toldBy(shot) {
-  if (shot.told_by === "flight") return term("from_flight");
-  if (shot.told_by === "rhythm") return term("from_rhythm");
-  return null;
+  const key = shot.told_by && shot.told_by !== "logo" ? `from_${shot.told_by}` : null;
+  return key && element("span.told", {}, term(key));
 }
 
 /** Time of day, or with the day. @param {CoachShot} shot */
