@@ -19,7 +19,7 @@ Bytes = NDArray[np.uint8]
 GROUND, WHITE, INK, AXIS = ((247, 248, 250), (252, 250, 244), (34, 48, 110), (214, 81, 8))  # RGB
 BALL_SHARE = 0.7  # of the picture's half side: the axis stands out of the ball
 AXIS_LENGTH, AXIS_WIDTH = 1.4, 0.045  # in ball radii
-FINER = 3  # pixels each way behind one of the picture
+FINER = 3
 PHASES = 36  # of a turn that are looked at for the one that shows most of the logo
 # From where the ball is looked at: behind the hitter, to the right and above, so that top, side and corkscrew can be
 # told apart. In right, up, forward of the hitter's frame.
@@ -48,7 +48,9 @@ def ink_of(detail: Mapping[str, Any]) -> Bytes | None:
     return ink
 
 
-def ball_picture(detail: Mapping[str, Any], side_px: int, t_us: float | None = None) -> Bytes | None:
+def ball_picture(
+    detail: Mapping[str, Any], side_px: int, t_us: float | None = None, finer: int = FINER
+) -> Bytes | None:
     """(side_px, side_px, 3) uint8 RGB picture at an instant, by default one that shows the logo; None without a spin.
 
     Parameters
@@ -57,11 +59,13 @@ def ball_picture(detail: Mapping[str, Any], side_px: int, t_us: float | None = N
         As `shot_detail` gives it.
     t_us : float, optional
         File time.
+    finer : int
+        Pixels each way that are painted behind one of the picture.
     """
     if detail["spin_rps"] is None:
         return None
     spin_rps, frame, ink = np.array(detail["spin_rps"]), view_frame(detail), ink_of(detail)
-    place = (np.arange(FINER * side_px) + 0.5) / (FINER * side_px) * 2 - 1
+    place = (np.arange(finer * side_px) + 0.5) / (finer * side_px) * 2 - 1
     x, y = np.meshgrid(place / BALL_SHARE, -place / BALL_SHARE)
     height = 1 - x * x - y * y
     inside = height > 0
@@ -80,7 +84,7 @@ def ball_picture(detail: Mapping[str, Any], side_px: int, t_us: float | None = N
     light = np.array([-0.35, 0.6, 0.72])  # from above, as in a hall
     picture[inside] = colour * (0.62 + 0.38 * np.clip(normals @ light, 0, 1))[:, None]
     _paint_axis(picture, frame @ spin_rps / np.linalg.norm(spin_rps), x, y, z, inside)
-    small: Bytes = picture.reshape(side_px, FINER, side_px, FINER, 3).mean(axis=(1, 3)).round().astype(np.uint8)
+    small: Bytes = picture.reshape(side_px, finer, side_px, finer, 3).mean(axis=(1, 3)).round().astype(np.uint8)
     return small
 
 

@@ -10,7 +10,8 @@ from spinscope.app.table_files import write_table
 from spinscope.pipeline.result_rows import ResultRow
 
 from .session import NAMES, ShotSession
-from .terms import clock_hours, confidence, corkscrew_share, mixture, spin_effect
+from .shot_words import kind_codes
+from .terms import clock_hours, confidence, corkscrew_share, spin_effect
 
 _NUMBERS = ("speed_m_s", "spin_rps", "spin_std_rps", "axis_std_deg", "topspin_rps", "sidespin_rps", "corkscrew_rps")
 _DERIVED = ("spin_effect", "corkscrew_share", "clock_hours")
@@ -47,9 +48,8 @@ def _rows(session: ShotSession) -> Iterator[ResultRow]:
         if spin is not None:
             row["confidence"] = confidence(spin, shot["spin_std_rps"], shot["axis_std_deg"])
             row["spin_effect"] = spin_effect(spin, speed) if speed else None
-            parts = {name: shot[name] for name in ("topspin_rps", "sidespin_rps", "corkscrew_rps")}
-            if None not in parts.values():
-                row["kind"] = ", ".join(mixture(parts, spin))
-                row["corkscrew_share"] = corkscrew_share(parts["corkscrew_rps"], spin)
-                row["clock_hours"] = clock_hours(parts["topspin_rps"], parts["sidespin_rps"])
+            row["kind"] = ", ".join(kind_codes(shot))
+            if shot["topspin_rps"] is not None:
+                row["corkscrew_share"] = corkscrew_share(shot["corkscrew_rps"], spin)
+                row["clock_hours"] = clock_hours(shot["topspin_rps"], shot["sidespin_rps"])
         yield row

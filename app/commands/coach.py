@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import click
 
 from spinscope.pipeline.session import Choices
 
+from ..terminal import note
 from .options import session_options
 
 
@@ -75,3 +77,66 @@ def open_page(
     if not sessions:
         sessions = [sample_session()]
     serve_coach(CoachState([*sessions, *other_sessions(sessions)], analyses), port, open_browser=not no_browser)
+
+
+def _words_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of language and units."""
+    for option in (
+        click.option("--language", type=click.Choice(["en", "de"]), default="en", show_default=True),
+        click.option("--spin-unit", type=click.Choice(["rps", "rpm"]), default="rps", show_default=True),
+        click.option("--speed-unit", type=click.Choice(["km_h", "m_s"]), default="km_h", show_default=True),
+    ):
+        command = option(command)
+    return command
+
+
+def _session(folder: Path | None) -> Any:
+    """The session in a folder, the sample without one."""
+    from ..coach.session import ShotSession
+    from ..coach.session_folders import sample_session
+
+    if folder is None:
+        return sample_session()
+    if not ShotSession.is_session(folder):
+        raise click.UsageError(f"{folder} is no session: `spinscope coach open` makes one of recordings")
+    return ShotSession(folder)
+
+
+@coach.command()
+@click.argument("session", required=False, type=click.Path(path_type=Path))
+@click.option("--html", type=click.Path(path_type=Path), metavar="OUT.html", help="One file that needs nothing else.")
+@click.option("--pdf", type=click.Path(path_type=Path), metavar="OUT.pdf", help="Needs `spinscope[report]`.")
+@click.option("--table", type=click.Path(path_type=Path), metavar="OUT.csv|.parquet|.jsonl", help="A row a shot.")
+@_words_options
+def report(session: Path | None, html: Path | None, pdf: Path | None, table: Path | None, **units: Any) -> None:
+    """Write a session's report or table; of the sample session without SESSION."""
+    from ..coach.report import write_report
+    from ..coach.session_table import write_session_table
+    from ..coach.shot_words import ShotWords
+
+    if not (html or pdf or table):
+        raise click.UsageError("say what to write: --html, --pdf or --table")
+    opened = _session(session)
+    for path in filter(None, (html, pdf)):
+        write_report(opened, path, ShotWords(**units))
+        note(f"wrote {path}")
+    if table:
+        write_session_table(opened, table)
+        note(f"wrote {table}")
+
+
+@coach.command()
+@click.argument("shot", type=int)
+@click.option(
+    "--session", "folder", type=click.Path(path_type=Path), help="Folder of the session; by default the sample."
+)
+@click.option("--out", required=True, type=click.Path(path_type=Path), metavar="OUT.mp4")
+@_words_options
+def video(shot: int, folder: Path | None, out: Path, **units: Any) -> None:
+    """Write the video of a shot, told by its `id` in the session's table; needs `spinscope[video]`."""
+    from ..coach.shot_words import ShotWords
+    from ..coach.video import write_video
+
+    row = _session(folder).shot(shot)
+    write_video(row, row["detail"], out, ShotWords(**units))
+    note(f"wrote {out}")

@@ -8,18 +8,22 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Annotated
 
-from fastapi import FastAPI, HTTPException, Response
+from fastapi import FastAPI, HTTPException, Query, Response
 from fastapi.responses import FileResponse, JSONResponse, StreamingResponse
 from fastapi.staticfiles import StaticFiles
 
 from spinscope.app.coach.flight_path import checked_pose, flight_path
+from spinscope.app.coach.report import report_html
 from spinscope.app.coach.session import NAMES, Row, ShotSession
 from spinscope.app.coach.session_analysis import AnalysisProgress, SessionAnalysis
 from spinscope.app.coach.session_table import write_session_table
+from spinscope.app.coach.shot_words import ShotWords, kind_codes
 from spinscope.app.coach.statistics import series_statistics
-from spinscope.app.coach.terms import clock_hours, confidence, corkscrew_share, effect_word, mixture, spin_effect
+from spinscope.app.coach.terms import clock_hours, confidence, corkscrew_share, effect_word, spin_effect
 from spinscope.app.coach.texts import texts
+from spinscope.app.coach.video import write_video
 
 from .coach_schemas import (
     AnalysisState,
@@ -33,6 +37,7 @@ from .coach_schemas import (
     ShotDetail,
     Statistics,
     StatisticsRequest,
+    WordsQuery,
 )
 from .error_answers import add_error_handlers
 from .security import SecurityMiddleware
@@ -188,6 +193,19 @@ def _add_exports(app: FastAPI, state: CoachState) -> None:
             write_session_table(state.session(session), path)
             return Response(path.read_bytes(), media_type="text/csv; charset=utf-8")
 
+    @app.get(SESSION + "report.html", include_in_schema=False)
+    def report(session: str, words: Annotated[WordsQuery, Query()]) -> Response:
+        page = report_html(state.session(session), ShotWords(**words.model_dump()))
+        return Response(page, media_type="text/html; charset=utf-8")
+
+    @app.get(SESSION + "shots/{shot_id}/video.mp4", include_in_schema=False)
+    def video(session: str, shot_id: int, words: Annotated[WordsQuery, Query()]) -> Response:
+        shot = state.session(session).shot(shot_id)
+        with TemporaryDirectory(prefix="spinscope-") as folder:
+            path = Path(folder) / "shot.mp4"
+            write_video(shot, shot["detail"], path, ShotWords(**words.model_dump()))
+            return Response(path.read_bytes(), media_type="video/mp4")
+
 
 def _add_name_routes(app: FastAPI, state: CoachState) -> None:
     @app.post(SESSION + "names")
@@ -212,19 +230,18 @@ def _add_name_routes(app: FastAPI, state: CoachState) -> None:
 def coach_shot(row: Row) -> CoachShot:
     """A row of a session in the terms of coaches."""
     spin, speed = row["spin_rps"], row["speed_m_s"]
-    parts = {name: row[name] for name in ("topspin_rps", "sidespin_rps", "corkscrew_rps")}
-    is_named = spin is not None and None not in parts.values()
+    is_named = spin is not None and row["topspin_rps"] is not None
     effect = spin_effect(spin, speed) if spin is not None and speed else None
     columns = {name: value for name, value in row.items() if name in CoachShot.model_fields}
     return CoachShot(
         **{**columns, "marked": bool(row["marked"]), "deleted": bool(row["deleted"])},
         has_picture=row["picture_file"] is not None,
-        kind=mixture(parts, spin) if is_named else [] if spin is None else ["in_place"],
+        kind=list(kind_codes(row)),
         effect=effect,
         effect_word=None if effect is None else effect_word(effect),
         confidence=None if spin is None else confidence(spin, row["spin_std_rps"], row["axis_std_deg"]),
-        clock_hours=clock_hours(parts["topspin_rps"], parts["sidespin_rps"]) if is_named else None,
-        corkscrew_share=corkscrew_share(parts["corkscrew_rps"], spin) if is_named else None,
+        clock_hours=clock_hours(row["topspin_rps"], row["sidespin_rps"]) if is_named else None,
+        corkscrew_share=corkscrew_share(row["corkscrew_rps"], spin) if is_named else None,
     )
 
 

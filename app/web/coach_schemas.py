@@ -42,6 +42,14 @@ class PoseRequest(Request):
     pose: dict[str, list[float] | list[list[float]]] | None
 
 
+class WordsQuery(Request):
+    """Language and units of what is downloaded."""
+
+    language: Literal["en", "de"] = "en"
+    spin_unit: Literal["rps", "rpm"] = "rps"
+    speed_unit: Literal["km_h", "m_s"] = "km_h"
+
+
 class CoachShot(Response):
     """One shot of a session: its columns, and what follows from them."""
 

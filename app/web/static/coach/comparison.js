@@ -7,7 +7,7 @@
 import { element } from "../elements.js";
 import { legendMark, spreadChart, trendChart } from "./charts.js";
 import { nameWords, ShotFilter } from "./shot_list.js";
-import { dayOf, mainKind, speedWords, spinWords, term, text } from "./texts.js";
+import { dayOf, mainKind, speedWords, spinWords, term, text, wordsQuery } from "./texts.js";
 
 const GROUPINGS = ["player", "kind", "wing", "stroke", "drill", "day"];
 const FEWEST = 3; // shots of a group that is called the most constant or the strongest
@@ -72,7 +72,7 @@ export class Comparison {
     const bar = this.filter.bar(this.shots.list);
     bar.prepend(element("label.name", {}, text("by"), by));
     const report = element("a.button", {
-      href: this.shots.path(`report.html?language=${document.documentElement.lang}`),
+      href: this.shots.path(`report.html?${wordsQuery()}`),
       target: "_blank",
     }, text("download_report"));
     bar.append(report);

@@ -3,11 +3,12 @@
 /** @import { CoachShot, ShotDetail } from "../messages.d.ts" */
 /** @import { Shots } from "./shots.js" */
 
-import { attempt, element } from "../elements.js";
+import { attempt, download, element, notice } from "../elements.js";
 import { clock, componentBars, FlightDrawing, proofDiscs } from "./drawings.js";
 import { nameCode, nameInputs, nameWords } from "./shot_list.js";
 import {
   capitalized,
+  chosen,
   decimal,
   kindWords,
   mainKind,
@@ -18,8 +19,8 @@ import {
   text,
   timeWords,
   toldBy,
+  wordsQuery,
 } from "./texts.js";
-import { chosen } from "./texts.js";
 import { SlowMotion, TurningBall } from "./turning_ball.js";
 
 const SLOWNESS = [10, 30, 100, 300, 1000];
@@ -215,10 +216,9 @@ export class ShotView {
       element("h2", {}, `${text("shot", { number: place + 1 })} ${text("of", { count: order.length })}`),
       step(1, "next", "→"),
       element("span.note", {}, `${timeWords(shot, true)} ${nameWords(shot.player)}`),
-      shot.spin_rps === null ? "" : element("a.button", {
-        href: this.shots.path(`shots/${id}/video.mp4?language=${chosen.language}`),
-        download: `shot-${id}.mp4`,
-      }, text("download_video")),
+      shot.spin_rps === null
+        ? ""
+        : element("button", { onclick: () => attempt(() => this.#video(id)) }, text("download_video")),
     );
     const picture = element("div.stage");
     if (shot.spin_rps === null) {
@@ -292,6 +292,18 @@ export class ShotView {
     this.go(next === undefined ? "shots" : `shot/${next}`);
   }
 
+  /** @param {number} id */
+  async #video(id) {
+    const note = notice(text("video_soon"), "info", 0);
+    try {
+      const response = await fetch(this.shots.path(`shots/${id}/video.mp4?${wordsQuery()}`));
+      if (!response.ok) throw new Error((await response.json()).error);
+      download(`shot-${id}.mp4`, await response.arrayBuffer(), "video/mp4");
+    } finally {
+      note.remove();
+    }
+  }
+
   /** Before and after a bounce side by side. @param {CoachShot} shot */
   #bounce(shot) {
     const before = this.shots.neighbour(shot, true), after = this.shots.neighbour(shot, false);
@@ -310,7 +322,7 @@ export class ShotView {
       "div.card",
       {},
       element("h3", {}, text("bounce")),
-      element("div.two", {}, side(first, "before_bounce"), side(second, "after_bounce")),
+      element("div.two.bounce", {}, side(first, "before_bounce"), side(second, "after_bounce")),
     );
   }
 

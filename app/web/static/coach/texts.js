@@ -99,6 +99,9 @@ export function toldBy(shot) {
   return key && element("span.told", {}, term(key));
 }
 
+/** Language and units, for what the server writes. */
+export const wordsQuery = () => `language=${chosen.language}&spin_unit=${chosen.spin}&speed_unit=${chosen.speed}`;
+
 /** Time of day, or with the day. @param {CoachShot} shot */
 export const timeWords = (shot, withDay = false) =>
   new Date(1000 * shot.recorded_s).toLocaleString(
