@@ -15,6 +15,7 @@ from .commands.convert import convert
 from .commands.evaluate import evaluate
 from .commands.info import info
 from .commands.options import join_fixed_ball
+from .commands.settings import settings
 from .commands.simulate import simulate
 from .commands.tune import tune
 from .commands.view import view
@@ -39,7 +40,7 @@ def cli(context: click.Context) -> None:
         serve(DEFAULT_SAMPLE, Choices(), None, open_browser=True)
 
 
-for _command in (info, analyze, view, coach, convert, tune, simulate, evaluate):
+for _command in (info, analyze, view, coach, convert, tune, settings, simulate, evaluate):
     cli.add_command(_command)
 
 

@@ -114,9 +114,17 @@ def analyze(
 ) -> None:
     """Find the shots of recordings (files, folders, patterns) and estimate their spin.
 
-    A shot is one free flight of one ball: a bounce or a hit ends it and begins another. In the table * marks the
-    estimate that the program itself trusts, +- is 1 sigma, axes are in the camera frame. A recording without a flight
+    A shot is one free flight of one ball: a bounce or a hit ends it and begins another. A recording without a flight
     in which a ball turns in place is taken as one of a ball spinner, and it is said.
+
+    In the table * marks the one estimate that the program itself trusts (`best` in JSON). An estimate without * may be
+    right, but the program has no evidence for it; where no line has one, the line below them says why.
+
+    +- is 1 sigma, the standard deviation that the method states for its own estimate: 68 % of the errors of the
+    magnitude are expected within it. For the axis it is an angle in degrees, over both directions across the axis.
+
+    The axis is a unit vector in the camera frame (x right, y down, z into the scene) about which the ball turns by the
+    right-hand rule; rps are revolutions per second. `spinscope settings` lists what --set can change.
     """
     if output is not None and output != "-":
         check_writable(Path(output), "JSON")
