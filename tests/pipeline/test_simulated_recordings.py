@@ -157,7 +157,7 @@ def test_nonsense_gets_one_line_and_no_file(tmp_path: Path, kind: str, options: 
 
 def test_places_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "folder.h5").mkdir()
-    for name in ("no/such/folder.h5", "folder.h5", "suffix.txt"):
+    for name in ("no/such/folder.h5", "folder.h5", "suffix.mp4"):
         with pytest.raises(RecordingError, match="give another"):
             simulate_to_file("spinner", tmp_path / name, **SMALL)
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from spinscope.pipeline.recordings import open_recording
+from spinscope.pipeline.recordings import ReadingOptions, open_recording
 from spinscope.pipeline.recordings.formats.prophesee_dat import DatReader
 from spinscope.pipeline.recordings.reader import ReadPass
 from tests.reference.recordings import NaiveDecoded, naive_dat
@@ -53,7 +53,7 @@ def test_dat_is_decoded_as_by_its_twin_however_it_is_cut(
     path = tmp_path_factory.getbasetemp() / "twin.dat"
     write_dat(path, np.array(words, np.uint32).reshape(-1, 2))
     reading, out = ReadPass(max_events), NaiveDecoded()
-    for c in DatReader(path).columns(reading):
+    for c in DatReader(path, ReadingOptions()).columns(reading):
         out.events += zip(c.t_us.tolist(), c.x.tolist(), c.y.tolist(), c.on.tolist(), strict=True)
     out.time_jumps, out.outside = reading.damage.time_jumps, reading.damage.outside_events
     assert out == naive_dat(words)
