@@ -10,7 +10,8 @@ import numpy as np
 
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.recordings import FORMATS, Triggers, write_recording
-from tests.reference.recordings import ecf_block, write_evt2
+from tests.pipeline.recordings.test_recordings_rosbag import packets, store, write_bag
+from tests.reference.recordings import columns, ecf_block, write_aedat4, write_event_stream, write_evt2
 
 WIDTH_PX, HEIGHT_PX = 320, 240
 
@@ -36,14 +37,6 @@ def write_evt21(path: Path, events: EventBatch) -> None:
     path.write_bytes(header.encode() + np.array(words, "<u4").tobytes())
 
 
-def write_dat(path: Path, events: EventBatch) -> None:
-    """DAT of CD events."""
-    pixel = events.x_px.astype("<u4") | events.y_px.astype("<u4") << 14 | events.on.astype("<u4") << 28
-    words = np.stack([(events.t_us & 0xFFFFFFFF).astype("<u4"), pixel], axis=1)
-    header = f"% Data file containing CD events.\n% Version 2\n% Height {HEIGHT_PX}\n% Width {WIDTH_PX}\n"
-    path.write_bytes(header.encode() + bytes((12, 8)) + words.tobytes())
-
-
 def write_ecf(path: Path, events: EventBatch) -> None:
     """Prophesee's HDF5 with its own compression."""
     kind = np.dtype([("x", "<u2"), ("y", "<u2"), ("p", "<i2"), ("t", "<i8")])
@@ -60,13 +53,41 @@ def write_ecf(path: Path, events: EventBatch) -> None:
         file.attrs["geometry"] = f"{WIDTH_PX}x{HEIGHT_PX}"
 
 
+def write_mono(path: Path, events: EventBatch) -> None:
+    """Bag of `event_camera_msgs` packets of 100 events."""
+    payloads = []
+    for first in range(0, len(events), 100):
+        part = events[first : first + 100]
+        base_us = int(part.t_us[0])
+        words = [int(on) << 63 | y << 48 | x << 32 | (t - base_us) * 1000 for t, x, y, on in columns(part)]
+        payloads.append((base_us * 1000, np.array(words, "<u8").tobytes()))
+    kind = path.suffix[1:]
+    folder = path.with_name(f"made_{kind}")
+    folder.mkdir()
+    write_bag(folder, kind, {"/camera": packets(store(kind), kind, "mono", payloads)}).rename(path)
+
+
+def write_rows(path: Path, events: EventBatch) -> None:
+    """Array of x, y, t, p in N rows."""
+    np.save(path, np.stack([events.x_px, events.y_px, events.t_us, events.on], axis=1).astype(np.int64))
+
+
+def write_stream(path: Path, events: EventBatch) -> None:
+    """Event Stream, of an ATIS where the name says so."""
+    size = {"width_px": WIDTH_PX, "height_px": HEIGHT_PX}
+    write_event_stream(path, columns(events), **size, is_atis="atis" in path.name)
+
+
 # Encodings beside the one that `write_recording` writes, by the format's name.
 ENCODINGS: dict[str, dict[str, Callable[[Path, EventBatch], None]]] = {
     "prophesee_raw": {
         "evt2.raw": lambda path, events: write_evt2(path, events, width_px=WIDTH_PX, height_px=HEIGHT_PX),
         "evt21.raw": write_evt21,
     },
-    "prophesee_dat": {"cd.dat": write_dat},
+    "aedat": {"plain.aedat4": lambda path, events: write_aedat4(path, columns(events), WIDTH_PX, HEIGHT_PX)},
+    "event_stream": {"dvs.es": write_stream, "atis.es": write_stream},
+    "npy": {"rows.npy": write_rows},
+    "rosbag": {"a.bag": write_mono, "a.db3": write_mono, "a.mcap": write_mono},
     "hdf5": {"ecf.h5": write_ecf},
 }
 

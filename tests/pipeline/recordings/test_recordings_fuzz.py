@@ -155,11 +155,11 @@ def scramble(data: bytearray, start: int, rng: Random) -> None:
 
 # Most events lost to a flipped bit and to a block of 512 random bytes; what EVT2 and DAT hold in a block is 128 and 64
 # events. EVT3 has the time in words of their own: up to the next one (4 ms, 25 events) the old time holds.
-MOST_LOST = {"written.raw": (60, 170), "evt2.raw": (5, 140), "evt21.raw": (5, 75), "cd.dat": (1, 65)}
+MOST_LOST = {"written.raw": (60, 170), "evt2.raw": (5, 140), "evt21.raw": (5, 75), "written.dat": (1, 65)}
 
 
 @pytest.mark.parametrize("damage", [flip_one, scramble])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ["prophesee_raw", "prophesee_dat"])
 def test_events_before_and_after_the_damage_are_kept(
     tmp_path: Path, name: str, damage: Callable[[bytearray, int, Random], None]
 ) -> None:
@@ -170,8 +170,8 @@ def test_events_before_and_after_the_damage_are_kept(
     events = some_events(3000)
     own = set(zip(*(column.tolist() for column in events.columns), strict=True))
     for path in sound_files(tmp_path, name, events):
-        if open_recording(path)._reader.strict_order:
-            continue  # a table of columns: what is damaged is refused
+        if path.name not in MOST_LOST:
+            continue  # a table of columns, or packets: what is damaged is refused, or read up to there
         sound = path.read_bytes()
         start = max(sound.rfind(b"% end\n") + 6, sound.rfind(b"\x0c\x08", 0, 200) + 2) + 1024
         rng = np.random.default_rng(8)
