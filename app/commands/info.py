@@ -3,33 +3,114 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any, Literal
 
 import click
 from rich.table import Table
 
+from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.recordings import ReadingOptions, RecordingInfo, open_recording, summary
 from spinscope.pipeline.session import Progress
 
 from ..terminal import ProgressBar, console
 from .options import RECORDING, reading_options, write_text
 
+# Of the table, with their alignment.
+TABLE_HEADINGS: dict[str, Literal["left", "right"]] = {
+    "recording": "left",
+    "format": "left",
+    "sensor, px": "left",
+    "events": "right",
+    "s": "right",
+    "Mev/s": "right",
+    "triggers": "right",
+    "damage": "right",
+}
 SHOWN = 60  # characters of an attribute; a simulation's scene is a page long
 
 
 @click.command()
-@click.argument("recording", type=RECORDING)
+@click.argument("recordings", type=RECORDING, nargs=-1, required=True)
 @reading_options
 @click.option("--json", "output", type=click.Path(), help="Write JSON to this file, - for standard output.")
-def info(recording: Path, reading: ReadingOptions, output: str | None) -> None:
-    """Say what a recording holds: format, sensor, events, duration, rates, hot pixels, triggers, damage."""
-    with ProgressBar() as bar:
-        found = information(recording, reading, bar)
-    if output:
-        write_text(output, json.dumps(found.as_dict(), allow_nan=False) + "\n")
+def info(recordings: tuple[Path, ...], reading: ReadingOptions, output: str | None) -> None:
+    """Say what a recording holds: format, sensor, events, duration, rates, hot pixels, triggers, damage.
+
+    Of several recordings, or of those in a folder, print a table with one line each.
+    """
+    found: list[RecordingInfo | UnreadableRecording] = []
+    if len(recordings) == 1 and not recordings[0].is_dir():
+        with ProgressBar() as bar:
+            found.append(information(recordings[0], reading, bar))
     else:
-        print_information(found)
+        from ..batch import recordings_in  # loads all that analyzing needs
+
+        found += informations(recordings_in(recordings), reading)
+    if output:
+        write_text(output, "".join(json.dumps(one.as_dict(), allow_nan=False) + "\n" for one in found))
+    elif len(found) == 1 and isinstance(found[0], RecordingInfo):
+        print_information(found[0])
+    else:
+        print_table(found)
+    if any(isinstance(one, UnreadableRecording) for one in found):
+        sys.exit(2)
+
+
+@dataclass(frozen=True, slots=True)
+class UnreadableRecording:
+    """A file that could not be read, and why."""
+
+    path: Path
+    error: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """Names and values ready for JSON."""
+        return {"path": str(self.path), "error": self.error}
+
+
+def informations(paths: Sequence[Path], reading: ReadingOptions) -> Iterator[RecordingInfo | UnreadableRecording]:
+    """Yield the summaries of recordings, with those that cannot be read in their places."""
+    for path in paths:
+        try:
+            with ProgressBar() as bar:
+                yield information(path, reading, bar)
+        except RecordingError as error:
+            yield UnreadableRecording(path, str(error).removesuffix(f": {path}"))
+
+
+def print_table(found: Sequence[RecordingInfo | UnreadableRecording]) -> None:
+    """Print one line a recording, not folded where the output is no terminal; then what is wrong with them."""
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    for heading, justify in TABLE_HEADINGS.items():
+        table.add_column(heading, justify=justify, no_wrap=True)
+    for one in found:
+        if isinstance(one, UnreadableRecording):
+            table.add_row(str(one.path), "unreadable")
+            continue
+        rate = "" if one.mean_rate_hz is None else f"{one.mean_rate_hz / 1e6:.3f}"
+        damage = sum(one.damage.values())
+        table.add_row(
+            str(one.path),
+            one.format,
+            f"{one.width_px} x {one.height_px}",
+            f"{one.events:,}",
+            f"{one.duration_us / 1e6:.3f}",
+            rate,
+            f"{one.triggers:,}",
+            f"{damage:,}" if damage else "",
+        )
+    screen = console()
+    screen.print(table, soft_wrap=True)
+    for one in found:
+        if isinstance(one, UnreadableRecording):
+            screen.print(f"error: {one.path}: {one.error}", style="red", highlight=False, soft_wrap=True)
+            continue
+        for warning in one.warnings:
+            screen.print(f"warning: {one.path}: {warning}", style="yellow", highlight=False, soft_wrap=True)
 
 
 def information(path: Path, reading: ReadingOptions, on_progress: Progress) -> RecordingInfo:

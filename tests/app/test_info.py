@@ -9,6 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from spinscope.pipeline.recordings import write_recording
+from tests.pipeline.recordings.test_recordings_raw import moving_edge
+
 
 def spinscope(*arguments: object) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "spinscope", *map(str, arguments)]
@@ -39,3 +42,20 @@ def test_the_table_for_people_has_the_same(samples: Path) -> None:
 def test_a_file_that_is_no_recording_is_one_line(samples: Path) -> None:
     done = spinscope("info", samples / "README.md")
     assert done.returncode == 2 and done.stdout == "" and done.stderr.count("\n") == 1
+
+
+def test_a_folder_is_a_table_with_one_line_a_recording(tmp_path: Path) -> None:
+    for name, events in (("a.raw", 300), ("sub/b.csv", 200)):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        write_recording(tmp_path / name, moving_edge(events), width_px=1280, height_px=720)
+    (tmp_path / "c.npz").write_bytes(b"no zip at all")
+    (tmp_path / "notes.txt").write_text("nothing", encoding="utf-8")
+    done = spinscope("info", tmp_path, "--sensor", "1280x720")
+    lines = done.stdout.splitlines()
+    assert done.returncode == 2 and done.stderr == ""
+    assert lines[0].split()[:2] == ["recording", "format"] and len(lines) == 5
+    for line, words in zip(lines[1:], (["EVT3 RAW", "300"], ["unreadable"], ["text", "200"], []), strict=True):
+        assert all(word in line for word in words)
+    assert lines[4].startswith(f"error: {tmp_path / 'c.npz'}: file named .npz is no NPZ")
+    found = [json.loads(line) for line in spinscope("info", tmp_path, "--json", "-").stdout.splitlines()]
+    assert [one.get("events") for one in found] == [300, None, 200] and "error" in found[1]
