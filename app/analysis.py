@@ -7,6 +7,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.flight_calibration import estimate_with_measured_up
 from spinscope.pipeline.session import Choices, Progress, Result, Session
@@ -24,8 +26,27 @@ def analyzed_session(session: Session, method: str = "all", on_progress: Progres
     """The shots of an open recording, or its ball on a spinner where there is no flight.
 
     Where no shot is trusted, and neither the user nor a sidecar fixed the ball, a ball that turns in place is looked
-    for. It counts only if its spin is trusted, and a warning says so.
+    for. It counts only if its spin is trusted, and a warning says so, as one says a focal length that is only assumed.
     """
+    result = _flights_or_turning_ball(session, method, on_progress)
+    if result.shots and not session.states_focal_length:
+        result.session.warnings.append(_assumed_focal_length(result))
+    return result
+
+
+def _assumed_focal_length(result: Result) -> str:
+    """Warning about the focal length, with the distance of the ball that follows, by which people check it."""
+    camera, session = result.session.parameters.camera, result.session
+    places_m = [shot.positions_m(session.camera, session.ball_radius_m) for shot in result.shots]
+    distance_m = float(np.median(np.linalg.norm(np.concatenate(places_m), axis=1)))
+    return (
+        f"nothing states the focal length: {camera.focal_length_mm:g} mm with pixels of {camera.pixel_um:g} um are "
+        f"assumed, by which the ball is {distance_m:.2f} m away; if that is wrong, state --set "
+        "camera.focal_length_mm=MM and --set camera.pixel_um=UM"
+    )
+
+
+def _flights_or_turning_ball(session: Session, method: str, on_progress: Progress | None) -> Result:
     result = estimate_with_measured_up(session, method, on_progress)
     if session.parameters.track.ball == "fixed" or any(shot.best for shot in result.shots):
         return result

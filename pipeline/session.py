@@ -82,7 +82,7 @@ class Choices:
 class Session:
     """An open recording, its events of the window, the parameters, and the chain that runs over them.
 
-    `states_up` is whether the recording or the user gives camera.up.
+    `states_up` and `states_focal_length` are whether the recording or the user gives these values of the camera.
     The events of a long recording stay on disk and are read when they are needed.
     """
 
@@ -94,6 +94,7 @@ class Session:
     read_seconds: float = 0.0
     sidecar: Sidecar = Sidecar()
     states_up: bool = False
+    states_focal_length: bool = False
 
     @classmethod
     def open(
@@ -113,9 +114,23 @@ class Session:
         sidecar = Sidecar.beside(recording.path) if isinstance(recording, Recording) else Sidecar()
         parameters = _with_attributes(parameters, {**recording.attributes, **sidecar.parameters}, choices)
         warnings += recording.warnings
-        states_up = "camera.up" in {**recording.attributes, **sidecar.parameters}
-        states_up |= parameters.camera.up != CameraParameters().up or "camera.up" in _assigned(choices)
-        session = cls(recording, source, parameters, _timed(source), warnings, read_seconds, sidecar, states_up)
+        stated = {*recording.attributes, *sidecar.parameters, *_assigned(choices)}
+
+        def states(name: str) -> bool:
+            differs = getattr(parameters.camera, name) != getattr(CameraParameters(), name)
+            return differs or f"camera.{name}" in stated
+
+        session = cls(
+            recording=recording,
+            source=source,
+            parameters=parameters,
+            chain=_timed(source),
+            warnings=warnings,
+            read_seconds=read_seconds,
+            sidecar=sidecar,
+            states_up=states("up"),
+            states_focal_length=states("focal_length_mm"),
+        )
         session.place_fixed_ball(choices.fixed_ball or sidecar.fixed_ball)
         return session
 

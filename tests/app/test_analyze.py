@@ -21,6 +21,7 @@ from spinscope.app.cli import cli
 from spinscope.app.commands.analyze import AnalyzedRecording, print_shots
 from spinscope.pipeline import calibrate_flights
 from spinscope.pipeline.flight_calibration import estimate_with_measured_up
+from spinscope.pipeline.recordings import open_recording, write_recording
 from spinscope.pipeline.result_rows import shot_rows
 from spinscope.pipeline.session import Choices, Session
 from spinscope.pipeline.stages.logo import LogoParameters
@@ -73,6 +74,23 @@ def test_track_and_speed_are_the_truths(reports: dict[str, dict[str, Any]], samp
     assert error.mean() <= 0.3
     assert np.abs(track["radius_px"] - true_r)[whole].mean() <= 0.5
     assert shot["speed_m_s"] == pytest.approx(np.linalg.norm(velocity, axis=1).mean(), rel=0.05)
+
+
+def test_an_assumed_focal_length_is_said_with_the_distance(
+    reports: dict[str, dict[str, Any]], samples: Path, tmp_path: Path
+) -> None:
+    (warning,) = (one for one in reports["flight_fast_top"]["warnings"] if "focal length" in one)
+    found = re.search(r"8 mm with pixels of 4.86 um are assumed, by which the ball is (.*) m away", warning)
+    with h5py.File(samples / "flight_fast_top.h5") as file:
+        distance_m = np.median(np.linalg.norm(file["truth/position_m"][:], axis=1))
+    assert found and float(found[1]) == pytest.approx(distance_m, abs=0.05)
+    events = open_recording(samples / "spinner_ball1_top.h5").read()
+    stated: dict[str, str | float] = {"camera.focal_length_mm": 8.0}
+    write_recording(tmp_path / "stated.raw", events, width_px=1280, height_px=720, attributes=stated)
+    write_recording(tmp_path / "plain.raw", events, width_px=1280, height_px=720)
+    assert Session.open(tmp_path / "stated.raw").states_focal_length
+    assert Session.open(tmp_path / "plain.raw", Choices(assignments=["camera.focal_length_mm=8"])).states_focal_length
+    assert not Session.open(tmp_path / "plain.raw").states_focal_length
 
 
 def test_a_trusted_answer_is_right_and_a_hidden_logo_is_refused(
