@@ -422,8 +422,8 @@ RECORDINGS = [
     ),
     Mutant(
         "pipeline/recordings/formats/prophesee_raw/evt2.py",
-        "(word >> 22) & LOW_MASK)\n            mask",
-        "(word >> 22) & 0xF)\n            mask",
+        "(word >> TIME_SHIFT) & LOW_MASK)\n            mask",
+        "(word >> TIME_SHIFT) & 0xF)\n            mask",
         RAW,
     ),
     Mutant(
@@ -476,8 +476,8 @@ RECORDINGS = [
     ),
     Mutant(
         "pipeline/recordings/column_types.py",
-        "~(on | (p == 0) | (p == -1))",
-        "~(on | (p == 0))",
+        "(p == 1) | (p == 0) | (p == -1)",
+        "(p == 1) | (p == 0)",
         "tests/pipeline/recordings/test_recordings_columns.py",
     ),
     Mutant(
@@ -681,8 +681,8 @@ COMMANDS = [
     ),
     Mutant(
         "app/commands/options.py",
-        "if window and window[0] >= window[1]:",
-        "if window and window[0] > window[1]:",
+        "if value and value[0] >= value[1]:",
+        "if value and value[0] > value[1]:",
         "tests/app/test_analyze.py -k wrong_input",
     ),
     Mutant(
@@ -693,8 +693,8 @@ COMMANDS = [
     ),
     Mutant(
         "app/commands/info.py",
-        "found = information(recording, reading, bar)",
-        "found = information(recording, ReadingOptions(), bar)",
+        "information(recordings[0], reading, bar)",
+        "information(recordings[0], ReadingOptions(), bar)",
         "tests/app/test_info.py",
     ),
 ]
