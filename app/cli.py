@@ -19,7 +19,7 @@ from .commands.settings import settings
 from .commands.simulate import simulate
 from .commands.tune import tune
 from .commands.view import view
-from .terminal import announce_compilation, note
+from .terminal import FULL_DISK, announce_compilation, drop_output, exit_on_signals, note, prepare_streams
 
 
 @click.group(
@@ -46,9 +46,12 @@ for _command in (info, analyze, view, coach, convert, tune, settings, simulate, 
 
 def main() -> None:
     """Run the command line; our errors and click's become one line on standard error and exit status 2."""
+    prepare_streams()
+    exit_on_signals()
     announce_compilation()
     try:
         cli.main(join_fixed_ball(sys.argv[1:]), prog_name="spinscope", standalone_mode=False)
+        sys.stdout.flush()
     except SpinscopeError as error:
         message = str(error)
     except click.exceptions.Exit as error:
@@ -63,6 +66,11 @@ def main() -> None:
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(0)
+    except OSError as error:
+        if error.errno not in FULL_DISK:
+            raise
+        drop_output()
+        message = f"the output cannot be written ({error.strerror}): check free space"
     else:
         return
     note(f"spinscope: {message}")

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
 import time
+import warnings
+from errno import EDQUOT, EFBIG, EIO, ENOSPC
 from types import TracebackType
 
 from rich.console import Console
@@ -11,11 +15,37 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 UNFOLDED_COLUMNS = 1000  # wider than any table
 PATIENCE_S = 1.0  # work that ends sooner shows no bar
+FULL_DISK = (ENOSPC, EDQUOT, EFBIG, EIO)  # errors of writing that are the disk's
 
 
 def note(text: str) -> None:
     """Print one line on standard error."""
     print(text, file=sys.stderr, flush=True)
+
+
+def prepare_streams() -> None:
+    """Let letters that the output's code page lacks appear as escapes, and warnings as one line."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+    warnings.showwarning = lambda message, *_: note(f"warning: {message}")
+
+
+def exit_on_signals() -> None:
+    """End as on an error when the system asks the program to: half-written files are removed."""
+
+    def end(number: int, _: object) -> None:
+        sys.exit(128 + number)
+
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), end)
+
+
+def drop_output() -> None:
+    """Send what is still to be printed nowhere, as Python complains at its end about what it cannot write."""
+    with open(os.devnull, "wb") as nowhere:
+        os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
 def console() -> Console:

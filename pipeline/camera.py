@@ -10,9 +10,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from .compilation import njit
 from .errors import ParameterError
 from .parameters import ParameterGroup, tunable
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import secrets
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from errno import EFBIG, EINVAL
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from .errors import RecordingError
 
@@ -20,7 +22,7 @@ def atomic_file(path: str | Path, what: str = "file") -> Iterator[Path]:
     ----------
     path : str or Path
         File to create or to replace. A symbolic link is kept, and the file that it points to replaced. A device or a
-        pipe (`/dev/stdout`) cannot be replaced: the block writes to it directly.
+        pipe (`/dev/stdout`) cannot be replaced: what the block wrote is copied to it.
     what : str
         Noun that the message begins with, like "recording" or "JSON".
 
@@ -37,8 +39,12 @@ def atomic_file(path: str | Path, what: str = "file") -> Iterator[Path]:
     path = Path(path)
     part: Path | None = None
     try:
-        if path.exists() and not path.is_file() and not path.is_dir():
-            yield path
+        if _is_device(path):
+            with TemporaryDirectory() as folder:
+                content = Path(folder) / "content"
+                yield content
+                with open(content, "rb") as source, open(path, "ab") as device:
+                    shutil.copyfileobj(source, device)
             return
         check_writable(path, what)
         target = Path(os.path.realpath(path))
@@ -57,6 +63,12 @@ def atomic_file(path: str | Path, what: str = "file") -> Iterator[Path]:
             part.unlink(missing_ok=True)
 
 
+def _is_device(path: Path) -> bool:
+    """Whether a path is a device or a pipe, or standard output where that is a file."""
+    there = os.path.exists(path) and not os.path.isdir(path)  # unlike Path's, these raise nothing
+    return there and (not os.path.isfile(path) or path.is_relative_to("/dev"))
+
+
 def file_bytes(path: Path, most_bytes: int) -> bytes:
     """Content of an ordinary file; raises OSError, with its reason in words, for devices, pipes and larger files."""
     if path.exists() and not path.is_file():
@@ -71,12 +83,26 @@ def file_bytes(path: Path, most_bytes: int) -> bytes:
 def check_writable(path: Path, what: str = "file") -> None:
     """Raise RecordingError when `path` cannot be written, for callers that have long work to do before."""
     folder = Path(os.path.realpath(path)).parent
-    if path.is_dir():
+    impossible = _impossible(path)
+    if impossible:
+        why = impossible
+    elif path.is_dir():
         why = "it is a folder"
     elif not folder.is_dir():
         why = "its folder does not exist"
-    elif not os.access(folder, os.W_OK) and not (path.exists() and not path.is_file()):
+    elif not os.access(folder, os.W_OK) and not _is_device(path):
         why = "its folder may not be written to"
     else:
         return
     raise RecordingError(f"{what} cannot be written, {why}: give another name: {path}")
+
+
+def _impossible(path: Path) -> str:
+    """Reason in words why the system takes no such name, like one of 300 characters; empty when it does."""
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError, PermissionError):
+        return ""
+    except OSError as error:
+        return error.strerror or str(error)
+    return ""

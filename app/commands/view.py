@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.files import check_writable
 from spinscope.pipeline.session import Choices, Session
 
 from ..terminal import ProgressBar, note
@@ -53,7 +54,9 @@ def view(recording: Path, save: Path | None, native: bool, layout: str, followed
         return
     from .. import viewer
 
-    if not save:
+    if save:
+        check_writable(save, ".rrd file")
+    else:
         viewer.require_display()
     with ProgressBar() as bar:
         session = Session.open(recording, choices, bar)

@@ -22,6 +22,20 @@ from rerun.chunk import Chunk as Chunk  # for the stages
 
 from .entities import APPLICATION, TIMELINE, Colour
 
+# Settings of the user's own programs: they switch logging off, send it elsewhere, or cut it otherwise.
+LOGGING_VARIABLES = ("RERUN", "_RERUN_TEST_FORCE_SAVE", "RERUN_STRICT")
+LOGGING_PREFIXES = ("RERUN_CHUNK_", "RERUN_FLUSH_")
+
+
+def _leave_logging_variables_out() -> None:
+    """Forget variables that change what this process logs; Rerun reads them with each recording stream."""
+    for name in list(os.environ):
+        if name in LOGGING_VARIABLES or name.startswith(LOGGING_PREFIXES):
+            del os.environ[name]
+
+
+_leave_logging_variables_out()
+
 
 class _NoPandas:
     """Finder of modules that finds no pandas."""
@@ -151,17 +165,19 @@ def states(entity: str, t_us: NDArray[Any], names: Sequence[str], colours: dict[
     return [columns_at(entity, np.asarray(t_us)[changed], columns), once(entity, style)]
 
 
-def file_with(chunks: Iterable[Chunk], blueprint: rrb.Blueprint, path: Path, name: str) -> None:
-    """Write an .rrd file with a blueprint in it, which becomes the active one when the file is opened.
+def file_content(chunks: Iterable[Chunk], blueprint: rrb.Blueprint, name: str) -> bytes:
+    """Bytes of an .rrd file with a blueprint in it, which becomes the active one when the file is opened.
 
-    Each recording stream leaves a few idle threads behind: fine for a file a run, not for one a slider's move.
+    Rerun itself writes files in the background and tells nobody when the disk is full. Each recording stream leaves a
+    few idle threads behind: fine for a file a run, not for one a slider's move.
     """
     recording = rr.RecordingStream(APPLICATION, recording_id=str(uuid.uuid4()))
-    recording.save(path)
+    content = rr.binary_stream(recording)
     try:
         recording.send_blueprint(blueprint, make_active=True, make_default=True)
         recording.send_recording_name(name)
         rr.send_chunks(list(chunks), recording=recording)
+        return content.read() or b""
     finally:
         recording.disconnect()
 

@@ -12,17 +12,16 @@ from spinscope.pipeline.files import atomic_file
 
 from . import entities as at
 from .drawers import run_chunks
-from .rerun_api import Chunk, file_with
+from .rerun_api import Chunk, file_content
 from .run import ViewedRun
 from .views import VIEWS, blueprint
 
 
 def write_rrd(run: ViewedRun, path: Path, layout: str) -> None:
     """Write the run and its views, whole or not at all; raises RecordingError when that fails."""
-    made = run_chunks(run)
+    content = file_content(run_chunks(run), blueprint(run, layout), run.name)
     with atomic_file(path, ".rrd file") as part:
-        part.touch()  # Rerun's own message for a path that cannot be written is no help
-        file_with(made, blueprint(run, layout), part, run.name)
+        part.write_bytes(content)
 
 
 def rrd_bytes(chunks: Sequence[Chunk], recording_id: str) -> bytes:

@@ -11,11 +11,11 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from ..camera import Camera
+from ..compilation import njit
 from ..kernels.rotation import axis_and_length, rotations
 from ..simulator.logos import Logo, Texture, texture
 from .frame_albedo import SurfaceAlbedo, surface_albedos

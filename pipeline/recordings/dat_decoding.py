@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ..compilation import njit
 from .reader import MAX_DISORDER_US
 from .sensor import MAX_SIDE_PX
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import RecordingError
 from ..events import EventBatch
-from ..files import atomic_file
+from ..files import atomic_file, check_writable
 from ..results import Truth
 from .formats.registry import RecordingContent, RecordingFormat, encoding_to_write, format_to_write
 from .opening import open_recording
@@ -113,9 +113,10 @@ def convert(
         What the source holds and the target does not, in sentences.
     """
     source, target = Path(source), Path(target)
-    format, encoding = format_to_write(target), encoding_to_write(target, encoding)  # fail before the source is read
+    format, encoding = format_to_write(target), encoding_to_write(target, encoding)
+    check_writable(target, "recording")  # all three fail before the source is read
     recording = open_recording(source, **asdict(options))
-    if target.exists() and os.path.samefile(source, target):
+    if os.path.exists(target) and os.path.samefile(source, target):
         raise RecordingError(f"a recording cannot be converted onto itself: give another name: {target}")
     read_share = 0.0  # share of the progress before the batches are read
 

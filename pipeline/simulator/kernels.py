@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ..compilation import njit
 from . import kernels_pixel as pixel
 from .kernels_light import EVERY, Bodies, Floats, Physics, light
 from .kernels_pixel import NOBODY, Ints, Maps, Pixels

@@ -6,8 +6,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ..compilation import njit
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]

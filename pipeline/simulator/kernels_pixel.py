@@ -9,9 +9,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ..compilation import njit
 from .kernels_light import Physics
 
 Floats = NDArray[np.float64]

@@ -89,6 +89,39 @@ def test_a_pipe_is_written_through(tmp_path: Path) -> None:
     assert read == ["text"] and path.is_fifo() and list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
+def test_a_full_device_is_an_error_and_stays_a_device(tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to("/dev/full")
+    with pytest.raises(RecordingError, match="No space left on device"), atomic_file(tmp_path / "link") as part:
+        part.write_text("text", encoding="ascii")
+    assert (tmp_path / "link").is_char_device() and list(tmp_path.iterdir()) == [tmp_path / "link"]
+
+
+def test_a_name_that_the_system_does_not_take_is_refused_before_the_work(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="^file cannot be written, File name too long"):
+        check_writable(tmp_path / ("x" * 300))
+
+
+def test_half_a_file_is_removed_when_the_system_ends_the_program(tmp_path: Path) -> None:
+    script = """
+import sys, time
+from pathlib import Path
+from spinscope.app.terminal import exit_on_signals
+from spinscope.pipeline.files import atomic_file
+exit_on_signals()
+with atomic_file(Path(sys.argv[1])) as part:
+    part.write_text("half", encoding="ascii")
+    print("writing", flush=True)
+    time.sleep(60)
+"""
+    command = [sys.executable, "-c", script, str(tmp_path / "a")]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None and process.stdout.readline() == "writing\n"
+    process.terminate()
+    process.communicate(timeout=30)
+    assert process.returncode == 143 and not list(tmp_path.iterdir())
+
+
 @pytest.mark.skipif(not Path("/dev/stdout").exists(), reason="no /dev/stdout on this system")
 @pytest.mark.parametrize("output", ["-", "/dev/stdout"])
 def test_json_goes_to_standard_output(samples: Path, output: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import subprocess
 import sys
 import uuid
@@ -208,11 +209,35 @@ def test_a_failed_write_leaves_the_old_file_and_no_litter(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("spinscope.app.viewer.rrd.file_with", full)
+    monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(RecordingError, match=r"No space left on device.*free space"):
         write_rrd(flight, path, "all")
     assert [file.name for file in tmp_path.iterdir()] == ["run.rrd"]
     assert path.read_bytes() == b"precious"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
+def test_a_full_disk_is_told_at_once(no_ball: ViewedRun, tmp_path: Path) -> None:
+    """Rerun's own writer tells nobody, or waits for ever."""
+    (tmp_path / "run.rrd").symlink_to("/dev/full")
+    with pytest.raises(RecordingError, match="No space left on device"):
+        write_rrd(no_ball, tmp_path / "run.rrd", "all")
+    assert (tmp_path / "run.rrd").readlink() == Path("/dev/full")
+
+
+def test_rerun_switched_off_by_its_variables_still_writes(samples: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run.rrd"
+    command = ["view", str(samples / "spinner_ball5_back_no_logo.h5"), "--window", "0", "30000", "--save", str(out)]
+    variables = {"RERUN": "off", "_RERUN_TEST_FORCE_SAVE": str(tmp_path / "other.rrd"), "RERUN_STRICT": "1"}
+    done = subprocess.run(
+        [sys.executable, "-m", "spinscope", *command, "--fixed-ball", "606.67", "302.79", "16.47"],
+        env={**os.environ, **variables},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert out.stat().st_size > 100_000 and not (tmp_path / "other.rrd").exists()
 
 
 def test_a_folder_that_is_not_there_is_named(no_ball: ViewedRun, tmp_path: Path) -> None:

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ....compilation import njit
 from ....errors import RecordingError
 from ....isolation import without_time_limit
 

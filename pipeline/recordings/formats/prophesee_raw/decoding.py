@@ -11,8 +11,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ....compilation import njit
 
 # Indices of `Decoded.state`.
 HIGH = 0  # TIME_HIGH with the wraps counted in; -1 before the first

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ....compilation import njit
 from . import decoding
 from .decoding import MAX_COORDINATE, TIME_HIGH, Decoded, take_time_high
 

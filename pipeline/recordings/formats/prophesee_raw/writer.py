@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ....compilation import njit
 from ....errors import RecordingError
 from ....events import EventBatch
 from ...reader import Triggers
