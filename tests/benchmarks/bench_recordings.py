@@ -2,7 +2,8 @@
 
     pytest tests/benchmarks/bench_recordings.py --benchmark-only -s
 
-Every test prints its own figure and the ratio to what it is compared with, measured in the same run.
+Every test prints its own figure and the ratio to what it is compared with, measured in the same run. The libraries are
+installed with `uv run --group rivals pytest ...`; those that are not are left out.
 """
 
 from __future__ import annotations
@@ -90,10 +91,42 @@ def test_npz_against_numpy(benchmark: Any, tmp_path: Path) -> None:
     say("NPZ read", best_seconds(recording.read), "numpy.load alone", best_seconds(plain))
 
 
+def write_dat(path: Path, events: EventBatch, *, width_px: int, height_px: int) -> None:
+    """Prophesee DAT, which Spinscope only reads."""
+    pixel = events.x_px.astype("<u4") | events.y_px.astype("<u4") << 14 | events.on.astype("<u4") << 28
+    header = f"% Data file\n% Version 2\n% Height {height_px}\n% Width {width_px}\n".encode()
+    path.write_bytes(header + bytes((12, 8)) + np.stack([events.t_us.astype("<u4"), pixel], axis=1).tobytes())
+
+
+def faery_read(path: Path, encoding: str) -> int:
+    return len(pytest.importorskip("faery").events_stream_from_file(path).to_array())
+
+
+def evutils_read(path: Path, encoding: str) -> int:
+    io = pytest.importorskip("evutils.io")
+    with io.EventReader(str(path), mode="all", max_events=1 << 40, index=False) as reader:
+        return len(reader.read())
+
+
+def expelliarmus_read(path: Path, encoding: str) -> int:
+    return len(pytest.importorskip("expelliarmus").Wizard(encoding=encoding.lower()).read(str(path)))
+
+
+@pytest.mark.parametrize("rival", [faery_read, evutils_read, expelliarmus_read])
+@pytest.mark.parametrize("format", ["EVT3", "EVT2", "DAT"])
+def test_reading_against_other_libraries(tmp_path: Path, format: str, rival: Callable[[Path, str], int]) -> None:
+    write = {"EVT3": write_recording, "EVT2": write_evt2, "DAT": write_dat}[format]
+    path = tmp_path / ("a.dat" if format == "DAT" else "a.raw")
+    write(path, scene(EVENTS), width_px=1280, height_px=720)
+    assert rival(path, format) == EVENTS
+    own_seconds = best_seconds(lambda: open_recording(path).read(), 7)
+    say(f"{format} read", own_seconds, rival.__name__, best_seconds(lambda: rival(path, format), 7))
+
+
 def test_summary_against_reading_alone(benchmark: Any, tmp_path: Path) -> None:
     path = tmp_path / "a.raw"
     write_recording(path, scene(EVENTS), width_px=1280, height_px=720)
     recording = open_recording(path)
     recording.scan()
     benchmark.pedantic(lambda: summary(recording), rounds=3)
-    say("summary of EVT3", best_seconds(lambda: summary(recording)), "a scan", best_seconds(recording.scan))
+    say("summary of EVT3", best_seconds(lambda: summary(recording)), "reading", best_seconds(recording.read))
