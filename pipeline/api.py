@@ -10,7 +10,7 @@ import numpy as np
 
 from .errors import ParameterError
 from .events import EventBatch
-from .flight_calibration import FlightCalibration, flight_calibration
+from .flight_calibration import FlightCalibration, estimate_with_measured_up, flight_calibration
 from .recordings import ReadingOptions
 from .recordings.in_memory import RecordingInMemory
 from .registry import Parameters
@@ -39,8 +39,9 @@ def estimate(
         memory (then `sensor_px` says how large the sensor is).
     parameters : Parameters, mapping or sequence of str, optional
         All parameters, or changes to the preset: `{"logo": {"pad_px": 3.0}}`, `{"logo.pad_px": 3.0}` or
-        `["logo.pad_px=3"]`. What the recording states of its camera is taken unless it is changed here; `Parameters`
-        are taken as they are.
+        `["logo.pad_px=3"]`. What the recording states of its camera is taken unless it is changed here; where nobody
+        states `camera.up` and the balls do not fall against it, it is taken from how they fall, and
+        `result.session.warnings` says so with its error. `Parameters` are taken as they are.
     preset : str or Path, optional
         `default`, `paper`, or a TOML file of [group] tables.
     method : str
@@ -74,6 +75,20 @@ def estimate(
     >>> result.shots[0].estimates["contrast"].vector_rps  # doctest: +SKIP
     """
     check_method(method)
+    session = _session(recording, parameters, preset, window_us, fixed_ball, sensor_px, on_progress)
+    return estimate_with_measured_up(session, method, on_progress)
+
+
+def _session(
+    recording: AnyRecording | SimulatedRecording | EventBatch | str | Path,
+    parameters: Parameters | Mapping[str, Any] | Sequence[str] | None = None,
+    preset: str | Path | None = None,
+    window_us: tuple[int, int] | None = None,
+    fixed_ball: tuple[float, float, float] | str | None = None,
+    sensor_px: tuple[int, int] | None = None,
+    on_progress: Progress | None = None,
+) -> Session:
+    """An open session, see `estimate`."""
     if isinstance(parameters, Parameters) and preset is not None:
         raise ParameterError("parameters are given as a whole and as a preset: give one of them")
     assignments = () if isinstance(parameters, Parameters) else tuple(_assignments(parameters))
@@ -89,9 +104,9 @@ def estimate(
     choices = Choices(preset, assignments, window_us, None, ReadingOptions(sensor=sensor_px))
     session = Session.open(recording, choices, on_progress)
     if isinstance(parameters, Parameters):
-        session.parameters = parameters
+        session.parameters, session.states_up = parameters, True
     session.place_fixed_ball(fixed_ball)
-    return session.estimate(method, on_progress)
+    return session
 
 
 def calibrate_flights(
@@ -106,7 +121,7 @@ def calibrate_flights(
     recordings : iterable
         Recordings of one set-up with shots whose logo is seen well; others do no harm.
     parameters, **options
-        As `estimate` takes them.
+        As `estimate` takes them, but for the method.
 
     Returns
     -------
@@ -125,7 +140,7 @@ def calibrate_flights(
     >>> calibration = calibrate_flights(["top.raw", "back.raw", "side.raw"])  # doctest: +SKIP
     >>> estimate("side.raw", calibration.values).shots[0].estimates["trajectory"]  # doctest: +SKIP
     """
-    return flight_calibration(estimate(recording, parameters, **options) for recording in recordings)
+    return flight_calibration(_session(recording, parameters, **options).estimate() for recording in recordings)
 
 
 def _in_memory(events: EventBatch, sensor_px: tuple[int, int] | None) -> RecordingInMemory:

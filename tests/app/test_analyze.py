@@ -19,7 +19,7 @@ from click.testing import CliRunner
 
 from spinscope.app.cli import cli
 from spinscope.app.commands.analyze import AnalyzedRecording, print_shots
-from spinscope.pipeline import calibrate_flights
+from spinscope.pipeline import calibrate_flights, estimate
 from spinscope.pipeline.flight_calibration import estimate_with_measured_up
 from spinscope.pipeline.recordings import open_recording, write_recording
 from spinscope.pipeline.result_rows import shot_rows
@@ -297,9 +297,14 @@ def test_up_that_nobody_states_is_taken_from_how_the_balls_fall(samples: Path, t
     session = Session.open(sample)
     assert not session.states_up
     session.parameters = session.parameters.with_values({"camera": {"up": (0.0, -0.6, -0.8)}})
+    parameters = session.parameters
     result = estimate_with_measured_up(session)
     assert session.parameters.camera.up == pytest.approx((0, 0, -1), abs=0.1)
     assert 0.0 < session.parameters.trajectory.plumb_std_deg < 10.0
     assert result.session is session and result.shots[0].estimates["trajectory"].status == "ok"
     (warning,) = (one for one in session.warnings if "camera.up" in one)
     assert "not given" in warning and "+-" in warning
+    as_it_is = estimate(sample, parameters)
+    assert as_it_is.session.parameters.camera.up == (0.0, -0.6, -0.8), "whole parameters are taken as they are"
+    (warning,) = (one for one in as_it_is.session.warnings if "camera.up" in one)
+    assert "--set camera.up=" in warning
