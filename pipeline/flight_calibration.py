@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -132,11 +132,16 @@ class MeasuredUp:
 
 
 def estimate_with_measured_up(session: Session, method: str = "all", on_progress: Progress | None = None) -> Result:
-    """Estimate the spin of every shot, with camera.up from the flights where nobody states it and they contradict it.
+    """Estimate the spin of every shot, see `with_measured_up`."""
+    return with_measured_up(session, lambda: session.estimate(method, on_progress))
+
+
+def with_measured_up(session: Session, estimated: Callable[[], Result]) -> Result:
+    """What `estimated` gives, with camera.up from the flights where nobody states it and they contradict it.
 
     The session's warnings say so, as where a stated direction is contradicted, which stands.
     """
-    result = session.estimate(method, on_progress)
+    result = estimated()
     measured = measured_up(result)
     if measured is None:
         return result
@@ -144,7 +149,7 @@ def estimate_with_measured_up(session: Session, method: str = "all", on_progress
     if session.states_up:
         return result
     session.parameters = session.parameters.with_values(measured.values)
-    return session.estimate(method, on_progress)
+    return estimated()
 
 
 def measured_up(result: Result) -> MeasuredUp | None:

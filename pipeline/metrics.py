@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .chain import Tick
+from .flight_calibration import measured_up
 from .results import SpinEstimate
 from .session import Result, Session
 from .shots import Shot
@@ -89,6 +90,8 @@ class RunMetrics:
         1 sigma of the noise of the measured centres along one axis, from their second differences.
     logo_events : int
         Logo events of all shots.
+    up_doubt : str or None
+        In which direction the balls fall, where that is not the one of camera.up.
     """
 
     ticks: int
@@ -98,11 +101,12 @@ class RunMetrics:
     logo_events: int = _metric("Logo events")
     shots: list[ShotMetrics]
     no_shot_reason: str | None
+    up_doubt: str | None
 
     @classmethod
     def of(cls, result: Result) -> RunMetrics:
         """Metrics of a result with all its ticks, of which the track and the logo are needed."""
-        session, ticks = result.session, result.ticks
+        session, ticks, up = result.session, result.ticks, measured_up(result)
         return cls(
             ticks=len(ticks),
             tracked_share=sum(tick.track.measured is not None for tick in ticks) / max(len(ticks), 1),
@@ -111,6 +115,7 @@ class RunMetrics:
             logo_events=sum(len(tick.logo.events) for tick in ticks),
             shots=[_shot(session, shot) for shot in result.shots],
             no_shot_reason=result.no_shot_reason,
+            up_doubt=None if up is None else up.warning(is_stated=True),
         )
 
     @property

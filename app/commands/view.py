@@ -8,6 +8,7 @@ import click
 
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.files import check_writable
+from spinscope.pipeline.flight_calibration import with_measured_up
 from spinscope.pipeline.session import Choices, Session
 
 from ..terminal import ProgressBar, note
@@ -61,7 +62,7 @@ def view(recording: Path, save: Path | None, native: bool, layout: str, followed
     with ProgressBar() as bar:
         session = Session.open(recording, choices, bar)
         session = session.clip_for_viewing(bar)
-        result = session.estimate_keeping_ticks(bar)
+        result = with_measured_up(session, lambda: session.estimate_keeping_ticks(bar))
         if followed is not None and followed > len(result.shots):
             raise ParameterError(f"--shot {followed}: there are {len(result.shots)} shots, numbered from 1")
         for warning in session.warnings:

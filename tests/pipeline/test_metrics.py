@@ -44,6 +44,15 @@ def test_metrics_agree_with_the_ticks_and_the_truth(samples: Path) -> None:
     assert estimate.error_share == pytest.approx(gap / size, rel=0.02)
 
 
+def test_flights_that_fall_otherwise_are_a_doubt(samples: Path) -> None:
+    for up, is_doubted in (((0.0, 0.0, -1.0), False), ((0.0, -0.6, -0.8), True)):
+        session = Session.open(samples / "own" / "shot_slow_top.h5")
+        session.parameters = session.parameters.with_values({"camera": {"up": up}})
+        doubt = RunMetrics.of(session.estimate_keeping_ticks()).up_doubt
+        assert (doubt is not None) == is_doubted
+        assert doubt is None or "do not fall against camera.up = 0,-0.6,-0.8" in doubt
+
+
 def test_the_coach_is_told_in_one_sentence() -> None:
     up, forward = (0.0, 0.0, -1.0), np.array([8.9, 0.0, 0.0])
     spin = 54.0 * np.array([0.0, -np.cos(np.radians(12)), np.sin(np.radians(12))])

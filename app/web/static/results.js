@@ -31,6 +31,9 @@ export class Results extends EventTarget {
     for (const reason of new Set(both.map((one) => mainShot(one)?.best_reason).filter(Boolean))) {
       parts.push(element("p.note", {}, `No spin is trusted: ${reason}`));
     }
+    for (const doubt of new Set(both.map((one) => one.up_doubt).filter(Boolean))) {
+      parts.push(element("p.note", {}, `Warning: ${doubt}`));
+    }
     this.parent.replaceChildren(...parts);
     this.sentence = mainShot(metrics)?.sentence ?? null;
     this.dispatchEvent(new CustomEvent("shown"));

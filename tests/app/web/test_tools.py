@@ -127,6 +127,7 @@ def metrics_with(best: str | None, estimate: EstimateMetrics | None) -> RunMetri
         logo_events=5,
         shots=[shot],
         no_shot_reason=None,
+        up_doubt=None,
     )
 
 
