@@ -11,6 +11,7 @@ from spinscope.pipeline.session import DEFAULT_SAMPLE, Choices
 
 from .commands.analyze import analyze
 from .commands.coach import coach
+from .commands.calibrate import calibrate
 from .commands.convert import convert
 from .commands.evaluate import evaluate
 from .commands.info import info
@@ -40,7 +41,7 @@ def cli(context: click.Context) -> None:
         serve(DEFAULT_SAMPLE, Choices(), None, open_browser=True)
 
 
-for _command in (info, analyze, view, coach, convert, tune, settings, simulate, evaluate):
+for _command in (info, analyze, view, coach, convert, tune, settings, simulate, evaluate, calibrate):
     cli.add_command(_command)
 
 

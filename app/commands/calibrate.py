@@ -1,0 +1,98 @@
+"""`spinscope calibrate`: the camera by a board or a ball, and the table's pose."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..terminal import ProgressBar, note
+from .options import RECORDING, FixedBall, sensor_option
+
+
+class BoardSize(click.ParamType[tuple[int, int]]):
+    """COLUMNSxROWS of inner corners."""
+
+    name = "COLUMNSxROWS"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        """Value of the option; fails with what is allowed."""
+        columns, _, rows = str(value).lower().partition("x")
+        if not (columns.isdecimal() and rows.isdecimal()):
+            self.fail(f"{value!r} is not a board: write its inner corners as COLUMNSxROWS, like 9x6", param, ctx)
+        return int(columns), int(rows)
+
+
+@click.group()
+def calibrate() -> None:
+    """Calibrate the camera, and the table's pose."""
+
+
+@calibrate.command()
+@click.argument("recordings", nargs=-1, required=True, type=RECORDING, metavar="FILE...")
+@click.option("--board", type=BoardSize(), help="Inner corners of the blinking board, like 9x6.")
+@click.option("--square-mm", type=float, help="Side of the board's squares on the screen, in mm.")
+@click.option("--pattern", type=click.Choice(["chessboard", "charuco"]), default="chessboard", show_default=True)
+@click.option("--ball-distance-m", type=float, help="Instead of a board: distance from lens to a ball, in m.")
+@click.option("--ball-mm", type=float, default=40.0, show_default=True, help="Diameter of that ball.")
+@click.option("--fixed-ball", type=FixedBall(), default="auto", show_default=True, help="Circle of that ball.")
+@click.option("--pixel-um", type=float, default=4.86, show_default=True, help="Pitch of the pixels.")
+@click.option("--out", type=click.Path(path_type=Path), required=True, metavar="FILE.toml", help="Preset to write.")
+@sensor_option
+def camera(
+    recordings: tuple[Path, ...],
+    board: tuple[int, int] | None,
+    square_mm: float | None,
+    pattern: str,
+    ball_distance_m: float | None,
+    ball_mm: float,
+    fixed_ball: tuple[float, float, float] | str,
+    pixel_um: float,
+    out: Path,
+    sensor: tuple[int, int] | None,
+) -> None:
+    """Find focal length, principal point and distortion from recordings of a blinking board.
+
+    Show a chessboard with a white margin on a screen that blinks (white squares on and off, a few times a second), and
+    move and tilt it between the flashes, into the image's corners, too. FILE.toml goes with --preset; its [camera]
+    table is also a sidecar's. A picture of the coverage is written beside it. With --ball-distance-m the focal length
+    alone is found, from one recording of a ball on a spinner.
+    """
+    from .. import calibration as running
+
+    if (board is None) == (ball_distance_m is None):
+        raise click.UsageError("give --board COLUMNSxROWS with --square-mm, or --ball-distance-m")
+    with ProgressBar() as bar:
+        if ball_distance_m is not None:
+            if len(recordings) != 1:
+                raise click.UsageError("a ball is measured in one recording: give one FILE")
+            said = running.calibrate_by_ball(recordings[0], ball_distance_m, ball_mm, fixed_ball, pixel_um, sensor, out)
+        else:
+            assert board is not None
+            if square_mm is None:
+                raise click.UsageError("how large are the board's squares? give --square-mm")
+            said = running.calibrate_by_board(recordings, board, square_mm, pattern, pixel_um, sensor, out, bar)
+    for line in said:
+        note(line)
+
+
+@calibrate.command()
+@click.option(
+    "--corners",
+    type=float,
+    nargs=8,
+    required=True,
+    metavar="X1 Y1 X2 Y2 X3 Y3 X4 Y4",
+    help="The table's corners in the image, in order round it, px.",
+)
+@click.option("--camera", "preset", required=True, metavar="FILE.toml", help="The calibrated camera.")
+@click.option("--size", type=BoardSize(), default="1280x720", show_default=True, help="Sensor, in px.")
+@click.option("--out", type=click.Path(path_type=Path), required=True, metavar="FILE.toml", help="Preset to write.")
+def table(corners: tuple[float, ...], preset: str, size: tuple[int, int], out: Path) -> None:
+    """Find the direction up (camera.up) from the table's four corners, and write it with the camera."""
+    from .. import calibration as running
+
+    pairs = list(zip(corners[::2], corners[1::2], strict=True))
+    for line in running.calibrate_table(pairs, preset, size, out):
+        note(line)

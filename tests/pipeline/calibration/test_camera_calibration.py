@@ -1,0 +1,169 @@
+"""Calibration of a camera: a simulated blinking board, a ball and the table's corners tell what was simulated."""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from spinscope.app.calibration import calibrate_by_ball, calibrate_by_board, calibrate_table
+from spinscope.app.cli import cli
+from spinscope.pipeline.calibration.board import Board, BoardView, board_views
+from spinscope.pipeline.calibration.camera_calibration import calibrate_camera, focal_length_px
+from spinscope.pipeline.calibration.table_pose import table_pose
+from spinscope.pipeline.camera import Camera, CameraParameters
+from spinscope.pipeline.errors import ParameterError, RecordingError
+from spinscope.pipeline.kernels.rotation import rotations
+from spinscope.pipeline.presets import preset
+from spinscope.pipeline.recordings import write_recording
+from spinscope.pipeline.recordings.in_memory import RecordingInMemory
+from spinscope.pipeline.session import Choices, Session
+from spinscope.pipeline.simulated_recordings import simulate_to_file
+from spinscope.pipeline.simulator.board import SimulatedBoard, drawn_poses, simulate_board
+from spinscope.pipeline.simulator.sensor import SensorModel
+
+SIZE = 640, 360
+BOARD = Board(9, 6, 20.0)
+TRUE = Camera.of(
+    CameraParameters(
+        focal_length_mm=4.0, principal_x_px=326.5, principal_y_px=175.5, distortion=(-0.12, 0.08, 0.0008, -0.0005, 0.0)
+    ),
+    *SIZE,
+)
+ONE_EVENT = SensorModel(threshold_on=0.6, threshold_off=0.6, refractory_us=20_000.0)  # a pixel a flash: a coarse image
+
+
+def simulated(poses: int, seed: int) -> SimulatedBoard:
+    return simulate_board(drawn_poses(poses, camera=TRUE, seed=seed), camera=TRUE, sensor=ONE_EVENT, seed=seed)
+
+
+@pytest.fixture(scope="module")
+def made() -> SimulatedBoard:
+    return simulated(14, 77_002)
+
+
+def distortion_px(camera: Camera, rays: np.ndarray) -> np.ndarray:
+    return camera.project(rays) - dataclasses.replace(camera, distortion=(0.0,) * 5).project(rays)
+
+
+def corner_error_px(camera: Camera) -> float:
+    """Largest error of the distortion in the image's corners."""
+    rays = TRUE.rays(*np.array([(0, 0), (639, 0), (0, 359), (639, 359)], float).T)
+    return float(np.linalg.norm(distortion_px(camera, rays) - distortion_px(TRUE, rays), axis=1).max())
+
+
+def test_a_blinking_board_tells_the_camera(made: SimulatedBoard, tmp_path: Path) -> None:
+    write_recording(tmp_path / "board.raw", made.events, width_px=SIZE[0], height_px=SIZE[1])
+    (tmp_path / "none.raw").write_bytes(b"% evt 3.0\n% end\n")
+    files = [tmp_path / "board.raw", tmp_path / "none.raw"]
+    said = calibrate_by_board(files, (9, 6), 20.0, "chessboard", 4.86, SIZE, tmp_path / "camera.toml")
+    assert said[0].startswith("left out:") and "none.raw" in said[0] and "reprojection error" in said[-2]
+    assert (tmp_path / "camera.png").read_bytes().startswith(b"\x89PNG")
+    camera = Camera.of(preset(tmp_path / "camera.toml").camera, *SIZE)
+    assert camera.focal_px == pytest.approx(TRUE.focal_px, rel=0.006)
+    assert corner_error_px(camera) < 0.6  # of 14 views; see below
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [77_006, 77_007, 77_008])
+def test_forty_views_tell_focal_length_and_distortion_well(seed: int) -> None:
+    made = simulated(40, seed)
+    found = calibrate_camera(board_views(RecordingInMemory(made.events, *SIZE), BOARD), BOARD, SIZE)
+    assert found.camera.focal_px == pytest.approx(TRUE.focal_px, rel=0.003)
+    assert corner_error_px(found.camera) < 0.3
+
+
+def test_corners_are_found_to_a_tenth_of_a_pixel(made: SimulatedBoard) -> None:
+    first = made.events.between(0, 360_000)
+    views = board_views(RecordingInMemory(first, *SIZE), BOARD)
+    assert len(views) >= 3
+    for view in views:
+        true = made.corners_px[round((view.t_us - 50_000) / 100_000)]
+        either_way = [np.linalg.norm(view.corners_px - corners, axis=1) for corners in (true, true[::-1])]
+        assert np.sqrt(np.mean(np.square(min(either_way, key=np.max)))) < 0.15
+
+
+def views_of(poses: int, middle: tuple[float, float], board: Board = BOARD) -> list[BoardView]:
+    """Exact views round a place of the image."""
+    random = np.random.default_rng(77_003)
+    views = []
+    for number in range(poses):
+        turn = rotations(0.5 * random.uniform(-1, 1, 3))[0]
+        place = TRUE.rays(*np.array(middle)[:, None])[0] * random.uniform(0.5, 0.7)
+        points = (board.corners_mm - board.corners_mm.mean(axis=0)) * 1e-3 @ turn.T + place
+        views.append(BoardView(number, np.arange(54), TRUE.project(points)))
+    return views
+
+
+def test_uncovered_corners_and_wrong_views_are_said() -> None:
+    found = calibrate_camera(views_of(12, (320, 180)), BOARD, SIZE)
+    assert found.camera.focal_px == pytest.approx(TRUE.focal_px, rel=1e-4) and found.reprojection_px < 0.01
+    assert "top left, top right, bottom left, bottom right" in found.warnings[0]
+    views = views_of(12, (320, 180))
+    views[3].corners_px[:] += 3 * np.random.default_rng(77_004).standard_normal((54, 2))
+    found = calibrate_camera(views, BOARD, SIZE)
+    assert found.left_out == 1 and found.camera.focal_px == pytest.approx(TRUE.focal_px, rel=1e-4)
+    with pytest.raises(RecordingError, match="seen in 4 different places: 5 or more"):
+        calibrate_camera(views[:4], BOARD, SIZE)
+
+
+def test_a_board_never_seen_is_said(made: SimulatedBoard) -> None:
+    one = RecordingInMemory(made.events.between(0, 100_000), *SIZE)
+    with pytest.raises(RecordingError, match=r"board of 8x5 inner corners .* is seen in none of 1 flashes"):
+        board_views(one, Board(8, 5, 20.0))
+    noise = RecordingInMemory(made.events.between(0, 40_000), *SIZE)
+    with pytest.raises(RecordingError, match="nothing flashes"):
+        board_views(noise, BOARD)
+    with pytest.raises(ParameterError, match="3 to 100"):
+        Board(2, 6, 20.0)
+
+
+def test_focal_length_by_a_ball(tmp_path: Path) -> None:
+    for place in ((0.0, 0.0, 1.7), (0.3, -0.2, 1.2)):
+        circle = tuple(float(value[0]) for value in TRUE.silhouette(np.array([place]), 0.02))
+        unknown = dataclasses.replace(TRUE, focal_px=1234.0)
+        distance_m = float(np.linalg.norm(place))
+        assert focal_length_px(circle, distance_m, 0.02, unknown) == pytest.approx(TRUE.focal_px, rel=1e-6)  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match="tells no focal length"):
+        focal_length_px((320.0, 180.0, 20.0), 0.01, 0.02, TRUE)
+    simulate_to_file("spinner", tmp_path / "ball.h5", seed=77_005, focal_length_mm=12.0)
+    session = Session.open(tmp_path / "ball.h5", Choices())
+    truth = session.truth
+    assert truth is not None
+    circle = float(truth.x_px[0]), float(truth.y_px[0]), float(truth.radius_px[0])
+    distance_m = float(np.linalg.norm(truth.position_m[0]))
+    calibrate_by_ball(tmp_path / "ball.h5", distance_m, 40.0, circle, 4.86, None, tmp_path / "camera.toml")
+    assert tomllib.loads((tmp_path / "camera.toml").read_text())["camera"]["focal_length_mm"] == pytest.approx(12.0)
+
+
+@pytest.mark.parametrize("seed", range(77_010, 77_014))
+def test_table_pose(seed: int, tmp_path: Path) -> None:
+    random = np.random.default_rng(seed)
+    turn = rotations(random.uniform(-0.4, 0.4, 3))[0]
+    table_m = np.array([(-1.37, -0.7625, 0), (1.37, -0.7625, 0), (1.37, 0.7625, 0), (-1.37, 0.7625, 0)])
+    place = np.array([0.1, -0.05, 4.0])
+    corners = np.roll(TRUE.project(table_m @ turn.T + place), random.integers(4), axis=0)[:: random.choice([-1, 1])]
+    pose = table_pose([tuple(corner) for corner in corners], TRUE)
+    assert pose.up == pytest.approx(-turn[:, 2], abs=1e-4) and pose.middle_m == pytest.approx(place, abs=1e-3)
+    assert pose.height_m == pytest.approx(abs(place @ turn[:, 2]), abs=1e-3)
+    with pytest.raises(ParameterError, match="in order round the table"):
+        table_pose([tuple(corner) for corner in corners[[0, 2, 1, 3]]], TRUE)
+    (tmp_path / "lens.toml").write_text("[camera]\nfocal_length_mm = 4.0\n")
+    calibrate_table([tuple(corner) for corner in corners], str(tmp_path / "lens.toml"), SIZE, tmp_path / "up.toml")
+    assert preset(tmp_path / "up.toml").camera.up == pytest.approx(-turn[:, 2], abs=0.05)  # without the distortion
+
+
+def test_command_line_says_what_is_missing(tmp_path: Path) -> None:
+    out = str(tmp_path / "camera.toml")
+    for arguments, said in (
+        (["a.raw", "--out", out], "give --board"),
+        (["a.raw", "--board", "9x6", "--out", out], "--square-mm"),
+        (["a.raw", "--board", "9", "--square-mm", "20", "--out", out], "like 9x6"),
+        (["a.raw", "b.raw", "--ball-distance-m", "2", "--out", out], "give one FILE"),
+    ):
+        done = CliRunner().invoke(cli, ["calibrate", "camera", *arguments])
+        assert done.exit_code == 2 and said in done.output
