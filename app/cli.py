@@ -15,6 +15,7 @@ from .commands.calibrate import calibrate
 from .commands.convert import convert
 from .commands.evaluate import evaluate
 from .commands.info import info
+from .commands.label import label
 from .commands.options import join_fixed_ball
 from .commands.settings import settings
 from .commands.simulate import simulate
@@ -41,7 +42,7 @@ def cli(context: click.Context) -> None:
         serve(DEFAULT_SAMPLE, Choices(), None, open_browser=True)
 
 
-for _command in (info, analyze, view, coach, convert, tune, settings, simulate, evaluate, calibrate):
+for _command in (info, analyze, view, coach, convert, tune, settings, simulate, evaluate, calibrate, label):
     cli.add_command(_command)
 
 

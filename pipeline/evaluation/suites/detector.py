@@ -7,13 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ...calibration.ball_labels import BallLabels
 from ...camera import BallParameters
-from ...chain import Tick
-from ...results import Circle
-from ...simulator import SimulatedRecording, flight
+from ...chain import Chain, Tick
+from ...errors import RecordingError
+from ...registry import Parameters
+from ...results import Circle, Truth
+from ...simulator import flight
 from ...stages.track_kalman import OBSERVED, BallFilter
 from .. import paper
 from ..estimation import chain_over
+from ..lab_recordings import FLIGHT, LabRecording
 from ..plots import Figures, curve, label_axes, panels
 from ..rendering import camera_of, render
 from ..tables import Cell, ResultTable, Row, Summary, distinct, share, summary, where
@@ -23,10 +27,12 @@ LABEL = "Ball detector: error against speed"
 HELP = "Errors of the ball's place, size and velocity against its speed (section 4.2)."
 
 TAKES_SCENE_CHOICES = True
+REAL_KINDS = (FLIGHT,)
 
 SEED = 882_541  # of this suite alone
 SPEEDS_M_S = tuple(float(speed) for speed in range(4, 21, 2))
 SCENES = ("one ball", "two balls", "arm")
+REAL = "real recordings"
 FLIGHTS = 3  # of each speed and scene
 STAGES = ("hough", "hough + kalman", "refined", "refined + kalman")
 
@@ -65,12 +71,34 @@ def measure(context: TaskContext, scene: str, speed_m_s: float, seed: int) -> li
     )
     recording = render(context, shown, seed=seed)
     about: Row = {"scene": scene, "speed_m_s": speed_m_s, "seed": seed}
-    chain = chain_over(recording)
-    follower = HoughKalman(context.parameters.ball, chain.camera(context.parameters).focal_px)
+    return _rows(chain_over(recording), context.parameters, recording.truth, about)
+
+
+def real(context: TaskContext, recording: LabRecording) -> list[Row]:
+    """The same against the labels `NAME.labels.csv` of a real flight, as `spinscope label` makes them."""
+    path, session = recording.path.with_suffix(".labels.csv"), recording.session
+    if not path.is_file():
+        raise RecordingError(f"no labels of the ball: make them with `spinscope label`: {path.name}")
+    labels = BallLabels.read(path)
     rows: list[Row] = []
-    for tick in chain.run(context.parameters, ("track",), forget=("surface",)):
+    for number in np.unique(labels.ball):
+        flight = labels.of_ball(int(number))
+        centres_m = session.camera.ball_centre_m(flight.x_px, flight.y_px, flight.radius_px, session.ball_radius_m)
+        seconds = (flight.t_us - flight.t_us[0]) * 1e-6
+        speed_m_s = round(float(np.linalg.norm(np.polyfit(seconds, centres_m[:, :2], 1)[0])))
+        about: Row = {"scene": REAL, "speed_m_s": float(speed_m_s), "seed": None}
+        rows += _rows(session.chain, session.parameters, flight, about)
+    return rows
+
+
+def _rows(chain: Chain, parameters: Parameters, ball: Truth | BallLabels, about: Row) -> list[Row]:
+    """Every stage's errors in every tick in which the true ball is known and all of it in view."""
+    camera = chain.camera(parameters)
+    follower = HoughKalman(parameters.ball, camera.focal_px)
+    rows: list[Row] = []
+    for tick in chain.run(parameters, ("track",), forget=("surface",)):
         found = _found(tick, follower)
-        truth = _truth_at(recording, tick.track.t_us)
+        truth = _truth_at(ball, (camera.width_px, camera.height_px), tick.track.t_us)
         if truth is not None:
             rows += [_row({**about, "t_us": tick.track.t_us}, stage, found[stage], truth) for stage in STAGES]
     return rows
@@ -128,15 +156,14 @@ def _ball_state(circle: Circle | None) -> BallState | None:
     return None if circle is None else np.array([circle.x_px, circle.y_px, np.nan, np.nan, circle.radius_px])
 
 
-def _truth_at(recording: SimulatedRecording, t_us: float) -> BallState | None:
+def _truth_at(truth: Truth | BallLabels, size_px: tuple[int, int], t_us: float) -> BallState | None:
     """The true ball at a time; None unless all of it is in the image, and for a while on both sides."""
-    truth = recording.truth
     around = np.array([t_us - ASIDE_US, t_us, t_us + ASIDE_US])
     if around[0] < truth.t_us[0] or around[2] > truth.t_us[-1]:
         return None
     x, y, radius = (np.interp(around, truth.t_us, column) for column in (truth.x_px, truth.y_px, truth.radius_px))
     most = radius.max()
-    if min(x.min(), y.min()) < most or x.max() > recording.width_px - most or y.max() > recording.height_px - most:
+    if min(x.min(), y.min()) < most or x.max() > size_px[0] - most or y.max() > size_px[1] - most:
         return None
     slope = 1e6 / (2 * ASIDE_US)
     return np.array([x[1], y[1], (x[2] - x[0]) * slope, (y[2] - y[0]) * slope, radius[1]])
@@ -171,7 +198,7 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
         (scene, speed, *_line(part, stage))
         for scene in scenes
         for speed in sorted(speeds)
-        for stage in (STAGES if scene == SCENES[0] else STAGES[-1:])
+        for stage in (STAGES if scene in (SCENES[0], REAL) else STAGES[-1:])
         if (part := where(rows, scene=scene, speed_m_s=speed, stage=stage))
     ]
     return [
