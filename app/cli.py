@@ -16,6 +16,8 @@ from .commands.convert import convert
 from .commands.evaluate import evaluate
 from .commands.info import info
 from .commands.label import label
+from .commands.cameras import cameras
+from .commands.live import live
 from .commands.options import join_fixed_ball
 from .commands.settings import settings
 from .commands.simulate import simulate
@@ -42,7 +44,7 @@ def cli(context: click.Context) -> None:
         serve(DEFAULT_SAMPLE, Choices(), None, open_browser=True)
 
 
-for _command in (info, analyze, view, coach, convert, tune, settings, simulate, evaluate, calibrate, label):
+for _command in (info, analyze, view, coach, convert, tune, settings, simulate, evaluate, calibrate, label, live, cameras):
     cli.add_command(_command)
 
 

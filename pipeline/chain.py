@@ -15,9 +15,10 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable, Collection, Hashable, Iterator, Mapping
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import islice
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
@@ -352,30 +353,63 @@ class Chain:
         ParameterError
             For an unknown target, or values that do not go together.
         """
-        stages = needed_stages(STAGES.names if targets is None else targets)
-        keys = self.keys(parameters)
-        run = _Run(self, parameters, keys, set(forget), self.seconds if seconds is None else seconds)
-        of_recording = [(stage, run.column(stage)) for stage in stages if stage.scope == "recording"]
-        of_ball = [stage for stage in stages if stage.scope == "ball"]
         count = self.tick_count(parameters)
         count = count if ticks is None else min(ticks, count)
-        for first in range(0, count, together):
-            rows = [
-                {"packet": self._packet(parameters.track.tick_us, index)}
-                for index in range(first, min(first + together, count))
-            ]
+        packets = (self._packet(parameters.track.tick_us, index) for index in range(count))
+        return self.follow(parameters, packets, targets, forget=forget, together=together, seconds=seconds)
+
+    def follow(
+        self,
+        parameters: Parameters,
+        packets: Iterable[Packet],
+        targets: Collection[str] | None = None,
+        *,
+        forget: Collection[str] = (),
+        together: int = 1,
+        seconds: dict[str, float] | None = None,
+    ) -> Iterator[Tick]:
+        """Yield tick by tick of packets that come one after the other, as from a running camera.
+
+        Parameters
+        ----------
+        packets : iterable of Packet
+            From the tick of the source's start on, without gaps.
+        parameters, targets, forget, together, seconds
+            As of `run`.
+        """
+        stages = needed_stages(STAGES.names if targets is None else targets)
+        run = _Run(self, parameters, self.keys(parameters), set(forget), self.seconds if seconds is None else seconds)
+        of_recording = [(stage, run.column(stage)) for stage in stages if stage.scope == "recording"]
+        coming = enumerate(packets)
+        while group := list(islice(coming, together)):
+            rows: list[tuple[int, dict[str, Any]]] = [(index, {"packet": packet}) for index, packet in group]
             for stage, column in of_recording:
-                for index, results in enumerate(rows, first):
+                for index, results in rows:
                     results[stage.name] = run.result(stage, column, index, results)
-            balls = [run.balls_of(index, results) for index, results in enumerate(rows, first)]
-            for stage in of_ball:
-                for one in (one for flying in balls for ticks_of_ball in flying for one in ticks_of_ball):
-                    column = run.column(stage, one.values["ball"].shot, one.index)
-                    one.values[stage.name] = run.result(stage, column, one.index, one.values)
-            for results, flying in zip(rows, balls, strict=True):
-                yield run.tick(of_ball, results, flying)
-            run.let_go_of_ended_shots()
-            self._keep_budget(run.columns_in_use)
+            yield from run.answered([stage for stage in stages if stage.scope == "ball"], rows)
+
+    def answer(
+        self,
+        parameters: Parameters,
+        tracked: Iterable[Tick],
+        targets: Collection[str] | None = None,
+        *,
+        forget: Collection[str] = (),
+    ) -> Iterator[Tick]:
+        """Run the stages of one ball over ticks with a track, such as another thread's run makes.
+
+        Parameters
+        ----------
+        tracked : iterable of Tick
+            With the results of the recording that stages of one ball need; from the first tick on, without gaps.
+        parameters, targets, forget
+            As of `run`.
+        """
+        stages = needed_stages(STAGES.names if targets is None else targets)
+        of_ball = [stage for stage in stages if stage.scope == "ball"]
+        run = _Run(self, parameters, self.keys(parameters), set(forget), self.seconds)
+        for index, tick in enumerate(tracked):
+            yield from run.answered(of_ball, [(index, {**tick.results, "packet": tick.packet})])
 
     def _packet(self, tick_us: int, index: int) -> Packet:
         number = self.source.start_us // tick_us + index
@@ -509,6 +543,18 @@ class _Run:
                 balls[-1].append(_BallInputs(number, evidence, values))
         self._evidence = {ball.shot: rows[-1].evidence for ball, rows in zip(track.balls, balls, strict=True)}
         return balls
+
+    def answered(self, of_ball: list[Stage], rows: list[tuple[int, dict[str, Any]]]) -> Iterator[Tick]:
+        """Ticks of rows (index, results of the recording), each with the results of its balls."""
+        balls = [self.balls_of(index, results) for index, results in rows]
+        for stage in of_ball:
+            for one in (one for flying in balls for ticks_of_ball in flying for one in ticks_of_ball):
+                column = self.column(stage, one.values["ball"].shot, one.index)
+                one.values[stage.name] = self.result(stage, column, one.index, one.values)
+        for (_, results), flying in zip(rows, balls, strict=True):
+            yield self.tick(of_ball, results, flying)
+        self.let_go_of_ended_shots()
+        self._chain._keep_budget(self.columns_in_use)
 
     def let_go_of_ended_shots(self) -> None:
         """Let the budget have the columns of shots that are over, and drop those whose results are not kept."""

@@ -11,3 +11,7 @@ class ParameterError(SpinscopeError):
 
 class RecordingError(SpinscopeError):
     """A recording cannot be read or holds nothing that can be used."""
+
+
+class CameraError(SpinscopeError):
+    """A running camera cannot be found, opened, set or read."""

@@ -207,6 +207,11 @@ class ShotLog:
         for shot, rows in list(self._flying.items()):
             self._end(ShotEnd(shot, rows[-1].end_us, "end"))
 
+    def take_ended(self) -> list[Shot]:
+        """The shots that have ended since the last call, in order of their start; they are kept no longer."""
+        ended, self._ended = self.shots, []
+        return ended
+
     def __len__(self) -> int:
         """Number of the shots that have ended."""
         return len(self._ended)

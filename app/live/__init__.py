@@ -1,0 +1,1 @@
+"""Live runs for users: lines of JSON, sockets, tables of shots."""

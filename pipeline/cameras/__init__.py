@@ -1,0 +1,16 @@
+"""Running cameras: drivers, the replay of a recording as a camera, the stream of ticks, and the recorder.
+
+A clock is read here, so that stages and chain need none.
+"""
+
+from .drivers import neuromorphic as _neuromorphic  # noqa: F401  registers itself
+from .event_camera import DRIVERS as DRIVERS
+from .event_camera import CameraDriver as CameraDriver
+from .event_camera import CameraPacket as CameraPacket
+from .event_camera import EventCamera as EventCamera
+from .event_camera import ListedCamera as ListedCamera
+from .event_camera import open_camera as open_camera
+from .event_stream import ArrivedTick as ArrivedTick
+from .event_stream import EventStream as EventStream
+from .replay import FAULTS as FAULTS
+from .replay import ReplayCamera as ReplayCamera

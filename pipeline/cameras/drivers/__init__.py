@@ -1,0 +1,1 @@
+"""Drivers of cameras: each module registers one in `event_camera.DRIVERS`."""

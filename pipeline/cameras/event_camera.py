@@ -1,0 +1,163 @@
+"""Interface of a running camera, and the registry of drivers."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from ..errors import CameraError
+from ..events import EventBatch
+from ..extensions import Registry
+
+UDEV_RULES = "/etc/udev/rules.d/65-event-cameras.rules"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraPacket:
+    """Events that a camera hands over at once.
+
+    Attributes
+    ----------
+    events : EventBatch
+        In order of time, on the sensor; perhaps none.
+    end_us : int
+        All events before this time have come (the camera's clock).
+    dropped : int
+        Packets that driver or ring lost before this one.
+    outside : int
+        Events beyond the sensor, left out: the camera states a wrong size.
+    """
+
+    events: EventBatch
+    end_us: int
+    dropped: int = 0
+    outside: int = 0
+
+
+class EventCamera(ABC):
+    """An open camera. All methods are called by one thread, the one that reads.
+
+    Attributes
+    ----------
+    name, serial : str
+        Model and serial number, for people.
+    width_px, height_px : int
+        Size of the sensor.
+    bias_limits : Mapping of str to (int, int)
+        Lowest and highest value of each bias, as the device states them.
+    biases : Mapping of str to int
+        Present values.
+    can_wait : bool
+        Whether it hands its events over whenever they are asked for, as no real camera does.
+    """
+
+    can_wait = False
+    name: str
+    serial: str
+    width_px: int
+    height_px: int
+    bias_limits: Mapping[str, tuple[int, int]]
+    biases: Mapping[str, int]
+
+    @abstractmethod
+    def read(self) -> CameraPacket | None:
+        """The next packet, after 50 ms at the latest, perhaps without events; None where no more come.
+
+        Raises CameraError when the camera is gone; it can then be opened anew.
+        """
+
+    @abstractmethod
+    def close(self) -> None:
+        """Let go of the camera."""
+
+    def set_biases(self, biases: Mapping[str, int]) -> None:
+        """Change some biases; raises CameraError for unknown ones and values beyond the device's limits."""
+        check_biases(biases, self.bias_limits, self.name)
+        self._apply_biases({**self.biases, **biases})
+        self.biases = {**self.biases, **biases}
+
+    @abstractmethod
+    def _apply_biases(self, biases: Mapping[str, int]) -> None:
+        """Hand all values over to the device."""
+
+
+def check_biases(biases: Mapping[str, int], limits: Mapping[str, tuple[int, int]], name: str) -> None:
+    """Raise CameraError for biases that the device does not have, and values beyond its limits."""
+    for bias, value in biases.items():
+        if bias not in limits:
+            raise CameraError(f"{name} has no bias {bias!r}: it has {', '.join(limits) or 'none'}")
+        low, high = limits[bias]
+        if not low <= value <= high:
+            raise CameraError(f"bias {bias} = {value} is out of range for {name}: {low} to {high}")
+
+
+@dataclass(frozen=True, slots=True)
+class ListedCamera:
+    """Camera that is plugged in.
+
+    Attributes
+    ----------
+    driver, name, serial, connection : str
+        Driver, model, serial number ("" where it cannot be read) and kind of connection.
+    size_px : (int, int), optional
+        Width and height; None where they cannot be read.
+    temperature_deg_c : float, optional
+        Of the sensor, where the device tells it.
+    problem : str
+        Why it cannot be opened, with the remedy; empty where it can.
+    """
+
+    driver: str
+    name: str
+    serial: str
+    connection: str
+    size_px: tuple[int, int] | None = None
+    temperature_deg_c: float | None = None
+    problem: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraDriver:
+    """Driver of one family of cameras.
+
+    Attributes
+    ----------
+    name, label : str
+        As users type it, and for people.
+    cameras : callable
+        `cameras() -> list of ListedCamera`: what is plugged in; raises CameraError when the driver is not installed.
+    open : callable
+        `open(serial or None, biases) -> EventCamera`; raises CameraError.
+    udev_rules : tuple of str
+        Lines that let everybody use its cameras on Linux.
+    """
+
+    name: str
+    label: str
+    cameras: Callable[[], list[ListedCamera]]
+    open: Callable[[str | None, Mapping[str, int]], EventCamera]
+    udev_rules: tuple[str, ...] = field(default=())
+
+
+DRIVERS: Registry[CameraDriver] = Registry("camera driver")
+
+
+def open_camera(serial: str | None = None, biases: Mapping[str, int] | None = None) -> EventCamera:
+    """Open the camera of this serial number, or the only one there is; raises CameraError with the remedy."""
+    problems: list[str] = []
+    for driver in DRIVERS:
+        try:
+            return driver.open(serial, biases or {})
+        except CameraError as error:
+            problems.append(str(error))
+    raise CameraError("; ".join(problems))
+
+
+def udev_instructions() -> str:
+    """Commands that let everybody on this machine use the cameras (Linux), for people to run."""
+    rules = "\n".join(rule for driver in DRIVERS for rule in driver.udev_rules)
+    return (
+        f"sudo tee {UDEV_RULES} <<'RULES'\n{rules}\nRULES\n"
+        "sudo udevadm control --reload-rules && sudo udevadm trigger\n"
+    )

@@ -1,0 +1,142 @@
+"""Packets of a camera become ticks: cut by time alone, with gaps, resets and unplugging told apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from spinscope.pipeline.cameras import ArrivedTick, CameraPacket, EventCamera, EventStream
+from spinscope.pipeline.errors import CameraError
+from spinscope.pipeline.events import EventBatch
+
+TICK_US = 1000
+
+
+class ListedPackets(EventCamera):
+    """Camera that hands over what it is given: packets, errors to raise; then it ends."""
+
+    name, serial, width_px, height_px = "toy", "1", 64, 48
+
+    def __init__(self, given: list[CameraPacket | CameraError], can_wait: bool = False) -> None:
+        self.bias_limits, self.biases = {"diff_on": (-10, 10)}, {"diff_on": 0}
+        self.given, self.closed, self.applied = iter(given), 0, []
+        self.can_wait = can_wait
+
+    def read(self) -> CameraPacket | None:
+        one = next(self.given, None)
+        if isinstance(one, CameraError):
+            raise one
+        return one
+
+    def close(self) -> None:
+        self.closed += 1
+
+    def _apply_biases(self, biases: Mapping[str, int]) -> None:
+        self.applied.append(dict(biases))
+
+
+def at(*times_us: int) -> EventBatch:
+    """Events at these times, the x of each being its place in the list."""
+    t_us = np.array(times_us, np.int64)
+    return EventBatch(t_us, np.arange(t_us.size, dtype=np.uint16), np.zeros(t_us.size, np.uint16), t_us % 2 == 0)
+
+
+def packets(events: EventBatch, *cuts_us: int) -> list[CameraPacket]:
+    """The events, handed over at these times and at the end."""
+    bounds = [0, *cuts_us, int(events.t_us[-1]) + 1]
+    return [CameraPacket(events.between(a, b), min(b, int(events.t_us[-1]))) for a, b in pairwise(bounds)]
+
+
+def ticks_of(camera: EventCamera, **options: object) -> tuple[list[ArrivedTick], EventStream]:
+    stream = EventStream(camera, TICK_US, **options)  # type: ignore[arg-type]
+    stream.start()
+    return list(stream.ticks()), stream
+
+
+EVENTS = at(300, 900, 1000, 1999, 2000, 2000, 4500, 7001)
+
+
+@pytest.mark.parametrize("cuts_us", [(), (950,), (1000, 2000), (301, 2000, 2001, 7000), tuple(range(500, 7000, 250))])
+def test_ticks_do_not_depend_on_how_the_driver_cuts(cuts_us: tuple[int, ...]) -> None:
+    ticks, _ = ticks_of(ListedPackets(packets(EVENTS, *cuts_us)))
+    assert [(one.packet.index, one.packet.start_us) for one in ticks] == [(n, n * TICK_US) for n in range(8)]
+    assert [len(one.packet.events) for one in ticks] == [2, 2, 2, 0, 1, 0, 0, 1]
+    assert ticks[-1].packet.end_us == 7002  # cut short after the last event, as a recording's is
+    assert EventBatch.concatenate(one.packet.events for one in ticks).x_px.tolist() == list(range(8))
+
+
+def test_a_tick_waits_for_events_of_its_last_microsecond() -> None:
+    given = [CameraPacket(at(100, 999), 999), CameraPacket(at(999, 1000), 1000), CameraPacket(at(5000), 5000)]
+    ticks, _ = ticks_of(ListedPackets(given))
+    assert [len(one.packet.events) for one in ticks] == [3, 1, 0, 0, 0, 1]
+
+
+def test_a_clock_that_steps_back_begins_another_segment() -> None:
+    notices: list[str] = []
+    given = [*packets(EVENTS), CameraPacket(at(10, 20), 20), CameraPacket(at(1500), 1500)]
+    ticks, stream = ticks_of(ListedPackets(given), on_notice=notices.append)
+    assert [one.segment for one in ticks] == [0] * 8 + [1, 1]
+    assert [one.clock for one in ticks] == [0] * 8 + [1, 1]
+    assert ticks[7].packet.end_us == 7002 and ticks[8].packet.index == 0
+    assert len(notices) == 1 and "clock went from 7001 to 20 us" in notices[0]
+    assert stream.counts.events == len(EVENTS) + 3
+
+
+def test_an_unplugged_camera_is_waited_for() -> None:
+    unplugged, notices = CameraError("toy 1: the camera was unplugged"), []
+    first = ListedPackets([CameraPacket(at(100), 100), unplugged])
+    second = ListedPackets([CameraPacket(at(50), 50)])
+    ticks, _ = ticks_of(first, reopen=lambda: second, on_notice=notices.append)
+    assert [(one.clock, one.packet.events.t_us.tolist()) for one in ticks] == [(0, [100]), (1, [50])]
+    assert first.closed == second.closed == 1
+    assert "unplugged; waiting" in notices[0] and "is back" in notices[1]
+
+
+def test_without_a_way_to_open_it_anew_the_error_comes_out_after_the_ticks() -> None:
+    stream = EventStream(ListedPackets([CameraPacket(at(100), 100), CameraError("gone")]), TICK_US)
+    stream.start()
+    ticks: Iterator[ArrivedTick] = stream.ticks()
+    assert len(next(ticks).packet.events) == 1
+    with pytest.raises(CameraError, match="gone"):
+        next(ticks)
+
+
+def test_late_and_unordered_events_are_counted_and_sorted() -> None:
+    given = [CameraPacket(at(500), 1100), CameraPacket(at(900, 1300, 1200), 1300, dropped=2, outside=5)]
+    ticks, stream = ticks_of(ListedPackets(given))
+    assert [one.packet.events.t_us.tolist() for one in ticks] == [[500], [1200, 1300]]
+    assert (stream.counts.late, stream.counts.dropped, stream.counts.outside) == (1, 2, 5)
+
+
+def test_work_that_cannot_keep_up_misses_ticks_but_sinks_do_not() -> None:
+    recorded: list[int] = []
+    notices: list[str] = []
+    given = [CameraPacket(at(n * TICK_US), n * TICK_US) for n in range(5000)]
+    stream = EventStream(
+        ListedPackets(given),
+        TICK_US,
+        sinks=(lambda clock, events: recorded.extend(events.t_us),),
+        on_notice=notices.append,
+    )
+    stream.start()
+    stream.join()  # nobody takes a tick meanwhile
+    ticks = list(stream.ticks())
+    assert recorded == [n * TICK_US for n in range(5000)]
+    assert stream.counts.skipped > 0 and len(ticks) + stream.counts.skipped == 5000
+    assert len(notices) == 1 and "cannot keep up" in notices[0]
+
+
+def test_biases_are_set_by_the_reading_thread() -> None:
+    notices: list[str] = []
+    camera = ListedPackets([CameraPacket(at(100), 100)])
+    stream = EventStream(camera, TICK_US, on_notice=notices.append)
+    stream.set_biases({"diff_on": 5})
+    stream.set_biases({"diff_on": 11})
+    stream.set_biases({"diff": 0})
+    stream.start()
+    stream.join()
+    assert camera.applied == [{"diff_on": 5}]
+    assert "diff_on = 11 is out of range for toy: -10 to 10" in notices[0] and "no bias 'diff'" in notices[1]
