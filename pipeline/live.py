@@ -11,11 +11,12 @@ import queue
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from itertools import chain as joined
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from .cameras.clock import now_s
 from .chain import Chain, EventsInMemory, Tick
 from .errors import CameraError, ParameterError
 from .events import EventBatch
+from .recordings import RawWriter
 from .recordings.in_memory import RecordingInMemory
 from .registry import STAGES, Parameters
 from .results import Packet
@@ -179,6 +181,11 @@ def session_of(camera: EventCamera, choices: Choices) -> Session:
         raise ParameterError("a running camera needs the fixed ball's circle: give --fixed-ball X_PX Y_PX RADIUS_PX")
     session.place_fixed_ball(choices.fixed_ball)
     return session
+
+
+def raw_file(path: Path, width_px: int, height_px: int, attributes: Mapping[str, str | float]) -> RawWriter:
+    """A new RAW file for a `Recorder`; raises OSError or RecordingError."""
+    return RawWriter(path, path, width_px, height_px, attributes)
 
 
 def load_kernels() -> None:

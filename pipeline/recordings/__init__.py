@@ -3,6 +3,7 @@
 Nothing else of this package is meant to be imported from outside.
 """
 
+from .formats.prophesee_raw.writer import RawWriter as RawWriter
 from .formats.registry import FORMATS as FORMATS
 from .formats.registry import RecordingContent as RecordingContent
 from .formats.registry import RecordingFormat as RecordingFormat

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Mapping
+from contextlib import closing
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +26,8 @@ EVT2_HIGH_STEP = 1 << (evt2.HIGH_BITS - 2)
 EVT2_TRIGGER_ID, EVT3_TRIGGER_ID = 0x1F, 0xF  # masks of a trigger's number
 # Absolute times are counted up to from 0 in whole turns; later ones would need megabytes of time words.
 LIMIT_US = 1 << 40
+MAX_WORDS = 4  # of an event or trigger: both times, row, column
+SPARE_WORDS = 8
 
 
 class Encoded(NamedTuple):
@@ -33,80 +37,115 @@ class Encoded(NamedTuple):
     state: NDArray[np.int64]
 
 
+class RawWriter:
+    """A new RAW file that is written as events come; cut off at any word it is read up to there.
+
+    Parameters
+    ----------
+    path : Path
+        File to create.
+    named : Path
+        Name of it in messages.
+    width_px, height_px : int
+        Size of the sensor.
+    attributes : Mapping of str to str or float
+        Statements about camera and scene, for the header.
+    encoding : str
+        EVT2 or EVT3.
+
+    Raises
+    ------
+    RecordingError
+        For pixels above 2047.
+    OSError
+        The file exists or cannot be written.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        named: Path,
+        width_px: int,
+        height_px: int,
+        attributes: Mapping[str, str | float],
+        encoding: str = "EVT3",
+    ) -> None:
+        if max(width_px, height_px) > MAX_COORDINATE + 1:
+            raise RecordingError(
+                f"{encoding} holds pixels up to {MAX_COORDINATE}, the sensor has {width_px} x {height_px}: "
+                f"write HDF5 (.h5) or NPZ (.npz): {named}"
+            )
+        self._named, self._state = named, np.full(3, -1, np.int64)
+        self._encoding, self._words = encoding, ENCODINGS[encoding]
+        self._file = open(path, "xb")  # noqa: SIM115  until close
+        lines = {
+            **attributes,
+            "evt": self._words.version,
+            "format": f"{encoding};height={height_px};width={width_px}",
+            "geometry": f"{width_px}x{height_px}",
+        }
+        text = "".join(f"% {key} {' '.join(str(value).split())}\n" for key, value in lines.items())
+        self._file.write((text + "% end\n").encode())
+        self._encode(EventBatch.empty(), Triggers.empty(), 0)  # has the kernel loaded before events come
+
+    def write(self, events: EventBatch, triggers: Triggers | None = None) -> None:
+        """Append events, and triggers that are not later than the last of them, both in order of time.
+
+        Raises RecordingError for times before 0 or beyond 2^40 us (12 days).
+        """
+        triggers = Triggers.empty() if triggers is None else triggers
+        ends = [int(t_us[i]) for t_us in (events.t_us, triggers.t_us) if t_us.size for i in (0, -1)]
+        if not ends:
+            return
+        if min(ends) < 0 or max(ends) >= LIMIT_US:
+            raise RecordingError(
+                f"times from {min(ends)} to {max(ends)} us do not fit in {self._encoding}, which goes from 0 to "
+                f"{LIMIT_US} us: write HDF5 (.h5) or NPZ (.npz): {self._named}"
+            )
+        steps = ((max(ends) >> self._words.low_bits) - max(int(self._state[HIGH]), 0)) // self._words.high_step
+        self._file.write(self._encode(events, triggers, steps))
+
+    def _encode(self, events: EventBatch, triggers: Triggers, steps: int) -> bytes:
+        """Words of events and triggers, with so many steps of time between them."""
+        words = MAX_WORDS * (len(events) + len(triggers)) + steps + SPARE_WORDS
+        out = Encoded(np.empty(words, self._words.dtype), self._state)
+        return out.words[: int(self._words.encode(out, *events.columns, *triggers.columns))].tobytes()
+
+    def flush(self, *, to_disk: bool = False) -> None:
+        """Hand everything over to the system, which keeps it when this process ends, or to the disk itself."""
+        self._file.flush()
+        if to_disk:
+            os.fsync(self._file.fileno())
+
+    @property
+    def bytes(self) -> int:
+        """Length of the file so far."""
+        return self._file.tell()
+
+    def close(self) -> None:
+        """Finish the file."""
+        try:
+            if self._state[HIGH] >= 0:  # once more: confirms the one before
+                high = int(self._state[HIGH]) & self._words.high_mask
+                self._file.write(self._words.dtype(TIME_HIGH << self._words.high_bits | high).tobytes())
+        finally:
+            self._file.close()
+
+
 def write_raw(path: Path, content: RecordingContent) -> None:
     """Write a new file in the content's encoding, with triggers among the events.
 
     Raises RecordingError for pixels above 2047, and for times before 0 or beyond 2^40 us (12 days).
     """
-    if max(content.width_px, content.height_px) > MAX_COORDINATE + 1:
-        raise RecordingError(
-            f"{content.encoding} holds pixels up to {MAX_COORDINATE}, the sensor has {content.width_px} x "
-            f"{content.height_px}: write HDF5 (.h5) or NPZ (.npz): {content.path}"
-        )
     triggers = content.triggers()
     triggers = triggers[np.argsort(triggers.t_us, kind="stable")]
-    state = np.full(3, -1, np.int64)
-    encode = _encode_evt2 if content.encoding == "EVT2" else _encode_evt3
-    with open(path, "xb") as file:
-        file.write(_header(content))
+    size_px = (content.width_px, content.height_px)
+    with closing(RawWriter(path, content.path, *size_px, content.attributes, content.encoding)) as writer:
         for batch in content.batches:
             upto = int(np.searchsorted(triggers.t_us, batch.t_us[-1], side="right"))
-            _write_words(file, encode, state, batch, triggers[:upto], content)
+            writer.write(batch, triggers[:upto])
             triggers = triggers[upto:]
-        _write_words(file, encode, state, EventBatch.empty(), triggers, content)
-        if state[HIGH] >= 0:  # once more: confirms the one before
-            file.write(_confirmation(content.encoding, int(state[HIGH])))
-
-
-def _header(content: RecordingContent) -> bytes:
-    lines = {
-        **content.attributes,
-        "evt": {"EVT2": "2.0", "EVT3": "3.0"}[content.encoding],
-        "format": f"{content.encoding};height={content.height_px};width={content.width_px}",
-        "geometry": f"{content.width_px}x{content.height_px}",
-    }
-    text = "".join(f"% {key} {' '.join(str(value).split())}\n" for key, value in lines.items())
-    return (text + "% end\n").encode()
-
-
-def _confirmation(encoding: str, high: int) -> bytes:
-    if encoding == "EVT2":
-        return np.uint32((TIME_HIGH << evt2.HIGH_BITS) | (high & evt2.HIGH_MASK)).tobytes()
-    return np.uint16((TIME_HIGH << evt3.TIME_BITS) | (high & TIME_MASK)).tobytes()
-
-
-def _write_words(
-    file: IO[bytes],
-    encode: Callable[[NDArray[np.int64], EventBatch, Triggers, int], Encoded],
-    state: NDArray[np.int64],
-    batch: EventBatch,
-    triggers: Triggers,
-    content: RecordingContent,
-) -> None:
-    """Encode and write events, and triggers that are not later than the last of them."""
-    ends = [int(t_us[i]) for t_us in (batch.t_us, triggers.t_us) if t_us.size for i in (0, -1)]
-    if not ends:
-        return
-    if min(ends) < 0 or max(ends) >= LIMIT_US:
-        raise RecordingError(
-            f"times from {min(ends)} to {max(ends)} us do not fit in {content.encoding}, which goes from 0 to "
-            f"{LIMIT_US} us: write HDF5 (.h5) or NPZ (.npz): {content.path}"
-        )
-    file.write(encode(state, batch, triggers, max(ends)).words.tobytes())
-
-
-def _encode_evt3(state: NDArray[np.int64], batch: EventBatch, triggers: Triggers, end_us: int) -> Encoded:
-    steps = ((end_us >> evt3.TIME_BITS) - max(int(state[HIGH]), 0)) // HIGH_STEP
-    out = Encoded(np.empty(4 * len(batch) + 3 * len(triggers) + steps + 8, np.uint16), state)
-    count = int(encode_evt3(out, *batch.columns, *triggers.columns))
-    return Encoded(out.words[:count], state)
-
-
-def _encode_evt2(state: NDArray[np.int64], batch: EventBatch, triggers: Triggers, end_us: int) -> Encoded:
-    steps = ((end_us >> evt2.LOW_BITS) - max(int(state[HIGH]), 0)) // EVT2_HIGH_STEP
-    out = Encoded(np.empty(2 * (len(batch) + len(triggers)) + steps + 2, np.uint32), state)
-    count = int(encode_evt2(out, *batch.columns, *triggers.columns))
-    return Encoded(out.words[:count], state)
+        writer.write(EventBatch.empty(), triggers)
 
 
 @njit(cache=True, nogil=True)
@@ -197,3 +236,21 @@ def encode_evt2(
             event += 1
         at += 1
     return at
+
+
+class RawEncoding(NamedTuple):
+    """Encoding of RAW that is written: its kernel and the bits of its time words."""
+
+    version: str
+    dtype: type[np.unsignedinteger[Any]]
+    low_bits: int
+    high_bits: int
+    high_mask: int
+    high_step: int
+    encode: Callable[..., int]
+
+
+ENCODINGS = {
+    "EVT2": RawEncoding("2.0", np.uint32, evt2.LOW_BITS, evt2.HIGH_BITS, evt2.HIGH_MASK, EVT2_HIGH_STEP, encode_evt2),
+    "EVT3": RawEncoding("3.0", np.uint16, evt3.TIME_BITS, evt3.TIME_BITS, TIME_MASK, HIGH_STEP, encode_evt3),
+}
