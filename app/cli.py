@@ -18,6 +18,7 @@ from .commands.info import info
 from .commands.label import label
 from .commands.cameras import cameras
 from .commands.live import live
+from .commands.live import live, watch
 from .commands.options import join_fixed_ball
 from .commands.settings import settings
 from .commands.simulate import simulate
@@ -44,7 +45,7 @@ def cli(context: click.Context) -> None:
         serve(DEFAULT_SAMPLE, Choices(), None, open_browser=True)
 
 
-for _command in (info, analyze, view, coach, convert, tune, settings, simulate, evaluate, calibrate, label, live, cameras):
+for _command in (info, analyze, view, coach, convert, tune, settings, simulate, evaluate, calibrate, label, live, cameras, watch):
     cli.add_command(_command)
 
 

@@ -1,8 +1,10 @@
-"""`spinscope live`: shots and spins of a running camera, or of a recording in its place."""
+"""`spinscope live` and `spinscope watch`: the shots of a running camera, or of a recording in its place."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -11,37 +13,76 @@ from spinscope.pipeline.session import Choices, check_method
 
 from .options import RECORDING, session_options
 
+SOURCE_OPTIONS = (
+    click.option("--camera", "serial", metavar="SERIAL", help="Serial number; the only camera by default."),
+    click.option("--biases", type=click.Path(path_type=Path), metavar="FILE.bias", help="Biases to set."),
+    click.option("--replay", type=RECORDING, metavar="FILE", help="Play a recording in the place of a camera."),
+    click.option("--speed", type=float, default=1.0, show_default=True, help="Of the replay; inf: no waiting."),
+    click.option("--loop", "loops", is_flag=True, help="Play the recording again and again."),
+    click.option("--fake", "fault", type=click.Choice(FAULTS), help="Have the replay misbehave every second."),
+    click.option("--record", type=click.Path(path_type=Path), metavar="NAME.raw", help="Record the events."),
+    click.option("--split-mb", type=click.FloatRange(min=1), help="With --record: begin another file at this size."),
+    click.option("--split-s", type=click.FloatRange(min=1), help="With --record: begin another file after so long."),
+    click.option("--socket", "port", type=click.IntRange(0, 65535), help="Send lines of every tick to robots here."),
+    click.option("--method", default="all", show_default=True, help="Which spin method to run."),
+)
+
+
+def source_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of a live run to a command."""
+    for option in reversed(SOURCE_OPTIONS):
+        command = option(command)
+    return command
+
 
 @click.command()
-@click.option("--camera", "serial", metavar="SERIAL", help="Camera of this serial number; the only one by default.")
-@click.option("--biases", type=click.Path(path_type=Path), metavar="FILE.bias", help="Biases to set.")
-@click.option("--replay", type=RECORDING, metavar="FILE", help="Play a recording in the place of a camera.")
-@click.option(
-    "--speed", type=float, default=1.0, show_default=True, help="Of the replay, in real times; inf: no waiting."
-)
-@click.option("--loop", "loops", is_flag=True, help="Play the recording again and again.")
-@click.option("--fake", "fault", type=click.Choice(FAULTS), help="Have the replay misbehave every second.")
 @click.option("--headless", is_flag=True, help="Without a page: lines of JSON.")
-@click.option("--jsonl", "output", default="-", metavar="OUT", help="File or pipe of the lines; - is standard output.")
-@click.option("--socket", "port", type=click.IntRange(0, 65535), help="Send lines of every tick to robots here.")
-@click.option("--method", default="all", show_default=True, help="Which spin method to run.")
+@click.option("--jsonl", "lines", default="-", metavar="OUT", help="File or pipe of the lines; - is standard output.")
+@source_options
 @session_options
-def live(
+def live(headless: bool, lines: str, **options: Any) -> None:
+    """Show the shots of a running camera as they end, one line of JSON each, and the state every second."""
+    if not headless:
+        raise click.UsageError("the page of a running camera is not there yet: give --headless, or use `watch`")
+    _run(lines=lines, **options)
+
+
+@click.command()
+@click.argument("table", type=click.Path(path_type=Path), metavar="TABLE.csv|.jsonl|.parquet")
+@click.option("--jsonl", "lines", metavar="OUT", help="Lines of JSON besides, as of `live`.")
+@source_options
+@session_options
+def watch(table: Path, lines: str | None, **options: Any) -> None:
+    """Append every shot of a running camera to a table, and save its events as a small recording of its own.
+
+    The same command goes on with a table that is there.
+    """
+    _run(lines=lines, table=table, **options)
+
+
+def _run(
+    *,
+    lines: str | None,
     serial: str | None,
     biases: Path | None,
     replay: Path | None,
     speed: float,
     loops: bool,
     fault: str | None,
-    headless: bool,
-    output: str,
+    record: Path | None,
+    split_mb: float | None,
+    split_s: float | None,
     port: int | None,
     method: str,
     choices: Choices,
+    table: Path | None = None,
 ) -> None:
-    """Show the shots of a running camera as they end, one line of JSON each, and the state every second."""
-    from ..live.headless import run_headless
+    from ..live.headless import Outputs, run_headless
     from ..live.opening import CameraChoice
+    from ..live.recording import RecordChoice
 
+    if record is None and (split_mb or split_s):
+        raise click.UsageError("--split-mb and --split-s go with --record NAME.raw")
     chosen = CameraChoice(serial=serial, biases=biases, replay=replay, speed=speed, loops=loops, fault=fault)
-    run_headless(chosen, choices, check_method(method), output, port=port)
+    recording = None if record is None else RecordChoice(record, split_mb, split_s)
+    run_headless(chosen, choices, check_method(method), Outputs(lines=lines, port=port, table=table, record=recording))

@@ -7,6 +7,7 @@ import socket
 import sys
 import threading
 from collections.abc import Mapping
+from contextlib import suppress
 from types import TracebackType
 from typing import IO, Any, Self
 
@@ -36,7 +37,8 @@ class JsonLines:
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         if self._output != "-":
-            self._file.close()
+            with suppress(OSError):  # what could not be written was said
+                self._file.close()
 
     def write(self, line: Mapping[str, Any]) -> None:
         """Append an object."""

@@ -12,6 +12,7 @@ from .event_camera import ListedCamera as ListedCamera
 from .event_camera import open_camera as open_camera
 from .event_stream import ArrivedTick as ArrivedTick
 from .event_stream import EventStream as EventStream
+from .recent_events import RecentEvents as RecentEvents
 from .recorder import Recorder as Recorder
 from .replay import FAULTS as FAULTS
 from .replay import ReplayCamera as ReplayCamera

@@ -29,7 +29,7 @@ class EventFile(Protocol):
         """Hand everything over to the system, or to the disk itself."""
 
     @property
-    def bytes(self) -> int:
+    def size_bytes(self) -> int:
         """Length so far."""
 
     def close(self) -> None:
@@ -131,7 +131,7 @@ class Recorder:
     def _write(self, clock: int, events: EventBatch) -> None:
         assert self._file is not None
         start_us = self._last_us if self._start_us is None else self._start_us
-        is_full = self._most_bytes is not None and self._file.bytes >= self._most_bytes
+        is_full = self._most_bytes is not None and self._file.size_bytes >= self._most_bytes
         is_full = is_full or (self._most_us is not None and int(events.t_us[-1]) - start_us > self._most_us)
         if clock != self._clock or (is_full and self._start_us is not None):
             self._file.close()

@@ -118,7 +118,7 @@ class RawWriter:
             os.fsync(self._file.fileno())
 
     @property
-    def bytes(self) -> int:
+    def size_bytes(self) -> int:
         """Length of the file so far."""
         return self._file.tell()
 

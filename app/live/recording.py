@@ -1,0 +1,81 @@
+"""Recording of a live run: the camera's events, with its settings beside them and markers that people type."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from spinscope.pipeline.biases import BiasParameters
+from spinscope.pipeline.cameras import EventCamera, Recorder
+from spinscope.pipeline.errors import ParameterError, SpinscopeError
+from spinscope.pipeline.live import raw_file
+from spinscope.pipeline.session import Session
+
+from ..terminal import note
+
+
+@dataclass(frozen=True, slots=True)
+class RecordChoice:
+    """Options of the recording.
+
+    Attributes
+    ----------
+    path : Path
+        First file, NAME.raw.
+    most_mb, most_s : float, optional
+        Size and length at which another file begins.
+    """
+
+    path: Path
+    most_mb: float | None = None
+    most_s: float | None = None
+
+
+def recorder(chosen: RecordChoice, camera: EventCamera, session: Session, on_notice: Callable[[str], None]) -> Recorder:
+    """A recorder of the camera; raises SpinscopeError when the first file cannot be created."""
+    if chosen.path.suffix.lower() != ".raw":
+        raise ParameterError(f"a camera is recorded as RAW: give a name that ends with .raw instead of {chosen.path}")
+    parameters, known = session.parameters, BiasParameters.tunables()
+    tables = {"camera": parameters.camera.as_dict(), "ball": parameters.ball.as_dict()}
+    if known.keys() <= camera.biases.keys():
+        tables["biases"] = {name: camera.biases[name] for name in known}
+    device: dict[str, dict[str, Any]] = {
+        "device": {"name": camera.name, "serial": camera.serial},
+        "device_biases": dict(camera.biases),
+    }
+    return Recorder(
+        chosen.path,
+        lambda path: raw_file(path, camera.width_px, camera.height_px, {"serial_number": camera.serial}),
+        beside={".toml": _toml(tables), ".settings.toml": _toml({**device, **parameters.as_dict()})},
+        most_bytes=None if chosen.most_mb is None else round(chosen.most_mb * 1e6),
+        most_us=None if chosen.most_s is None else round(chosen.most_s * 1e6),
+        on_notice=on_notice,
+    )
+
+
+def _toml(tables: dict[str, dict[str, Any]]) -> str:
+    """Tables as TOML, which has no word for None."""
+    stated = {name: {key: value for key, value in table.items() if value is not None} for name, table in tables.items()}
+    return tomli_w.dumps(stated)
+
+
+def take_markers(recording: Recorder) -> None:
+    """Note every line that somebody types at the terminal beside the recording."""
+    if not sys.stdin.isatty():
+        return
+    note("type a text and Enter to mark the recording")
+
+    def read() -> None:
+        for line in sys.stdin:
+            try:
+                recording.mark(line.strip())
+            except SpinscopeError as error:
+                note(str(error))
+
+    threading.Thread(target=read, name="markers", daemon=True).start()

@@ -1,0 +1,170 @@
+"""`spinscope live` and `watch` from the command line: lines, tables, recordings and clients."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import socket
+import threading
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet
+import pytest
+from click.testing import CliRunner
+
+from spinscope.app.cli import cli
+from spinscope.app.live import headless
+from spinscope.app.live.json_lines import JsonServer
+from spinscope.app.live.shot_table import ShotTable
+from spinscope.pipeline.cameras import RecentEvents
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.live import LiveShot
+from spinscope.pipeline.recordings import open_recording
+from spinscope.pipeline.session import Session
+
+QUICK = ("--speed", "inf", "--method", "triplet")
+
+
+@pytest.fixture(autouse=True)
+def _warm(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(headless, "warm_up", lambda: None)  # three recordings with all methods
+
+
+def run(*arguments: object) -> Any:
+    return CliRunner().invoke(cli, [str(one) for one in arguments])
+
+
+@pytest.fixture(scope="module")
+def bounce(request: pytest.FixtureRequest) -> Session:
+    samples: Path = request.getfixturevalue("samples")
+    return Session.open(samples / "own/bounce.h5")
+
+
+def test_lines_and_recording(bounce: Session, tmp_path: Path) -> None:
+    lines, raw = tmp_path / "out.jsonl", tmp_path / "a.raw"
+    result = run(
+        "live",
+        "--headless",
+        "--replay",
+        bounce.recording.path,
+        *QUICK,
+        "--jsonl",
+        lines,
+        "--record",
+        raw,
+        "--split-s",
+        1,
+    )
+    assert result.exit_code == 0, result.output
+    written = list(map(json.loads, lines.read_text().splitlines()))
+    shots, states = ([one for one in written if key in one] for key in ("start_us", "status"))
+    expected = [shot.to_dict(bounce.camera, bounce.ball_radius_m) for shot in bounce.estimate("triplet").shots]
+    assert [{name: one[name] for name in expected[0]} for one in shots] == expected
+    assert [(one["clock"], one["recorded_us"]) for one in shots] == [(0, 75_000), (0, 120_000)]
+    assert all(one["latency_ms"] >= 0 for one in shots)
+    assert {"events", "rate_mev_s", "dropped", "backlog_ms", "p50_ms", "p99_ms"} <= states[-1]["status"].keys()
+    recorded = open_recording(raw).read()
+    assert (recorded.t_us == bounce.source.between(0, 10**9).t_us).all()
+    assert "focal_length_mm" in raw.with_suffix(".toml").read_text()
+    again = Session.open(raw).estimate("triplet")
+    assert [shot.end_us for shot in again.shots] == [one["end_us"] for one in shots]
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".jsonl", ".parquet"])
+def test_a_table_goes_on_after_a_crash(bounce: Session, tmp_path: Path, suffix: str) -> None:
+    path, recent = tmp_path / f"day{suffix}", RecentEvents()
+    recent(0, bounce.source.between(0, 10**9))
+    shots = [LiveShot(shot, 0, 0, 12.5) for shot in bounce.estimate("triplet").shots]
+    table = ShotTable(path)
+    table.append(shots[0], bounce, recent)
+    rows = path if suffix != ".parquet" else tmp_path / "day.parquet.rows.jsonl"
+    with open(rows, "a") as file:
+        file.write('{"number": 2, "da')  # killed while it wrote
+    table = ShotTable(path)
+    assert table.count == 1
+    table.append(shots[1], bounce, recent)
+    table.close()
+    found: list[dict[str, Any]]
+    if suffix == ".csv":
+        with open(path, newline="") as file:
+            found = list(csv.DictReader(file))
+    elif suffix == ".jsonl":
+        found = list(map(json.loads, path.read_text().splitlines()))
+    else:
+        found = pyarrow.parquet.read_table(path).to_pylist()
+    assert [int(one["number"]) for one in found] == [1, 2]
+    assert [int(one["end_us"]) for one in found] == [shot.shot.end_us for shot in shots]
+    assert [one["began_by"] for one in found] == ["start", "bounce"]
+    saved = open_recording(tmp_path / found[1]["events_file"])
+    assert saved.read().t_us[0] >= shots[1].shot.start_us - 20_000
+    assert (saved.width_px, saved.height_px) == (1280, 720)
+
+
+def test_watch_writes_a_table(bounce: Session, tmp_path: Path) -> None:
+    table = tmp_path / "day.csv"
+    result = run("watch", table, "--replay", bounce.recording.path, *QUICK)
+    assert result.exit_code == 0, result.output
+    assert "2 shots in" in result.stderr and len(table.read_text().splitlines()) == 3
+    assert len(list((tmp_path / "day_shots").iterdir())) == 2
+
+
+def test_a_table_of_others_is_refused(bounce: Session, tmp_path: Path) -> None:
+    (tmp_path / "mine.csv").write_text("a,b\n1,2\n")
+    result = run("watch", tmp_path / "mine.csv", "--replay", bounce.recording.path)
+    assert "other columns" in str(result.exception)
+    assert (tmp_path / "mine.csv").read_text() == "a,b\n1,2\n"
+
+
+def test_clients_get_every_line_and_slow_ones_hold_nobody_up() -> None:
+    with JsonServer(0) as server:
+        quick = socket.create_connection(("127.0.0.1", server.port))
+        slow = socket.create_connection(("127.0.0.1", server.port))
+        while len(server._clients) < 2:
+            pass
+        got: list[bytes] = []
+        reading = threading.Thread(target=lambda: got.extend(quick.makefile("rb")))
+        reading.start()
+        line = {"text": "x" * 100_000}
+        for _ in range(200):  # more than the system keeps for the slow one
+            server.send(line)
+        assert len(server._clients) == 1
+    reading.join()
+    assert len(got) == 200 and json.loads(got[-1]) == line
+    quick.close()
+    slow.close()
+
+
+def test_recent_events_are_bounded() -> None:
+    recent = RecentEvents()
+    for start_us in range(0, 20_000_000, 100_000):
+        recent(0, EventBatch.checked([start_us], [1], [1], [True], width_px=4, height_px=4))
+    kept = recent.between(0, 0, 20_000_000)
+    assert kept.t_us[0] == 9_900_000 and kept.t_us[-1] == 19_900_000
+    assert not len(recent.between(1, 0, 20_000_000))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("live",), "--headless"),
+        (("live", "--headless", "--loop"), "--replay FILE"),
+        (("live", "--headless", "--split-s", "5"), "--record NAME.raw"),
+        (("watch", "table.txt"), "a table is one of"),
+        (("live", "--headless", "--replay", "x.h5", "--window", "0", "5"), "no --window"),
+        (("live", "--headless", "--replay", "{}", "--record", "a.h5"), "ends with .raw"),
+        (("live", "--headless", "--replay", "{}", "--speed", "0"), "speed = 0 is no speed"),
+        (("live", "--headless", "--replay", "{}", "--jsonl", "/nowhere/out"), "lines cannot be written"),
+    ],
+)
+def test_errors_say_what_to_do(bounce: Session, arguments: tuple[str, ...], said: str) -> None:
+    result = run(*(one.format(bounce.recording.path) for one in arguments))
+    assert result.exit_code != 0
+    assert said in f"{result.output} {result.exception}"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists() or os.name != "posix", reason="needs /dev/full")
+def test_a_full_disk_under_the_lines_is_said(bounce: Session) -> None:
+    result = run("live", "--headless", "--replay", bounce.recording.path, *QUICK, "--jsonl", "/dev/full")
+    assert "lines cannot be written (No space left on device)" in str(result.exception)
