@@ -35,6 +35,9 @@ class FlightPath:
         Centres of the ball.
     net_clearance_m : float, optional
         Height of the ball's lowest point over the net; None where it did not cross it in view.
+    height_std_m : float, optional
+        1 sigma of all heights together: the distance from the camera follows from the radius of the outline, which is
+        seen some tenths of a pixel outside the ball.
     landing_m : (x, y), optional
         Where it bounced; None where that was not seen.
     """
@@ -43,6 +46,7 @@ class FlightPath:
     t_us: list[float]
     points_m: list[tuple[float, float, float]]
     net_clearance_m: float | None
+    height_std_m: float | None
     landing_m: tuple[float, float] | None
 
 
@@ -70,12 +74,13 @@ def flight_path(
     places = np.stack([path["x_m"], path["y_m"], path["z_m"]], axis=1)
     if pose is not None:
         axes = np.array(pose["axes"], np.float64)
-        points, frame = places @ axes.T + pose["camera_m"], "table"
+        points, frame, upward = places @ axes.T + pose["camera_m"], "table", axes[2]
         if points[-1, 0] < points[0, 0]:
             points[:, :2] *= -1  # the table seen from the hitter's end
     else:
         right, up, forward = np.array(detail["hitter"])
         points, frame = (places - places[0]) @ np.stack([forward, -right, up], axis=1), "hitter"
+        upward = up
     middle_us = t_us.mean()
     curve = np.polynomial.polynomial.polyfit((t_us - middle_us) * 1e-6, points, 2)
 
@@ -85,10 +90,12 @@ def flight_path(
 
     drawn_us = np.linspace(max(shot["start_us"], t_us[0]), min(shot["end_us"], t_us[-1]), DRAWN_POINTS)
     drawn = at(drawn_us)
+    depth_std_m = detail.get("depth_std_m")  # early sessions have none
+    height_std_m = None if depth_std_m is None else abs(float(upward @ np.array(detail["line_of_sight"]))) * depth_std_m
     clearance = landing = None
     if frame == "table":
         ahead = drawn[:, 0]
-        if ahead[0] <= 0 <= ahead[-1]:
+        if ahead[0] <= 0 <= ahead[-1] and height_std_m is not None:
             crossed = at(np.interp([0.0], ahead, drawn_us))[0]
             clearance = float(crossed[2] - BALL_RADIUS_M - NET_HEIGHT_M)
         if shot["ended_by"] == "bounce":
@@ -100,6 +107,7 @@ def flight_path(
         t_us=drawn_us.tolist(),
         points_m=points_m,
         net_clearance_m=clearance,
+        height_std_m=height_std_m,
         landing_m=landing,
     )
 

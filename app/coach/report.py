@@ -31,7 +31,7 @@ p.note, small { color: #525b66; } ul { margin: 8px 0; font-size: 17px; }
 table { border-collapse: collapse; width: 100%; } th, td { text-align: left; padding: 4px 8px;
   border-bottom: 1px solid #d5d9df; } thead th { border-bottom: 2px solid #6b7480; }
 tr, figure { break-inside: avoid; } figure { margin: 0; } svg, img.chart { width: 100%; height: auto; }
-td img { display: block; width: 44px; height: 44px; border-radius: 6px; }
+td:nth-child(n + 5) { white-space: nowrap; } td img { display: block; width: 44px; height: 44px; border-radius: 6px; }
 @page { size: A4; margin: 14mm; } @media print { body { margin: 0; max-width: none; font-size: 11px; } }
 """
 
@@ -65,7 +65,7 @@ def report_html(session: ShotSession, words: ShotWords) -> str:
         parts += [f"<h2>{escape(t('spread'))} ({escape(t(usual))})</h2>", _chart(of_kind, players, words)]
     groups = _statistics(shots, lambda shot: f"{words.name(shot['player'])}, {t((*kind_codes(shot), 'not_seen')[0])}")
     parts += [f"<h2>{escape(t('compare'))}</h2>", _statistics_table(groups, words)]
-    drilled = [shot for shot in shots if shot["drill"]]
+    drilled = sorted((shot for shot in shots if shot["drill"]), key=lambda shot: (shot["drill"], shot["player"] or ""))
     tests = _statistics(
         drilled, lambda shot: f"{words.name(shot['drill'])}, {words.name(shot['player'])}, {_day(shot)}"
     )

@@ -18,6 +18,7 @@ from spinscope.pipeline.registry import STAGES
 from spinscope.pipeline.results import SpinEstimate
 from spinscope.pipeline.session import Choices, Result, Session
 from spinscope.pipeline.shots import Shot
+from spinscope.pipeline.spin.trajectory.motion import RADIUS_STD_PX
 from spinscope.pipeline.spin_terms import kind_of_spin
 
 from .ball_picture import ball_picture
@@ -154,7 +155,8 @@ def shot_detail(
     Returns
     -------
     dict
-        `path`: `t_us` and centres `x_m, y_m, z_m` (camera frame) of its ticks; `hitter`: rows right, up and forward
+        `path`: `t_us` and centres `x_m, y_m, z_m` (camera frame) of its ticks; `depth_std_m`: error that all their
+        distances have in common; `hitter`: rows right, up and forward
         of the hitter's frame in that of the camera (None where the ball does not fly level); `line_of_sight`: unit
         vector from the camera to the ball; and with a trusted answer `spin_rps` (camera frame), `reference_us`,
         `texture` (PNG in base64, `logo_texture`) and `proof` (`SpinProof`), None without logo events.
@@ -165,6 +167,7 @@ def shot_detail(
     columns = zip(("x_m", "y_m", "z_m"), places.T.round(4).tolist(), strict=True)
     detail: dict[str, Any] = {
         "path": {"t_us": shot.t_us.round().astype(int).tolist(), **dict(columns)},
+        "depth_std_m": float(RADIUS_STD_PX / shot.state[:, 4].mean() * np.linalg.norm(middle)),
         "hitter": hitter_frame(velocity_m_s, np.array(session.camera.up)),
         "line_of_sight": sight.tolist(),
         "spin_rps": None,

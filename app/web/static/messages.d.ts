@@ -36,7 +36,7 @@ export type EstimateMetrics = { status: string; reason: string | null; magnitude
 /** Event rate of the whole recording: counts of bins of equal length, and their edges. */
 export type EventRate = { counts: number[]; edges_us: number[] };
 /** The smoothed flight, metres. */
-export type FlightPath = { frame: "table" | "hitter"; t_us: number[]; points_m: [number, number, number][]; net_clearance_m: number | null; landing_m: [number, number] | null };
+export type FlightPath = { frame: "table" | "hitter"; t_us: number[]; points_m: [number, number, number][]; net_clearance_m: number | null; height_std_m: number | null; landing_m: [number, number] | null };
 /** Revision after a change. */
 export type Kept = { revision: number };
 /** A spin method with its colour, as CSS. */

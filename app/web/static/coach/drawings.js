@@ -137,7 +137,9 @@ export class FlightDrawing {
     if (flight.frame !== "table") return text("no_table");
     const cm = (/** @type {number} */ m) => decimal(Math.abs(100 * m));
     const net = flight.net_clearance_m;
-    const over = net === null ? text("not_over_net") : text("over_net", { value: decimal(100 * net) });
+    const over = net === null
+      ? text("not_over_net")
+      : text("over_net", { value: decimal(100 * net), error: cm(flight.height_std_m ?? 0) });
     if (flight.landing_m === null) return `${over} ${text("no_landing")}`;
     const [x, y] = flight.landing_m;
     return `${over} ${text("landed", { long: cm(x), side: cm(y), where: text(y > 0 ? "left" : "right") })}`;
