@@ -80,6 +80,13 @@ class SpinEstimate(ReadOnlyArrays):
         """Refusal with its reason."""
         return cls(method, None, None, reason, events, against)
 
+    def up_to(self, max_spin_rps: float) -> SpinEstimate:
+        """The estimate, refused where its magnitude is above the highest spin that is looked for."""
+        if self.magnitude_rps is None or self.magnitude_rps <= max_spin_rps:
+            return self
+        reason = f"{self.magnitude_rps:.0f} rps is above spin.max_spin_rps = {max_spin_rps:g} rps"
+        return SpinEstimate.refused(self.method, reason, self.events)
+
     @property
     def status(self) -> Literal["ok", "refused"]:
         """Whether there is an answer."""

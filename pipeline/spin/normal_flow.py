@@ -272,15 +272,12 @@ class NormalFlowSpin:
         spin_rps, covariance_rps2 = fit.spin / TAU, covariance / TAU**2
         if TAKES_RATE[self.parameters.magnitude_from] and rate.spin_rps is not None:
             spin_rps, covariance_rps2 = self._with_rate(spin_rps, covariance_rps2, rate)
-        magnitude_rps = float(np.linalg.norm(spin_rps))
-        if magnitude_rps > self.parameters.max_spin_rps:
-            return self._doubted(f"{magnitude_rps:.0f} rps is above spin.max_spin_rps")
         estimate = SpinEstimate("normal_flow", spin_rps, covariance_rps2, None, len(self.seen))
         if estimate.axis_std_deg is None or estimate.axis_std_deg > OPEN_DEG:
             return self._doubted(
                 f"the logo's place leaves the axis open by {estimate.axis_std_deg or 180.0:.0f} degrees"
             )
-        return estimate
+        return estimate.up_to(self.parameters.max_spin_rps)
 
     def _doubted(self, reason: str) -> SpinEstimate:
         """A refusal that keeps the fit: the next tick may start from it."""

@@ -14,7 +14,9 @@ TAKES_RATE = {"rate": True, "flow": False}
 class SpinParameters(ParameterGroup):
     """Bounds and window of every method, and the variants of the paper's."""
 
-    max_spin_rps: float = tunable(150.0, 1.0, 1000.0, 5.0, "rps", "highest spin looked for; bounds the flow's speed")
+    max_spin_rps: float = tunable(
+        150.0, 1.0, 1000.0, 5.0, "rps", "highest spin looked for or answered; bounds the flow's speed"
+    )
     window_us: int = tunable(
         500_000, 5000, 10_000_000, 5000, "us", "how far back in time the events of an estimate may lie"
     )

@@ -127,6 +127,7 @@ def step(
         # The rhythm's spin is partly along the flight, or comes back more than once a turn.
         reason = f"no spin of {np.linalg.norm(spins_rps[0][0]):.0f} rps across the flight bends it like this one"
         estimate = SpinEstimate.refused(METHOD, reason, contrast.estimate.events)
+    estimate = estimate.up_to(state.context["spin.max_spin_rps"])
     by_witness = {name: log_mean(values) for name, values in logs.items()}
     if basis in NAMED_BY:
         by_witness[NAMED_BY[basis]] = own

@@ -1,0 +1,19 @@
+"""Highest spin: no method answers beyond it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from spinscope.pipeline.session import Choices, Session
+
+HIGHEST_RPS = 30.0
+
+
+def test_no_method_answers_beyond_the_highest_spin(samples: Path) -> None:
+    """A ball of 54 rps with the outline's flow among the logo's, which gives hundreds of rps."""
+    choices = Choices(assignments=(f"spin.max_spin_rps={HIGHEST_RPS}", "logo.pad_px=0"))
+    result = Session.open(samples / "flight_fast_top.h5", choices).estimate()
+    estimates = [estimate for tick in result.ticks if tick.balls for estimate in tick.estimates.values()]
+    assert all((estimate.magnitude_rps or 0.0) <= HIGHEST_RPS for estimate in estimates)
+    refusing = {estimate.method for estimate in estimates if "above spin.max_spin_rps" in (estimate.reason or "")}
+    assert refusing >= {"triplet", "contrast", "combined"}
