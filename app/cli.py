@@ -42,7 +42,7 @@ def cli(context: click.Context) -> None:
         from .web import serve
 
         note(f"opening the sample {DEFAULT_SAMPLE.name}; `spinscope --help` lists what else there is")
-        serve(DEFAULT_SAMPLE, Choices(), None, open_browser=True)
+        serve(DEFAULT_SAMPLE, Choices())
 
 
 for _command in (info, analyze, view, coach, convert, tune, settings, simulate, evaluate, calibrate, label, live, cameras, watch):

@@ -11,7 +11,7 @@ import click
 from spinscope.pipeline.session import Choices
 
 from ..terminal import note
-from .options import session_options
+from .options import page_options, session_options
 
 
 class DefaultCommandGroup(click.Group):
@@ -42,17 +42,13 @@ def coach() -> None:
     help="Folder of the session that the recordings belong to; by default one of the user's own is made.",
 )
 @click.option("--jobs", type=click.IntRange(1), help="Processes that analyze; one a core by default.")
-@click.option(
-    "--port", type=click.IntRange(0, 65535), help="Port of the page; another free one is taken when it is busy."
-)
-@click.option("--no-browser", is_flag=True, help="Only print the address.")
+@page_options
 @session_options
 def open_page(
     paths: tuple[Path, ...],
     folder: Path | None,
     jobs: int | None,
-    port: int | None,
-    no_browser: bool,
+    page: dict[str, Any],
     choices: Choices,
 ) -> None:
     """Open the page; recordings are analyzed in the background, folders are watched for new ones."""
@@ -76,7 +72,7 @@ def open_page(
         sessions.insert(0, ShotSession(folder))
     if not sessions:
         sessions = [sample_session()]
-    serve_coach(CoachState([*sessions, *other_sessions(sessions)], analyses), port, open_browser=not no_browser)
+    serve_coach(CoachState([*sessions, *other_sessions(sessions)], analyses), **page)
 
 
 def _words_options(command: Callable[..., None]) -> Callable[..., None]:

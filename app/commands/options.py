@@ -176,6 +176,31 @@ def session_options(command: Callable[..., None]) -> Callable[..., None]:
     return reading_options(_decorated(with_choices, command, *options))
 
 
+def page_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of a served page to a command, which gets them as one `page`: arguments of `web.serve`."""
+
+    def with_page(port: int | None, no_browser: bool, hosts: tuple[str, ...], **rest: Any) -> None:
+        command(page={"port": port, "open_browser": not no_browser, "hosts": hosts}, **rest)
+
+    return _decorated(
+        with_page,
+        command,
+        click.option(
+            "--port",
+            type=click.IntRange(0, 65535),
+            help="Port of the page; another free one is taken when it is busy.",
+        ),
+        click.option("--no-browser", is_flag=True, help="Only print the address."),
+        click.option(
+            "--allow-host",
+            "hosts",
+            multiple=True,
+            metavar="NAME",
+            help="Answer requests for this host, too, as behind a proxy; repeatable. An SSH tunnel needs none.",
+        ),
+    )
+
+
 def write_text(output: str, text: str) -> None:
     """Write text to a file, which appears whole or not at all, or to standard output for "-"."""
     if output == "-":

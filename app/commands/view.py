@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -12,7 +13,7 @@ from spinscope.pipeline.flight_calibration import with_measured_up
 from spinscope.pipeline.session import Choices, Session
 
 from ..terminal import ProgressBar, note
-from .options import RECORDING, ListingCommand, RegisteredName, session_options
+from .options import RECORDING, ListingCommand, RegisteredName, page_options, session_options
 
 
 def _layouts() -> dict[str, str]:
@@ -45,13 +46,22 @@ def _layouts() -> dict[str, str]:
     metavar="N",
     help="Follow the ball of shot N, as `analyze` numbers them; the first ball by default.",
 )
+@page_options
 @session_options
-def view(recording: Path, save: Path | None, native: bool, layout: str, followed: int | None, choices: Choices) -> None:
+def view(
+    recording: Path,
+    save: Path | None,
+    native: bool,
+    layout: str,
+    followed: int | None,
+    page: dict[str, Any],
+    choices: Choices,
+) -> None:
     """Show every stage of a recording in the viewer."""
     if not (save or native):
         from ..web import serve
 
-        serve(recording, choices, tools=False, layout=layout, followed=followed)
+        serve(recording, choices, **page, tools=False, layout=layout, followed=followed)
         return
     from .. import viewer
 

@@ -18,7 +18,7 @@ from .open_recording import VIEW_FRAMES_BYTES, OpenRecording
 from .shot_detection_job import ShotDetectionJob
 
 RECORDINGS_KEPT = 2  # each holds up to 110 MB of events
-SESSIONS_MOST = 16
+SESSIONS_MOST = 16  # a page opened beyond them takes the place of one that was left
 ALONE_S = 20.0  # a session without its browser for so long is closed; a reload takes less
 
 
@@ -84,10 +84,16 @@ class AppState:
         recording = self.recording(name)
         self.close_lonely_sessions()
         with self._lock:
-            if len(self.sessions) >= SESSIONS_MOST:
+            left = [one for one in self.sessions.values() if one.listeners == 0]
+            longest_left = min(left, key=lambda one: one.last_sign_of_life_s, default=None)
+            if len(self.sessions) < SESSIONS_MOST:
+                longest_left = None
+            elif longest_left is None:
                 raise ParameterError(f"{SESSIONS_MOST} pages are open: close one of them")
             session = ClientSession(recording, self.drawings)
             self.sessions[session.id] = session
+        if longest_left is not None:
+            self.close_session(longest_left)
         self.detect_shots(session)
         return session
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Collection
 from contextlib import asynccontextmanager, suppress
 
 from fastapi import FastAPI, HTTPException, Response
@@ -32,8 +32,11 @@ NO_STORE = {"cache-control": "no-store"}
 SessionOf = Callable[[str], ClientSession]
 
 
-def application(state: AppState) -> FastAPI:
-    """The application over the open recordings; raises SpinscopeError when the viewer is not installed right."""
+def application(state: AppState, token: str | None = None, hosts: Collection[str] = ()) -> FastAPI:
+    """The application over the open recordings; raises SpinscopeError when the viewer is not installed right.
+
+    See SecurityMiddleware for `token` and `hosts`.
+    """
     viewer_version()
 
     @asynccontextmanager
@@ -47,7 +50,7 @@ def application(state: AppState) -> FastAPI:
 
     # Without the pages of documentation, which load their scripts from elsewhere.
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None, lifespan=lifespan)
-    app.add_middleware(SecurityMiddleware)
+    app.add_middleware(SecurityMiddleware, token=token, hosts=hosts)
     add_error_handlers(app)
     _add_assets(app)
 

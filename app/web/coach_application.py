@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Collection, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -105,8 +105,8 @@ class CoachState:
             analysis.close()
 
 
-def coach_application(state: CoachState) -> FastAPI:
-    """The application over the open sessions."""
+def coach_application(state: CoachState, token: str | None = None, hosts: Collection[str] = ()) -> FastAPI:
+    """The application over the open sessions; see SecurityMiddleware for `token` and `hosts`."""
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -115,7 +115,7 @@ def coach_application(state: CoachState) -> FastAPI:
 
     # Without the pages of documentation, which load their scripts from elsewhere.
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None, lifespan=lifespan)
-    app.add_middleware(SecurityMiddleware)
+    app.add_middleware(SecurityMiddleware, token=token, hosts=hosts)
     add_error_handlers(app)
 
     @app.get("/", include_in_schema=False)

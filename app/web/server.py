@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import gc
 import os
+import secrets
 import shutil
 import socket
 import sys
 import threading
 import webbrowser
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 import uvicorn
@@ -50,6 +51,7 @@ def serve(
     port: int | None = None,
     *,
     open_browser: bool = True,
+    hosts: Collection[str] = (),
     tools: bool = True,
     layout: str = "all",
     followed: int | None = None,
@@ -62,6 +64,8 @@ def serve(
         Port asked for; another free one is taken when it is busy. None for the usual one.
     open_browser : bool
         Whether to open the page where there is a browser; the address is printed in any case.
+    hosts : collection of str
+        Names besides 127.0.0.1 and localhost by which the page may be reached.
     tools, layout, followed
         See AppState.
 
@@ -75,9 +79,10 @@ def serve(
         recording = state.recording(on_progress=bar)
     # While the browser loads the page and the viewer, which takes longer.
     threading.Thread(target=_load_kernels, args=(recording,), name="kernels", daemon=True).start()
+    token = _new_token()
 
     def announce(own_port: int) -> None:
-        address = f"http://{HOST}:{own_port}/"
+        address = _address(own_port, token)
         tunnel = _tunnel(own_port)
         if tools:
             sys.stdout.write(f"{address}\n")
@@ -91,21 +96,24 @@ def serve(
 
     for warning in [] if tools else recording.session.warnings:
         note(f"warning: {warning}")
-    run_application(application(state), port, state.close, announce)
+    run_application(application(state, token, hosts), port, state.close, announce)
 
 
-def serve_coach(state: CoachState, port: int | None = None, *, open_browser: bool = True) -> None:
+def serve_coach(
+    state: CoachState, port: int | None = None, *, open_browser: bool = True, hosts: Collection[str] = ()
+) -> None:
     """Serve the coach's page until Ctrl-C; see `serve`."""
     state.start()
+    token = _new_token()
 
     def announce(own_port: int) -> None:
-        address = f"http://{HOST}:{own_port}/"
+        address = _address(own_port, token)
         sys.stdout.write(f"{address}\n")
         sys.stdout.flush()
         if not (open_browser and show_in_browser(address)):
             note(f"open the address in a browser; from elsewhere, {_tunnel(own_port)}")
 
-    run_application(coach_application(state), port, state.close, announce)
+    run_application(coach_application(state, token, hosts), port, state.close, announce)
 
 
 def run_application(app: FastAPI, port: int | None, close: Callable[[], None], announce: Callable[[int], None]) -> None:
@@ -132,8 +140,17 @@ def run_application(app: FastAPI, port: int | None, close: Callable[[], None], a
         listening.close()
 
 
+def _new_token() -> str:
+    """Secret of one start of the server, for the page's address."""
+    return secrets.token_urlsafe(24)
+
+
+def _address(port: int, token: str) -> str:
+    return f"http://{HOST}:{port}/?token={token}"
+
+
 def _tunnel(port: int) -> str:
-    return f"`ssh -L {port}:{HOST}:{port} THIS_MACHINE` brings it to your own machine"
+    return f"`ssh -L {port}:{HOST}:{port} THIS_MACHINE` brings it to the same address of yours"
 
 
 def show_in_browser(address: str) -> bool:

@@ -123,6 +123,9 @@ function listen() {
     app.bar.say("The server does not answer; trying again ...");
     document.body.classList.add("lost");
   });
+  connection.addEventListener("outdated", () => {
+    notice("The server was started anew: open the address that it prints.", "warning", 0);
+  });
   connection.addEventListener("back", () => {
     document.body.classList.remove("lost");
     notice("The server is back.", "info", 3);

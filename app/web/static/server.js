@@ -124,8 +124,9 @@ export class Connection extends EventTarget {
       try {
         const opening = await this.open(this.recording);
         this.dispatchEvent(new CustomEvent("back", { detail: opening }));
-      } catch {
-        this.#reopen();
+      } catch (error) {
+        if (error instanceof Refused && error.status === 401) this.dispatchEvent(new CustomEvent("outdated"));
+        else this.#reopen();
       }
     }, REOPEN_MS);
   }

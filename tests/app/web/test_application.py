@@ -7,6 +7,7 @@ import dataclasses
 import io
 import json
 import shlex
+import time
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from click.testing import CliRunner
 from rerun.chunk import RrdReader
 
 from spinscope.app.cli import cli
-from spinscope.app.web.app_state import AppState
+from spinscope.app.web.app_state import SESSIONS_MOST, AppState
 from spinscope.app.web.open_recording import OpenRecording
 from spinscope.pipeline.registry import STAGES, Parameters, needed_stages
 from spinscope.pipeline.session import Choices
@@ -200,7 +201,7 @@ def test_strangers_are_turned_away(tuner: Served) -> None:
     assert httpx.get(f"{tuner.address}static/../application.py").status_code == 404
     assert httpx.get(f"{tuner.address}static/%2e%2e/application.py").status_code == 404
     headers = {"origin": own, "sec-fetch-site": "same-origin"}
-    assert httpx.post(page, json={}, headers=headers).status_code == 200
+    assert httpx.post(page, json={}, headers=headers, timeout=60).status_code == 200
 
 
 def test_the_page_is_reached_through_a_tunnel_at_another_port_and_by_a_link(tuner: Served) -> None:
@@ -209,6 +210,22 @@ def test_the_page_is_reached_through_a_tunnel_at_another_port_and_by_a_link(tune
     visit = {"sec-fetch-site": "cross-site", "sec-fetch-mode": "navigate"}
     assert httpx.get(tuner.address, headers=visit).status_code == 200
     assert httpx.get(f"{tuner.address}static/main.js", headers=visit).status_code == 403
+
+
+def test_pages_that_were_left_make_room_for_others(client: Client, tuner: Served) -> None:
+    """Recordings opened in quick succession: the page that listens stays."""
+    until = time.monotonic() + 10
+    while tuner.state.sessions[client.opening["session"]].listeners == 0 and time.monotonic() < until:
+        time.sleep(0.01)
+    for _ in range(SESSIONS_MOST + 4):
+        answer = httpx.post(f"{tuner.address}api/sessions", json={}, timeout=60)
+        assert answer.status_code == 200, answer.text
+    assert len(tuner.state.sessions) <= SESSIONS_MOST
+    assert {client.opening["session"], answer.json()["session"]} <= tuner.state.sessions.keys()
+    for session in list(tuner.state.sessions.values()):
+        if session.listeners == 0:
+            tuner.state.close_session(session)
+            session.join(10)
 
 
 @pytest.mark.parametrize("name", ["../README.md", "/etc/passwd", "nothing.h5", "..", "", "a/../flight_back.h5x"])

@@ -31,23 +31,27 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[tuple[Any, ...], dict[s
 
 def test_without_a_command_the_default_sample_is_tuned(asked: list[Any]) -> None:
     assert CliRunner().invoke(cli, []).exit_code == 0
-    assert asked == [((DEFAULT_SAMPLE, Choices(), None), {"open_browser": True})]
+    assert asked == [((DEFAULT_SAMPLE, Choices()), {})]
     assert DEFAULT_SAMPLE.is_file()
 
 
 def test_the_options_of_tune_are_handed_on(asked: list[Any]) -> None:
     arguments = ["tune", "shot.h5", "--port", "0", "--no-browser", "--set", "logo.pad_px=3", "--window", "5", "9"]
+    arguments += ["--allow-host", "lab.example", "--allow-host", "proxy.example"]
     assert CliRunner().invoke(cli, arguments).exit_code == 0
     choices = Choices(assignments=("logo.pad_px=3",), window_us=(5, 9))
-    assert asked == [((Path("shot.h5"), choices, 0), {"open_browser": False})]
+    page = {"port": 0, "open_browser": False, "hosts": ("lab.example", "proxy.example")}
+    assert asked == [((Path("shot.h5"), choices), page)]
 
 
 def test_view_serves_the_page_without_tools(asked: list[Any]) -> None:
-    assert CliRunner().invoke(cli, ["view", "shot.h5", "--layout", "spin", "--set", "logo.pad_px=3"]).exit_code == 0
+    arguments = ["view", "shot.h5", "--layout", "spin", "--set", "logo.pad_px=3", "--port", "0"]
+    assert CliRunner().invoke(cli, arguments).exit_code == 0
+    page = {"port": 0, "open_browser": True, "hosts": ()}
     assert asked == [
         (
             (Path("shot.h5"), Choices(assignments=("logo.pad_px=3",))),
-            {"tools": False, "layout": "spin", "followed": None},
+            {**page, "tools": False, "layout": "spin", "followed": None},
         )
     ]
 
@@ -64,12 +68,14 @@ def test_the_address_is_one_line_and_ctrl_c_leaves_nothing_running(samples: Path
     process = started("tune", str(samples / "spinner_ball2_side.h5"), "--no-browser", "--port", "0")
     assert process.stdout is not None
     address = process.stdout.readline().strip()
-    answer = httpx.get(address, timeout=30)
-    assert answer.status_code == 200 and address.startswith("http://127.0.0.1:")
+    bare, _, token = address.partition("?token=")
+    port = bare.rpartition(":")[2].strip("/")
+    assert bare == f"http://127.0.0.1:{port}/" and len(token) >= 32
+    assert httpx.get(address, timeout=30).status_code == 200
+    assert httpx.get(bare, timeout=30).status_code == 401
     process.send_signal(signal.SIGINT)
     rest, errors = process.communicate(timeout=60)
     assert process.returncode == 0 and rest == "" and "Traceback" not in errors
-    port = address.rpartition(":")[2].strip("/")
     assert f"ssh -L {port}:127.0.0.1:{port}" in errors
     with pytest.raises(httpx.ConnectError):
         httpx.get(address, timeout=5)
@@ -80,12 +86,14 @@ def test_view_says_where_it_is_and_how_to_get_there_without_a_browser(samples: P
     assert process.stderr is not None
     line = next(line for line in process.stderr if "http://" in line)
     found = re.fullmatch(
-        r"the viewer is at (http://127\.0\.0\.1:(\d+)/) \(no browser here: `ssh -L \2:127\.0\.0\.1:\2 THIS_MACHINE` .*"
+        r"the viewer is at (http://127\.0\.0\.1:(\d+)/)\?token=(\S+) \(no browser here: "
+        r"`ssh -L \2:127\.0\.0\.1:\2 THIS_MACHINE` .*"
         r"`--save FILE\.rrd` .*\); Ctrl-C stops it\n",
         line,
     )
     assert found, line
-    opening = httpx.post(f"{found[1]}api/sessions", json={}, timeout=30).json()
+    headers = {"authorization": f"token {found[3]}"}
+    opening = httpx.post(f"{found[1]}api/sessions", json={}, headers=headers, timeout=30).json()
     assert opening["tools"] is False and opening["tab"] == "Coach"
     process.send_signal(signal.SIGINT)
     written, errors = process.communicate(timeout=60)
