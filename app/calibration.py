@@ -16,7 +16,7 @@ from spinscope.pipeline.camera import Camera
 from spinscope.pipeline.errors import ParameterError, RecordingError
 from spinscope.pipeline.files import atomic_file, check_writable
 from spinscope.pipeline.presets import preset
-from spinscope.pipeline.recordings import open_recording
+from spinscope.pipeline.recordings import ReadingOptions, open_recording
 from spinscope.pipeline.session import Choices, Progress, Session
 
 
@@ -26,7 +26,7 @@ def calibrate_by_board(
     square_mm: float,
     pattern: Any,
     pixel_um: float,
-    sensor_px: tuple[int, int] | None,
+    reading: ReadingOptions,
     out: Path,
     on_progress: Progress | None = None,
 ) -> list[str]:
@@ -41,7 +41,7 @@ def calibrate_by_board(
     of_sensor: tuple[int, int] | None = None
     for number, path in enumerate(recordings):
         try:
-            recording = open_recording(path, sensor=sensor_px)
+            recording = open_recording(path, **dataclasses.asdict(reading))
             own = recording.width_px, recording.height_px
             if of_sensor not in (None, own):
                 raise RecordingError(f"its sensor is {own[0]} x {own[1]} px, the first one's another: {path}")
@@ -67,12 +67,12 @@ def calibrate_by_ball(
     ball_mm: float,
     fixed_ball: tuple[float, float, float] | str,
     pixel_um: float,
-    sensor_px: tuple[int, int] | None,
+    reading: ReadingOptions,
     out: Path,
 ) -> list[str]:
     """Find the focal length by a ball of known size at a known distance; see `calibrate_by_board`."""
     _check_name(out)
-    session = Session.open(recording, Choices(fixed_ball=fixed_ball, sensor_px=sensor_px))
+    session = Session.open(recording, Choices(fixed_ball=fixed_ball, reading=reading))
     track = session.parameters.track
     circle = track.fixed_x_px, track.fixed_y_px, track.fixed_radius_px
     x, y, radius = (float(value) for value in circle if value is not None)

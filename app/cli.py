@@ -10,14 +10,13 @@ from spinscope.pipeline.errors import SpinscopeError
 from spinscope.pipeline.session import DEFAULT_SAMPLE, Choices
 
 from .commands.analyze import analyze
-from .commands.coach import coach
 from .commands.calibrate import calibrate
+from .commands.cameras import cameras
+from .commands.coach import coach
 from .commands.convert import convert
 from .commands.evaluate import evaluate
 from .commands.info import info
 from .commands.label import label
-from .commands.cameras import cameras
-from .commands.live import live
 from .commands.live import live, watch
 from .commands.options import join_fixed_ball
 from .commands.settings import settings
@@ -45,7 +44,11 @@ def cli(context: click.Context) -> None:
         serve(DEFAULT_SAMPLE, Choices())
 
 
-for _command in (info, analyze, view, coach, convert, tune, settings, simulate, evaluate, calibrate, label, live, cameras, watch):
+COMMANDS = (
+    info, analyze, view, coach, convert, tune, settings, simulate, evaluate, calibrate, label, live, watch, cameras
+)  # fmt: skip
+
+for _command in COMMANDS:
     cli.add_command(_command)
 
 

@@ -6,7 +6,7 @@ import json
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -177,7 +177,7 @@ def session_rows(context: TaskContext, path: Path, content: str, choices: Choice
 
 def settings_hash(choices: Choices) -> str:
     """Hash of all options that the results depend on."""
-    return digest([choices.parameters().as_dict(), choices.window_us, choices.fixed_ball, choices.sensor_px])
+    return digest([choices.parameters().as_dict(), choices.window_us, choices.fixed_ball, asdict(choices.reading)])
 
 
 def _unpacked(known: KnownRecording, text: str) -> tuple[KnownRecording, AnalyzedRecording | None]:

@@ -7,8 +7,10 @@ from typing import Any
 
 import click
 
+from spinscope.pipeline.recordings import ReadingOptions
+
 from ..terminal import ProgressBar, note
-from .options import RECORDING, FixedBall, sensor_option
+from .options import RECORDING, FixedBall, reading_options
 
 
 class BoardSize(click.ParamType[tuple[int, int]]):
@@ -39,7 +41,7 @@ def calibrate() -> None:
 @click.option("--fixed-ball", type=FixedBall(), default="auto", show_default=True, help="Circle of that ball.")
 @click.option("--pixel-um", type=float, default=4.86, show_default=True, help="Pitch of the pixels.")
 @click.option("--out", type=click.Path(path_type=Path), required=True, metavar="FILE.toml", help="Preset to write.")
-@sensor_option
+@reading_options
 def camera(
     recordings: tuple[Path, ...],
     board: tuple[int, int] | None,
@@ -50,7 +52,7 @@ def camera(
     fixed_ball: tuple[float, float, float] | str,
     pixel_um: float,
     out: Path,
-    sensor: tuple[int, int] | None,
+    reading: ReadingOptions,
 ) -> None:
     """Find focal length, principal point and distortion from recordings of a blinking board.
 
@@ -67,12 +69,14 @@ def camera(
         if ball_distance_m is not None:
             if len(recordings) != 1:
                 raise click.UsageError("a ball is measured in one recording: give one FILE")
-            said = running.calibrate_by_ball(recordings[0], ball_distance_m, ball_mm, fixed_ball, pixel_um, sensor, out)
+            said = running.calibrate_by_ball(
+                recordings[0], ball_distance_m, ball_mm, fixed_ball, pixel_um, reading, out
+            )
         else:
             assert board is not None
             if square_mm is None:
                 raise click.UsageError("how large are the board's squares? give --square-mm")
-            said = running.calibrate_by_board(recordings, board, square_mm, pattern, pixel_um, sensor, out, bar)
+            said = running.calibrate_by_board(recordings, board, square_mm, pattern, pixel_um, reading, out, bar)
     for line in said:
         note(line)
 

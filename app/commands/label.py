@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 
 import click
 
+from spinscope.pipeline.recordings import ReadingOptions
+
 from ..terminal import note
-from .options import RECORDING, sensor_option
+from .options import RECORDING, reading_options
 
 
 @click.command()
@@ -18,8 +21,8 @@ from .options import RECORDING, sensor_option
     metavar="TRUTH.csv",
     help="Labels to write; NAME.labels.csv beside the recording by default, where `evaluate detector --real` looks.",
 )
-@sensor_option
-def label(recording: Path, out: Path | None, sensor: tuple[int, int] | None) -> None:
+@reading_options
+def label(recording: Path, out: Path | None, reading: ReadingOptions) -> None:
     """Label the ball by blobs in frames of 10 ms, as the paper does: time, centre, radius and their error.
 
     The labels owe nothing to the ball detector, so that they can judge it. A ball must cross the image alone, before a
@@ -31,7 +34,7 @@ def label(recording: Path, out: Path | None, sensor: tuple[int, int] | None) -> 
 
     out = out or recording.with_suffix(".labels.csv")
     check_writable(out, "labels")
-    opened = open_recording(recording, sensor=sensor)
+    opened = open_recording(recording, **asdict(reading))
     labels = ball_labels(opened.read(), (opened.height_px, opened.width_px))
     labels.write(out)
     flights, std_px = int(labels.ball.max()), float(labels.std_px.mean())

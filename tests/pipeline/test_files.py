@@ -98,7 +98,7 @@ def test_a_full_device_is_an_error_and_stays_a_device(tmp_path: Path) -> None:
 
 
 def test_a_name_that_the_system_does_not_take_is_refused_before_the_work(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match="^file cannot be written, File name too long"):
+    with pytest.raises(RecordingError, match=r"^file cannot be written, File name too long"):
         check_writable(tmp_path / ("x" * 300))
 
 

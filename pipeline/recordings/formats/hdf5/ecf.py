@@ -60,8 +60,7 @@ class EcfRows:
         mask, packed = self._data.id.read_direct_chunk((start,))
         if mask:  # stored as it is
             records = np.frombuffer(packed, self._data.dtype, out.t.size)
-            for name, column in zip(EcfBlock._fields, out, strict=True):
-                column[:] = records[name]
+            out.t[:], out.x[:], out.y[:], out.p[:] = (records[name] for name in "txyp")
         elif decode_ecf(out, np.frombuffer(packed + bytes(PAD_BYTES), np.uint8)) < needed:
             raise RecordingError(
                 f"the block of events from {start} on is damaged: copy or export the file again: {self._path}"
