@@ -137,7 +137,7 @@ def estimate_with_measured_up(session: Session, method: str = "all", on_progress
 
 
 def with_measured_up(session: Session, estimated: Callable[[], Result]) -> Result:
-    """What `estimated` gives, with camera.up from the flights where nobody states it and they contradict it.
+    """Result of `estimated`, with camera.up from the flights where nobody states it and they contradict it.
 
     The session's warnings say so, as where a stated direction is contradicted, which stands.
     """

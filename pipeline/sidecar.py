@@ -112,7 +112,7 @@ class Sidecar:
 
     @classmethod
     def beside(cls, recording: Path) -> Sidecar:
-        """What `NAME.toml` and `truth.csv` state of a recording; raises RecordingError or ParameterError."""
+        """Statements of `NAME.toml` and `truth.csv` on a recording; raises RecordingError or ParameterError."""
         own, table = recording.with_suffix(".toml"), truth_table_of(recording)
         stated = cls._of(stated_tables(table, recording), table) if table else cls()
         return cls._of(_toml_tables(own), own)._over(stated) if own.is_file() else stated

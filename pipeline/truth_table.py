@@ -31,7 +31,7 @@ def truth_table_of(recording: Path) -> Path | None:
 
 
 def stated_tables(table: Path, recording: Path) -> dict[str, dict[str, Any]]:
-    """What a `truth.csv` states of a recording, as the tables of a sidecar; empty without a row for it.
+    """Statements of a `truth.csv` on a recording, as the tables of a sidecar; empty without a row for it.
 
     The column `recording` holds a recording's path from the folder of the table, with or without its suffix. A vector
     is one cell with three numbers, or a column for each component. Empty cells state nothing, nor do columns of other

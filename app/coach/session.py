@@ -41,7 +41,7 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class KnownRecording:
-    """What the results that a session holds of a recording depend on, and the error where there are none."""
+    """Identity of a recording's results in a session: all that they depend on, and the error where there are none."""
 
     recording_hash: str
     settings_hash: str

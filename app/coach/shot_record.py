@@ -89,7 +89,7 @@ class ShotRecord:
 
 @dataclass(frozen=True, slots=True)
 class AnalyzedRecording:
-    """What a session keeps of one recording: its shots, or why there are none."""
+    """Results of one recording in a session: its shots, or why there are none."""
 
     shots: tuple[ShotRecord, ...]
     no_shot_reason: str | None
@@ -150,7 +150,7 @@ def _record(result: Result, shot: Shot, logo: LogoEvents | None, number: int) ->
 def shot_detail(
     session: Session, shot: Shot, trusted: SpinEstimate | None, velocity_m_s: Floats | None, logo: LogoEvents | None
 ) -> dict[str, Any]:
-    """What the view of a shot draws, ready for JSON.
+    """Content of the view of a shot, ready for JSON.
 
     Returns
     -------

@@ -45,7 +45,7 @@ class PartOf(click.ParamType[tuple[int, int]]):
 
 
 @dataclass(frozen=True, slots=True)
-class AnalyzedRecording:
+class PrintedRecording:
     """Report on one recording, and its shots as rows; no rows where it could not be analyzed."""
 
     report: dict[str, Any]
@@ -157,18 +157,18 @@ def analyze(
 
 def analyze_one_by_one(recordings: Sequence[Path], choices: Choices, method: str, output: str | None) -> bool:
     """Report on recordings as a table for people or as JSON; whether one of several could not be analyzed."""
-    analyzed: list[AnalyzedRecording] = []
+    analyzed: list[PrintedRecording] = []
     for recording in recordings:
         try:
             with ProgressBar() as bar:
                 report, result = report_on(recording, choices, method, bar, cold=not analyzed)
-            analyzed.append(AnalyzedRecording(report, shot_rows(result)))
+            analyzed.append(PrintedRecording(report, shot_rows(result)))
         except SpinscopeError as error:
             if len(recordings) == 1:
                 raise
             note(f"error: {error}")
             failed = {"schema": 1, "recording": {"path": str(recording)}, "error": str(error)}
-            analyzed.append(AnalyzedRecording(failed))
+            analyzed.append(PrintedRecording(failed))
     if output is None:
         print_shots(analyzed)
     else:
@@ -215,7 +215,7 @@ def _results(recordings: Sequence[Path], choices: Choices) -> Iterator[Result]:
             continue
 
 
-def print_shots(analyzed: Sequence[AnalyzedRecording]) -> None:
+def print_shots(analyzed: Sequence[PrintedRecording]) -> None:
     """Print the shots for people: a heading for every shot and a row for every method under it."""
     for one in analyzed:
         report = one.report

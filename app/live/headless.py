@@ -28,7 +28,7 @@ SWITCH_S = 0.0005
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outputs:
-    """Where the results of a run without a page go.
+    """Destinations of the results of a run without a page.
 
     Attributes
     ----------

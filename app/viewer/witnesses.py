@@ -86,7 +86,7 @@ def _drawn(run: ViewedRun, name: str, colour: at.Colour, ticks: list[Strips]) ->
 
 
 def _odds(run: ViewedRun, name: str, row: int, said: list[Witness | None]) -> list[Chunk]:
-    """How much likelier a witness makes the combined spin than the next best one, where it speaks for or against it."""
+    """Odds of the combined spin against the next best one by one witness, where it speaks for or against it."""
     entity = f"{at.WITNESSES}/{name}/odds"
     texts = ["" if witness is None else odds_words(witness.log_odds) for witness in said]
     shown = [text for text in texts if text]

@@ -80,7 +80,7 @@ class CoachState:
         return self.sessions[name]
 
     def analysis(self, session: ShotSession) -> AnalysisState:
-        """What goes on in the background for a session."""
+        """State of the work in the background for a session."""
         failures = {
             Path(path).name: row["error"] for path, row in session.recordings().items() if row["error"] is not None
         }
@@ -90,7 +90,7 @@ class CoachState:
         )
 
     def progress(self, session: ShotSession) -> AnalysisProgress:
-        """How far the work on a session is."""
+        """Progress of the work on a session."""
         return next((one.progress for one in self._analyses if one.session is session), AnalysisProgress())
 
     def start(self) -> None:

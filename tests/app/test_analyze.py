@@ -18,7 +18,7 @@ import pytest
 from click.testing import CliRunner
 
 from spinscope.app.cli import cli
-from spinscope.app.commands.analyze import AnalyzedRecording, print_shots
+from spinscope.app.commands.analyze import PrintedRecording, print_shots
 from spinscope.pipeline import calibrate_flights, estimate
 from spinscope.pipeline.flight_calibration import estimate_with_measured_up
 from spinscope.pipeline.recordings import open_recording, write_recording
@@ -188,7 +188,7 @@ def test_the_table_says_how_a_shot_began_and_ended_and_why_nothing_is_trusted(
     result = Session.open(samples / "flight_side.h5").estimate("normal_flow")
     report = result.to_dict()
     report["shots"][0] |= {"began_by": "hit", "ended_by": "bounce"}
-    print_shots([AnalyzedRecording(report, shot_rows(result))])
+    print_shots([PrintedRecording(report, shot_rows(result))])
     table = capsys.readouterr().out
     assert "(from a hit, bounced)" in table
     assert f"none is trusted: {report['shots'][0]['best_reason']}" in table
