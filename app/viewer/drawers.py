@@ -50,6 +50,7 @@ class Drawer:
 DRAWERS: Registry[Drawer] = Registry("drawer")
 for _drawer in (
     Drawer(name="filter", stage="filter", draw=image.filter_chunks, plots=(plots.EVENT_PLOT,)),
+    Drawer(name="frames", draw=image.frame_chunks),
     Drawer(name="surface", stage="surface", draw=image.surface_chunks),
     Drawer(name="track", stage="track", draw=image.track_chunks, plots=(*plots.STATE_PLOTS, *plots.RESIDUAL_PLOTS)),
     Drawer(name="logo", stage="logo", draw=image.logo_chunks),

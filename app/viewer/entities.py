@@ -14,6 +14,7 @@ TIMELINE = "t"
 # The image plane: pixels as in the recording, origin at the centre of the top-left pixel.
 IMAGE = "/image"
 FRAME = "/image/frame"
+CAMERA_FRAMES = "/image/camera"
 EVENTS = "/image/events"
 SURFACE = "/image/surface"
 HOUGH = "/image/hough"

@@ -49,6 +49,19 @@ def filter_chunks(run: ViewedRun) -> list[Chunk]:
     return [once(at.FRAME, frame), *_events(run, at.EVENTS, positions, classes, radius_ui=1.0)]
 
 
+def frame_chunks(run: ViewedRun) -> list[Chunk]:
+    """Pictures that the camera took, each from the middle of its exposure on, beneath the events."""
+    if not run.frames:
+        return []
+    # Pixels are named by their centres, see `surface_chunks`; all pictures of a camera begin at the same pixel.
+    corner = rr.Transform3D(translation=[run.frames[0].x_px - 0.5, run.frames[0].y_px - 0.5, 0.0])
+    columns = rr.EncodedImage.columns(blob=[png(frame.pixels) for frame in run.frames])
+    return [
+        once(at.CAMERA_FRAMES, corner, rr.EncodedImage.from_fields(media_type="image/png", draw_order=-20.0)),
+        columns_at(at.CAMERA_FRAMES, np.array([frame.t_us for frame in run.frames]), columns),
+    ]
+
+
 def surface_chunks(run: ViewedRun) -> list[Chunk]:
     """The whole surface in its own pixels, as the tracker searched it."""
     blank = np.zeros((run.camera.height_px, run.camera.width_px), np.uint8)

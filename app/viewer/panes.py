@@ -35,8 +35,9 @@ def text(origin: str, name: str) -> rrb.View:
 
 
 def events(run: ViewedRun) -> rrb.View:
-    """Raw events in the whole image."""
-    return picture(at.IMAGE, "Events: ON red, OFF blue", [at.FRAME, at.EVENTS, *ALL_BALLS], _image_bounds(run))
+    """Raw events in the whole image, over the camera's own pictures where it took any."""
+    contents = [at.FRAME, at.CAMERA_FRAMES, at.EVENTS, *ALL_BALLS]
+    return picture(at.IMAGE, "Events: ON red, OFF blue", contents, _image_bounds(run))
 
 
 def surface(run: ViewedRun, name: str = "Surface: Hough yellow, Kalman green") -> rrb.View:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from spinscope.pipeline.camera import Camera
 from spinscope.pipeline.chain import Tick
+from spinscope.pipeline.recordings import CameraFrame, Recording
 from spinscope.pipeline.registry import STAGES, methods
 from spinscope.pipeline.results import SpinEstimate, Truth
 from spinscope.pipeline.shots import Shot
@@ -24,6 +26,17 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Times = NDArray[np.int64]
+
+
+FRAMES_SHOWN = 200  # 8 s of a DAVIS346, 18 MB
+
+
+def _frames(result: Result) -> tuple[CameraFrame, ...]:
+    """Pictures of the camera while the ticks last, the first FRAMES_SHOWN of them."""
+    recording, ticks = result.session.recording, result.ticks
+    if not isinstance(recording, Recording) or not ticks:
+        return ()
+    return tuple(islice(recording.frames(ticks[0].packet.start_us, ticks[-1].packet.end_us), FRAMES_SHOWN))
 
 
 @dataclass(frozen=True)
@@ -50,6 +63,8 @@ class ViewedRun:
         The simulator's truth.
     warnings : sequence of str
         Notices about the recording, for people.
+    frames : sequence of CameraFrame
+        Pictures that the camera took besides the events.
     followed : int, optional
         Number of the shot, from 1, whose ball the detail views follow while it flies; by default the tracker's first
         ball.
@@ -64,6 +79,7 @@ class ViewedRun:
     fixed: bool
     truth: Truth | None
     warnings: Sequence[str]
+    frames: Sequence[CameraFrame] = ()
     followed: int | None = None
 
     @classmethod
@@ -87,6 +103,7 @@ class ViewedRun:
             fixed=session.parameters.track.ball == "fixed",
             truth=session.truth,
             warnings=session.warnings,
+            frames=_frames(result),
             followed=followed,
         )
 

@@ -12,6 +12,7 @@ from .formats.registry import is_recording as is_recording
 from .formats.registry import readable_suffixes as readable_suffixes
 from .formats.registry import writable_suffixes as writable_suffixes
 from .opening import open_recording as open_recording
+from .reader import CameraFrame as CameraFrame
 from .reader import FormatReader as FormatReader
 from .reader import ReadingOptions as ReadingOptions
 from .reader import ReadPass as ReadPass

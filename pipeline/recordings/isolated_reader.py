@@ -11,7 +11,7 @@ from pathlib import Path
 from ..errors import RecordingError
 from ..isolation import IsolationError, call, iterate, without_time_limit
 from ..results import Truth
-from .reader import Damage, FormatReader, Place, ReadingOptions, ReadPass, Triggers, UncheckedEvents
+from .reader import CameraFrame, Damage, FormatReader, Place, ReadingOptions, ReadPass, Triggers, UncheckedEvents
 
 ReaderOpener = Callable[[Path, ReadingOptions], FormatReader]
 
@@ -47,6 +47,11 @@ class IsolatedReader(FormatReader):
         """Place before which all events are earlier than `start_us`; None if there is no way to find it."""
         with self._isolation_errors():
             return call(_place_before, self._reader, start_us)
+
+    def frames(self, start_us: int, end_us: int) -> Iterator[CameraFrame]:
+        """Yield the camera's pictures."""
+        with self._isolation_errors():
+            yield from iterate(_frames, self._reader, start_us, end_us)
 
     def truth(self) -> Truth | None:
         """Read the simulator's truth; None when the file has none."""
@@ -118,6 +123,10 @@ def _parts(pickled: bytes, reading: ReadPass) -> Iterator[ReadPart]:
 
 def _place_before(pickled: bytes, start_us: int) -> Place | None:
     return _restored(pickled).place_before(start_us)
+
+
+def _frames(pickled: bytes, start_us: int, end_us: int) -> Iterator[CameraFrame]:
+    yield from _restored(pickled).frames(start_us, end_us)
 
 
 def _truth(pickled: bytes) -> Truth | None:

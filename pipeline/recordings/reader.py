@@ -107,6 +107,25 @@ class Place(NamedTuple):
     state: tuple[int, ...] = ()
 
 
+class CameraFrame(NamedTuple):
+    """Picture that a camera took besides the events.
+
+    Attributes
+    ----------
+    t_us : int
+        Middle of its exposure, the file's time.
+    x_px, y_px : int
+        Place of its first pixel on the sensor.
+    pixels : (h, w) or (h, w, 3) uint8
+        Grey values, or red, green and blue.
+    """
+
+    t_us: int
+    x_px: int
+    y_px: int
+    pixels: NDArray[np.uint8]
+
+
 @dataclass(slots=True)
 class ReadPass:
     """One pass over a file: the request, and what the reader found so far.
@@ -212,6 +231,10 @@ class FormatReader(ABC):
     def place_before(self, start_us: int) -> Place | None:
         """Place before which all events are earlier than `start_us`, found without a pass; None if there is no way."""
         return None
+
+    def frames(self, start_us: int, end_us: int) -> Iterator[CameraFrame]:
+        """Yield the camera's pictures of [start_us, end_us), where the format holds any."""
+        return iter(())
 
     def truth(self) -> Truth | None:
         """Read the simulator's truth; None when the file has none."""

@@ -16,7 +16,17 @@ from ..results import Truth
 from .clock_segments import ClockSegments
 from .index import IndexBuilder, RecordingIndex
 from .order import NO_TIME_US, TimeOrder
-from .reader import CHUNK_EVENTS, Damage, FormatReader, Place, Progress, ReadPass, Triggers, UncheckedEvents
+from .reader import (
+    CHUNK_EVENTS,
+    CameraFrame,
+    Damage,
+    FormatReader,
+    Place,
+    Progress,
+    ReadPass,
+    Triggers,
+    UncheckedEvents,
+)
 from .sensor import KNOWN_SENSORS, Resolution, check_resolution, smallest_known
 
 HASH_ALL_BYTES = 64 << 20  # larger files are large: half a second and more to read
@@ -221,6 +231,10 @@ class Recording:
                     f"(--window START_US END_US): {self.path}"
                 )
         return columns.batch()
+
+    def frames(self, start_us: int, end_us: int) -> Iterator[CameraFrame]:
+        """Yield the pictures of [start_us, end_us) that the camera took besides the events; most take none."""
+        return self._reader.frames(start_us, end_us)
 
     def identity(self) -> str:
         """Hash of the file (see `file_identity`) and of the statements about its events, 32 hexadecimal digits."""

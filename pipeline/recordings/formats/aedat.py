@@ -7,15 +7,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import RecordingError
 from ..optional_packages import optional_module
 from ..packets import foreign_errors, joined, undamaged
-from ..reader import FormatReader, ReadingOptions, ReadPass, Triggers, UncheckedEvents
+from ..reader import CameraFrame, FormatReader, ReadingOptions, ReadPass, Triggers, UncheckedEvents
 from ..sensor import resolution_or_none
 from .registry import FORMATS, RecordingFormat
 
 MAGIC, MAGIC_4 = b"#!AER-DAT", b"#!AER-DAT4"
+RGB = 3  # channels; a fourth is opacity
 # Sources of AEDAT4's triggers that are rising edges, pulses or beginnings; the others are falling edges or ends.
 RISING_SOURCES = (0, 1, 3, 4, 6, 8)
 
@@ -59,6 +61,17 @@ class AedatReader(FormatReader):
             yield from joined(self._events(reading), reading.max_events)
         reading.report(1, 1)
 
+    def frames(self, start_us: int, end_us: int) -> Iterator[CameraFrame]:
+        """Yield the pictures before the first damaged packet."""
+        with foreign_errors(self.path, self.format):
+            for packet in undamaged(self._decoder(), ReadPass()):
+                if "frame" not in packet:
+                    continue
+                frame = packet["frame"]
+                t_us = (frame["exposure_begin_t"] + frame["exposure_end_t"]) // 2
+                if start_us <= t_us < end_us:
+                    yield CameraFrame(t_us, frame["offset_x"], frame["offset_y"], _colours(frame["pixels"]))
+
     def _events(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
         for packet in undamaged(self._decoder(), reading):
             if "triggers" in packet:
@@ -71,6 +84,10 @@ class AedatReader(FormatReader):
         aedat = optional_module("aedat", "aedat", "AEDAT4")
         with foreign_errors(self.path, self.format):
             return aedat.Decoder(str(self.path))
+
+
+def _colours(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    return pixels if pixels.ndim == 2 else np.ascontiguousarray(pixels[..., :RGB])
 
 
 def _triggers(found: Any) -> Triggers:

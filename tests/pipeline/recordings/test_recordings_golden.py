@@ -49,6 +49,38 @@ def test_counts_and_sums_are_those_of_other_decoders(name: str) -> None:
     assert len(recording.triggers) == triggers and not recording.damage.sentences()
 
 
+@pytest.mark.parametrize(("name", "count"), [("davis346.aedat4", 59), ("davis.aedat4", 3)])
+def test_pictures_of_the_camera_are_read(name: str, count: int) -> None:
+    recording = open_recording(FOLDER / name)
+    frames = list(recording.frames(-(2**63), 2**63 - 1))
+    assert len(frames) == count and {frame.pixels.shape for frame in frames} == {(260, 346)}
+    first_us, last_us = frames[0].t_us, frames[-1].t_us
+    assert len(list(recording.frames(first_us + 1, last_us))) == count - 2
+    assert all(10 < frame.pixels.mean() < 245 for frame in frames)
+
+
+# Events of `simulated/`, as its README states them.
+SIMULATED = {
+    "spinner_ball1_top": 6603,
+    "spinner_ball2_side": 9917,
+    "spinner_ball3_back": 4668,
+    "spinner_ball5_back_no_logo": 3366,
+    "flight_slow_top": 155_824,
+    "flight_back": 124_029,
+    "flight_fast_top": 125_061,
+    "flight_side": 157_288,
+    "flight_mixed": 121_946,
+    "flight_two_balls": 176_271,
+}
+
+
+@pytest.mark.parametrize("name", SIMULATED)
+def test_simulated_recordings_have_their_events_with_a_label_each(name: str) -> None:
+    recording = open_recording(FOLDER / "simulated" / f"{name}.h5")
+    assert len(recording.read()) == recording.events == SIMULATED[name]
+    assert recording.truth is not None and recording.truth.label.size == SIMULATED[name]
+
+
 def test_a_bag_that_is_cut_is_refused_in_one_line(tmp_path: Path) -> None:
     whole = (FOLDER / "test_events_1.bag").read_bytes()
     (tmp_path / "cut.bag").write_bytes(whole[: len(whole) // 2])

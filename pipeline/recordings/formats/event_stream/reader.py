@@ -11,10 +11,9 @@ import numpy as np
 from ....errors import RecordingError
 from ...reader import FormatReader, Place, ReadingOptions, ReadPass, UncheckedEvents, file_errors
 from ...sensor import resolution_or_none
-from . import MAGIC
 from .decoding import EVENT_BYTES, EVENTS, NOW, STATE_SIZE, EventStreamEvents, decode_event_stream
 
-HEADER = struct.Struct(f"<{len(MAGIC)}s3BBHH")  # magic, version, type, width, height
+HEADER = struct.Struct("<12s3BBHH")  # "Event Stream", version, type, width, height
 KINDS = ("generic", "DVS", "ATIS", "display", "color")
 DVS, ATIS = 1, 2
 

@@ -7,8 +7,7 @@ from pathlib import Path
 from ....isolation import without_time_limit
 from ...reader import FormatReader, ReadingOptions
 from ..registry import FORMATS, RecordingFormat
-
-ROS1, SQLITE, MCAP = b"#ROSBAG", b"SQLite format 3\0", b"\x89MCAP0\r\n"
+from .storages import MCAP, ROS1, SQLITE
 
 
 def _open(path: Path, options: ReadingOptions) -> FormatReader:

@@ -16,8 +16,8 @@ from ...packets import foreign_errors, joined, undamaged
 from ...reader import FormatReader, ReadingOptions, ReadPass, UncheckedEvents
 from ...sensor import resolution_or_none
 from ..prophesee_raw.reader import RawDecoder
-from . import MCAP, ROS1
 from .messages import MESSAGES, EventMessage, mono_events
+from .storages import MCAP, ROS1
 
 EVT3, MONO = "evt3", "mono"
 FED_BYTES = 1 << 20  # of EVT3 decoded at once
