@@ -9,12 +9,13 @@ import warnings
 from typing import Any
 
 from numba import njit as njit
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, NullCache
 from numba.core.dispatcher import Dispatcher
 
 PACKAGE = __name__.partition(".")[0]
 
 _enable_caching = Dispatcher.enable_caching
+_warned = False
 
 
 class KernelCache(FunctionCache):
@@ -28,6 +29,14 @@ class KernelCache(FunctionCache):
             _warn(error.strerror or str(error))
 
 
+class MemoryCache(NullCache):
+    """Cache of one kernel where there is no folder to keep it."""
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep nothing."""
+        _warn("neither the program's folder nor the user's cache can be written to")
+
+
 def _enable_kernel_caching(dispatcher: Any) -> None:
     """Give a dispatcher its cache; in place of numba's method, which raises where no folder can be written."""
     if dispatcher.py_func.__module__.partition(".")[0] != PACKAGE:
@@ -36,15 +45,19 @@ def _enable_kernel_caching(dispatcher: Any) -> None:
     try:
         dispatcher._cache = KernelCache(dispatcher.py_func)  # type: ignore[no-untyped-call]
     except (RuntimeError, OSError):
-        _warn("neither the program's folder nor the user's cache can be written to")
+        dispatcher._cache = MemoryCache()
 
 
 def _warn(why: str) -> None:
-    warnings.warn(
-        f"compiled kernels cannot be kept ({why}): they are compiled anew in every run, half a minute or so; "
-        "NUMBA_CACHE_DIR=FOLDER names another place for them",
-        stacklevel=2,
-    )
+    """Say so for the first kernel; the others fare alike."""
+    global _warned
+    if not _warned:
+        _warned = True
+        warnings.warn(
+            f"compiled kernels cannot be kept ({why}): they are compiled anew in every run, half a minute or so; "
+            "NUMBA_CACHE_DIR=FOLDER names another place for them",
+            stacklevel=3,
+        )
 
 
 setattr(Dispatcher, "enable_caching", _enable_kernel_caching)  # noqa: B010  mypy: no method may be assigned to
