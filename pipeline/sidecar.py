@@ -9,17 +9,18 @@ from __future__ import annotations
 
 import hashlib
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from .biases import LARGEST_BYTES, BiasParameters, read_biases
+from .biases import BiasParameters, read_biases
 from .camera import BallParameters, CameraParameters
 from .errors import ParameterError, RecordingError
 from .extensions import did_you_mean
+from .files import file_bytes
 from .parameters import ParameterGroup
+from .toml import MAX_BYTES, toml_tables
 from .truth_table import stated_tables, truth_table_of
 
 GROUPS: dict[str, type[ParameterGroup]] = {"camera": CameraParameters, "ball": BallParameters}
@@ -168,15 +169,11 @@ def biases_beside(recording: Path) -> BiasParameters | None:
 def _toml_tables(path: Path) -> dict[str, Any]:
     """The tables of a TOML file; raises RecordingError."""
     try:
-        with open(path, "rb") as file:
-            content = file.read(LARGEST_BYTES + 1)
-        if len(content) > LARGEST_BYTES:
-            raise RecordingError(f"the sidecar is larger than {LARGEST_BYTES >> 20} MB: {path}")
-        return tomllib.loads(content.decode("utf-8-sig"))
+        return toml_tables(file_bytes(path, MAX_BYTES).decode("utf-8-sig"))
     except OSError as error:
         raise RecordingError(f"the sidecar cannot be read ({error.strerror}): {path}") from error
-    except (ValueError, RecursionError) as error:  # not UTF-8, not TOML
-        raise RecordingError(f"the sidecar is no TOML ({error}): {path}") from None
+    except (UnicodeDecodeError, ParameterError) as error:
+        raise RecordingError(f"the sidecar cannot be read ({error}): {path}") from None
 
 
 def _circle(table: Mapping[str, Any]) -> tuple[float, float, float]:

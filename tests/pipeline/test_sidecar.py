@@ -76,9 +76,10 @@ def test_without_a_file_there_is_nothing(tmp_path: Path) -> None:
         ("[truth]\nrp = 3\n", ParameterError, "truth.rp is unknown.*rps"),
         ("[biases]\nfoo = 3\n", ParameterError, "foo"),
         ("[truth\n", RecordingError, "no TOML"),
-        (b"\xff\xfe\x00", RecordingError, "no TOML"),
-        ("a = " + "[" * 50_000, RecordingError, "no TOML"),
-        ("#" * 2_000_000, RecordingError, "larger than"),
+        (b"\xff\xfe\x00", RecordingError, "decode"),
+        ("a = " + "[" * 50_000, RecordingError, "nested too deep"),
+        ("a" + ".a" * 49_000 + " = 1", RecordingError, "49000 dots"),
+        ("#" * 2_000_000, RecordingError, "over 1.05 MB"),
     ],
 )
 def test_wrong_sidecars_are_refused_in_words(
