@@ -21,6 +21,7 @@ from .commands.live import live, watch
 from .commands.options import join_fixed_ball
 from .commands.settings import settings
 from .commands.simulate import simulate
+from .commands.split import split
 from .commands.tune import tune
 from .commands.view import view
 from .terminal import FULL_DISK, announce_compilation, drop_output, exit_on_signals, note, prepare_streams
@@ -49,6 +50,7 @@ COMMANDS = (
 )  # fmt: skip
 
 for _command in COMMANDS:
+for _command in (info, analyze, view, convert, tune, simulate, evaluate, calibrate, label, split):
     cli.add_command(_command)
 
 

@@ -111,6 +111,17 @@ def test_uncovered_corners_and_wrong_views_are_said() -> None:
         calibrate_camera(views[:4], BOARD, SIZE)
 
 
+def test_a_part_of_a_charuco_board_is_enough() -> None:
+    board = Board(9, 6, 20.0, "charuco")
+    image = np.asarray(board.charuco().generateImage((1000, 700)))
+    for seen, least in ((image, 54), (image[:, :500], 20)):
+        found = board.find(np.ascontiguousarray(seen))
+        assert found is not None and len(found[0]) >= least
+        row, column = np.divmod(found[0], 9)
+        assert np.allclose(found[1], np.column_stack([(column + 1) * 100, (row + 1) * 100]) - 0.5, atol=1.0)
+    assert board.find(np.zeros((200, 200), np.uint8)) is None
+
+
 def test_a_board_never_seen_is_said(made: SimulatedBoard) -> None:
     one = RecordingInMemory(made.events.between(0, 100_000), *SIZE)
     with pytest.raises(RecordingError, match=r"board of 8x5 inner corners .* is seen in none of 1 flashes"):
