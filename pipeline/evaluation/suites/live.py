@@ -1,0 +1,132 @@
+"""Suite `live`: latency of a recording replayed in real time, at the event rates of quiet and busy scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ...cameras import EventStream, ReplayCamera
+from ...chain import EventsInMemory
+from ...events import EventBatch
+from ...live import LiveRun, LiveShot, LiveStatus, load_kernels
+from ...session import DEFAULT_SAMPLE, Session
+from .. import paper
+from ..plots import Figures, label_axes, panels
+from ..tables import Cell, ResultTable, Row, distinct, where
+from ..tasks import Task, TaskContext
+
+LABEL = "Live"
+HELP = "Latency from an event's arrival to the track and to the shot's spin, replayed in real time."
+TIMED = True  # its tasks measure run times
+
+RATES_MEV_S = (1.0, 5.0)
+SECONDS, QUICK_SECONDS = 60.0, 5.0
+ROUND_US = 1_000_000  # one shot, and noise around it
+BATCH_EVENTS = 50_000
+
+
+def tasks(quick: bool) -> list[Task]:
+    """One event rate a task."""
+    seconds = QUICK_SECONDS if quick else SECONDS
+    return [Task(measure, {"rate_mev_s": rate, "seconds": seconds}, keep=False) for rate in RATES_MEV_S]
+
+
+def busy_round(sample: Session, rate_mev_s: float) -> EventBatch:
+    """A second with the sample's shot among uniform noise, which brings all to the rate."""
+    random, size = np.random.default_rng(11), (sample.source.width_px, sample.source.height_px)
+    shot = sample.source.between(sample.source.start_us, sample.source.end_us)
+    count = max(round(rate_mev_s * ROUND_US) - len(shot), 0)
+    t_us = np.concatenate([shot.t_us, random.integers(0, ROUND_US, count)])
+    order = np.argsort(t_us, kind="stable")
+    x_px, y_px = (
+        np.concatenate([column, random.integers(0, length, count, np.uint16)])[order]
+        for column, length in zip((shot.x_px, shot.y_px), size, strict=True)
+    )
+    return EventBatch(t_us[order], x_px, y_px, np.concatenate([shot.on, random.random(count) < 0.5])[order])
+
+
+def measure(context: TaskContext, rate_mev_s: float, seconds: float) -> list[Row]:
+    """Latency of every tick and shot, and whether the first round's shots are those of the events read at once."""
+    load_kernels()
+    sample = Session.open(DEFAULT_SAMPLE)
+    events, rounds = busy_round(sample, rate_mev_s), round(seconds * 1e6 / ROUND_US)
+    width_px, height_px = sample.source.width_px, sample.source.height_px
+
+    def batches() -> Iterator[EventBatch]:
+        for number in range(rounds):
+            for first in range(0, len(events), BATCH_EVENTS):
+                part = events[first : first + BATCH_EVENTS]
+                yield EventBatch(part.t_us + number * ROUND_US, *part.columns[1:])
+
+    camera, rows = ReplayCamera(batches, width_px, height_px), list[Row]()
+    run = LiveRun(
+        lambda tick_us, on_notice: EventStream(camera, tick_us, on_notice=on_notice),
+        context.parameters,
+        on_tick=lambda arrived, tick, latency_ms: rows.append({"what": "track", "latency_ms": latency_ms}),
+    )
+    shots, skipped = list[LiveShot](), 0
+    for one in run.outputs():
+        if isinstance(one, LiveShot):
+            shots.append(one)
+        elif isinstance(one, LiveStatus):
+            skipped = one.skipped
+    start_us, end_us = int(events.t_us[0]), int(events.t_us[-1]) + 1
+    source = EventsInMemory(("round", rate_mev_s), events, width_px, height_px, start_us, end_us)
+    once = Session(sample.recording, source, context.parameters, sample.chain).clip(start_us, end_us).estimate()
+    whole = [shot for shot in once.shots if shot.end_us < ROUND_US - context.parameters.track.tick_us]
+    first = [one.shot for one in shots if one.shot.end_us < ROUND_US - context.parameters.track.tick_us]
+    identical = [a.to_dict(once.session.camera, 0.02) for a in whole] == [
+        b.to_dict(once.session.camera, 0.02) for b in sorted(first, key=lambda shot: shot.start_us)
+    ]
+    rows += [{"what": "shot", "latency_ms": one.latency_ms} for one in shots]
+    about: Row = {"rate_mev_s": rate_mev_s, "skipped": skipped, "identical": identical}
+    return [{**about, **row} for row in rows]
+
+
+def tables(rows: Sequence[Row]) -> list[ResultTable]:
+    """Percentiles of both latencies by event rate, beside the paper's."""
+    lines: list[tuple[Cell, ...]] = [("paper, tracking alone", None, paper.LATENCY_MS, None, None, None, None, None)]
+    for rate in distinct(rows, "rate_mev_s"):
+        part = where(rows, rate_mev_s=rate)
+        tracks, shots = (_latencies_ms(where(part, what=what)) for what in ("track", "shot"))
+        shares = [
+            None if not one.size else round(float(np.percentile(one, q)), 1)
+            for one in (tracks, shots)
+            for q in (50, 99)
+        ]
+        lines.append((f"{rate:g} Mev/s", tracks.size, *shares, part[0]["skipped"], part[0]["identical"]))
+    return [
+        ResultTable(
+            "Live, replayed in real time",
+            (
+                "events",
+                "ticks",
+                "track p50 [ms]",
+                "p99 [ms]",
+                "spin p50 [ms]",
+                "p99 [ms]",
+                "ticks left out",
+                "identical",
+            ),
+            lines,
+            "Track: from the arrival of a tick's first events to its track, the tick of 5 ms included. Spin: from the "
+            "arrival of a shot's last events to its announcement with all methods. Identical: the first round's shots "
+            "are those of the same events read at once. The paper computes spins afterwards.",
+        )
+    ]
+
+
+def figures(rows: Sequence[Row]) -> Figures:
+    """Distribution of the track's latency by event rate."""
+    figure, axes = panels(1, 1)
+    for rate in distinct(rows, "rate_mev_s"):
+        latencies = np.sort(_latencies_ms(where(rows, rate_mev_s=rate, what="track")))
+        axes[0, 0].plot(latencies, np.linspace(0.0, 1.0, latencies.size), label=f"{rate:g} Mev/s")
+    axes[0, 0].set_xscale("log")
+    label_axes(axes[0, 0], "arrival to track", "latency [ms]", "share of ticks below")
+    return {"latency": figure}
+
+
+def _latencies_ms(rows: Sequence[Row]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    return np.array([row["latency_ms"] for row in rows], np.float64)
