@@ -13,7 +13,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import chain as joined
 from itertools import groupby
 from pathlib import Path
@@ -36,8 +36,9 @@ from .shots import Shot, ShotLog
 from .stages.track_result import BallTrack
 
 STATUS_S = 1.0
-# Ticks with a track that wait for their spins, at the most; then the tracker waits, too.
-MOST_TRACKED = 2000
+# Ticks with a ball that wait for their spins, at the most; then the tracker waits, too: 3 s of flight at 200 Hz, which
+# at 5 Mev/s is some 600 MB. Ticks without a ball are next to nothing.
+MOST_FLYING = 600
 ARRIVALS_KEPT = 4000  # ticks whose arrival is remembered: 20 s at 200 Hz, longer than any shot's end takes to be known
 SPIN_NICENESS = 5  # a third of the tracker's share where both want one core
 # Results of the recording that stages of one ball need: a full frame a tick would fill the memory behind a slow spin.
@@ -194,6 +195,10 @@ def load_kernels() -> None:
         Session.open(sample).estimate()
 
 
+def _without_events(packet: Packet) -> Packet:
+    return replace(packet, events=EventBatch.empty())
+
+
 class _Ticks:
     """A stream's ticks, segment by segment; `ended` when there are no more."""
 
@@ -244,7 +249,8 @@ class LiveRun:
         self.stream = stream(parameters.track.tick_us, lambda text: self._outputs.put(LiveNotice(text)))
         self.parameters = parameters
         self._targets, self._with_balls, self._on_tick = method_targets(method), with_balls, on_tick
-        self._tracked: queue.Queue[tuple[ArrivedTick, Chain, Tick] | None] = queue.Queue(MOST_TRACKED)
+        self._tracked: queue.SimpleQueue[tuple[ArrivedTick, Chain, Tick] | None] = queue.SimpleQueue()
+        self._room = threading.Semaphore(MOST_FLYING)
         self._latencies_ms: deque[float] = deque()
         self._arrivals: deque[tuple[int, float]] = deque(maxlen=ARRIVALS_KEPT)  # (end of the tick, its arrival)
         self._events_before = 0
@@ -332,14 +338,28 @@ class LiveRun:
                     self._outputs.put(LiveBall(ball, latency_ms))
             if self._on_tick is not None:
                 self._on_tick(one, tick, latency_ms)
-            needed = {name: tick.results[name] for name in tick.results if name in NEEDED_BY_BALLS}
-            self._tracked.put((one, chain, Tick(needed, tick.packet, ())))
+            self._tracked.put((replace(one, packet=_without_events(one.packet)), chain, self._kept(tick)))
+
+    def _kept(self, tick: Tick) -> Tick:
+        """What the spins need of a tick, as soon as there is room for it."""
+        if not tick.track.balls:
+            return Tick({"track": tick.track}, _without_events(tick.packet), ())
+        self._room.acquire()
+        needed = {name: tick.results[name] for name in tick.results if name in NEEDED_BY_BALLS}
+        return Tick(needed, tick.packet, ())
+
+    def _taken(self) -> Iterator[tuple[ArrivedTick, Chain, Tick]]:
+        """The tracked ticks, in order."""
+        while (row := self._tracked.get()) is not None:
+            if row[2].track.balls:
+                self._room.release()
+            yield row
 
     def _spin(self) -> None:
         """Answer the shots' spins, segment by segment; whatever comes, the tracker does not wait for ever."""
         if sys.platform == "linux":  # where it is of this thread alone: on a busy machine the tracker goes first
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), SPIN_NICENESS)
-        coming = iter(self._tracked.get, None)
+        coming = self._taken()
         try:
             for _, rows in groupby(coming, lambda row: row[0].segment):
                 self._spin_segment(rows)
