@@ -152,7 +152,7 @@ class TestPage:
         step_us = page.evaluate("window.coach.view.player.motion.t_us") - before
         assert step_us == pytest.approx(1e6 / 24 / 44.6, rel=0.05)  # a 24th of a turn
         page.keyboard.press("ArrowRight")
-        tab.until("location.hash === '#shot/29'")
+        tab.until("document.body.dataset.place === 'shot/29'")
         page.keyboard.press("m")
         page.wait_for_selector(".shot .star[aria-pressed=true]")
         page.keyboard.press("Escape")
@@ -214,7 +214,7 @@ class TestPage:
 
     def test_a_new_shot_appears_by_itself(self, tab: Tab, session: ShotSession) -> None:
         tab.go("live")
-        tab.page.evaluate("window.speechSynthesis.speak = (said) => window.said = said.text")
+        tab.page.evaluate("void (window.speechSynthesis.speak = (said) => window.said = said.text)")
         tab.page.get_by_label("Speak the numbers").check()
         session.add("new.raw", KNOWN, analysis(shot(1, recorded_s=1.8e9, spin_rps=91.4, topspin_rps=91.4)))
         tab.page.wait_for_selector(".live .value:has-text('91')")
