@@ -46,11 +46,11 @@ def cli(context: click.Context) -> None:
 
 
 COMMANDS = (
-    info, analyze, view, coach, convert, tune, settings, simulate, evaluate, calibrate, label, live, watch, cameras
+    info, analyze, view, coach, convert, tune, settings, simulate, evaluate, calibrate, label, split, live, watch,
+    cameras,
 )  # fmt: skip
 
 for _command in COMMANDS:
-for _command in (info, analyze, view, convert, tune, simulate, evaluate, calibrate, label, split):
     cli.add_command(_command)
 
 
