@@ -71,14 +71,14 @@ def split_by_triggers(
     before_us: int = 0,
     length_us: int | None = None,
     channel: int | None = None,
-    options: ReadingOptions = ReadingOptions(),
+    options: ReadingOptions | None = None,
 ) -> list[Path]:
     """Write every trial that holds events as NAME_001.h5 and so on, with the recording's sidecar; returns the files.
 
     Times stay those of the recording, so that trials keep their relation to other devices. See `trial_windows_us`;
     raises RecordingError where a file is there already.
     """
-    recording = open_recording(source, **asdict(options))
+    recording = open_recording(source, **asdict(options or ReadingOptions()))
     windows = trial_windows_us(recording, before_us, length_us, channel)
     beside = [one for suffix in (".toml", ".bias") if (one := source.with_suffix(suffix)).is_file()]
     folder.mkdir(parents=True, exist_ok=True)
