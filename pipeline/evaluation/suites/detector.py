@@ -97,8 +97,8 @@ def _rows(chain: Chain, parameters: Parameters, ball: Truth | BallLabels, about:
     follower = HoughKalman(parameters.ball, camera.focal_px)
     rows: list[Row] = []
     for tick in chain.run(parameters, ("track",), forget=("surface",)):
-        found = _found(tick, follower)
         truth = _truth_at(ball, (camera.width_px, camera.height_px), tick.track.t_us)
+        found = _found(tick, follower, truth)
         if truth is not None:
             rows += [_row({**about, "t_us": tick.track.t_us}, stage, found[stage], truth) for stage in STAGES]
     return rows
@@ -141,14 +141,19 @@ class HoughKalman:
         return BallFilter(mean, np.diag(std**2), ACCELERATION_M_S2 * per_m, approach_px_s)
 
 
-def _found(tick: Tick, follower: HoughKalman) -> dict[str, BallState | None]:
-    """State of the ball after every stage at the end of a tick, None where a stage has none."""
+def _found(tick: Tick, follower: HoughKalman, truth: BallState | None) -> dict[str, BallState | None]:
+    """State of the ball after every stage at the end of a tick, None where a stage has none.
+
+    Hough circles are those of the ball that is followed, refined ones of the ball nearest the true one.
+    """
     track = tick.track
+    place = track.mean if truth is None else truth
+    nearest = min(track.balls, key=lambda ball: float(np.hypot(*(ball.mean[:2] - place[:2]))), default=None)
     return {
         "hough": _ball_state(track.hough),
         "hough + kalman": follower.step(tick.packet.end_us, track.has_ball, track.hough),
-        "refined": _ball_state(track.measured),
-        "refined + kalman": track.mean if track.has_ball else None,
+        "refined": None if nearest is None else _ball_state(nearest.measured),
+        "refined + kalman": None if nearest is None else nearest.mean,
     }
 
 
@@ -212,8 +217,8 @@ NOTE = (
     "along the motion signed (negative = behind). Found: a circle whose centre lies on the ball."
 )
 NOTE_OF_TWO = (
-    "Two balls: the second one crosses at 2 to 6 m/s. One ball is tracked at a time, so a first ball that is hardly "
-    "faster than the second may be missed for all of its flight."
+    "Two balls: the second one crosses at 2 to 6 m/s. The Hough circles are those of the ball that is followed, which "
+    "may be the second one."
 )
 
 
