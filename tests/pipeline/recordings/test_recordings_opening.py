@@ -10,6 +10,7 @@ import pytest
 
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.recordings import open_recording, write_recording
+from spinscope.pipeline.recordings.optional_packages import optional_module
 from spinscope.pipeline.recordings.sensor import KNOWN_SENSORS, smallest_known
 from tests.pipeline.recordings.test_recordings_raw import assert_same_events, moving_edge
 
@@ -39,6 +40,11 @@ def test_what_is_no_recording_is_named(tmp_path: Path, name: str) -> None:
         open_recording(path)
     message = str(caught.value)
     assert HEADS[name][1] in message and message.endswith(str(path)) and "\n" not in message
+
+
+def test_a_package_that_is_not_installed_is_named_with_the_line_that_installs_it() -> None:
+    with pytest.raises(RecordingError, match=r"AEDAT4 files .* not installed \(`pip install spinscope\[aedat\]`"):
+        optional_module("no_module_of_this_name", "aedat", "AEDAT4")
 
 
 def test_missing_files_folders_and_closed_doors_are_named(tmp_path: Path) -> None:

@@ -33,6 +33,7 @@ LAYOUTS: dict[str, tuple[str, Callable[[int, int, int, bool], str]]] = {
     "quoted": ('"t_us","x","y","p"\n', lambda t, x, y, on: f'"{t}","{x}","{y}","{int(on)}"'),
     "words for the polarity": ("x,y,t,on\n", lambda t, x, y, on: f"{x},{y},{t},{bool(on)}"),
     "commented names": ("# made by nobody\n# ts_ns x y p\n", lambda t, x, y, on: f"{t}000 {x} {y} {int(on)}"),
+    "comments as of MATLAB": ("% made by nobody\n% t_us x y p\n", lambda t, x, y, on: f"{t} {x} {y} {int(on)}"),
     "size, then seconds": ("1280 720\n", lambda t, x, y, on: f"{t / 1e6:.9f} {x} {y} {int(on)}"),
     "x, y, p, t": ("%geometry:1280,720\n", lambda t, x, y, on: f"{x},{y},{int(on)},{t}"),
     "tabs and Windows": ("", lambda t, x, y, on: f"{t}\t{x}\t{y}\t{int(on)}\r"),

@@ -7,10 +7,12 @@ from pathlib import Path
 from ...reader import FormatReader, ReadingOptions
 from ..prophesee_dat import is_dat
 from ..registry import FORMATS, RecordingContent, RecordingFormat
+from ..text import is_text
 
 
 def _sniff(path: Path, head: bytes) -> bool:
-    return head.startswith(b"% ") and not is_dat(path, head)
+    # Columns of text may have comments that begin like lines of the header.
+    return head.startswith(b"% ") and not is_dat(path, head) and not is_text(path, head)
 
 
 def _open(path: Path, options: ReadingOptions) -> FormatReader:
