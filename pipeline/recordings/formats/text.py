@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import re
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import islice
@@ -36,6 +37,7 @@ SAMPLED_LINES = 4096  # looked at to tell columns and units apart
 COLUMNS = 4
 COMMENT = "#%"
 GZIP, ZIP = b"\x1f\x8b", b"PK"
+PACKING_ERRORS = (EOFError, zlib.error, gzip.BadGzipFile, zipfile.BadZipFile)
 TRUTHS = {"true": 1, "false": 0}
 # "1280 720", "% geometry 1280x720", "%geometry:1280,720"
 _SIZE = re.compile(r"[#%\s]*(?:geometry|resolution|sensor|size)?[\s:=]*(\d+)\s*[x,;\s]\s*(\d+)", re.IGNORECASE)
@@ -78,7 +80,7 @@ class TextReader(FormatReader):
 
     def __init__(self, path: Path, options: ReadingOptions) -> None:
         super().__init__(path, options)
-        with file_errors(path, self.format), _lines(path) as (lines, _):
+        with file_errors(path, self.format), _lines(path, Damage()) as (lines, _):
             head = list(islice(lines, HEAD_LINES + SAMPLED_LINES))
         self._layout = find_layout(head, path)
         if self._layout.size is not None:
@@ -91,7 +93,7 @@ class TextReader(FormatReader):
     def columns(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
         """Yield the events; lines that are none are counted as damage."""
         row, size_bytes = 0, self.path.stat().st_size
-        with file_errors(self.path, self.format), _lines(self.path) as (all_lines, file):
+        with file_errors(self.path, self.format), _lines(self.path, reading.damage) as (all_lines, file):
             lines = islice(all_lines, self._layout.skipped, None)
             while part := list(islice(lines, reading.max_events)):
                 allowed = int(BROKEN_FREE + BROKEN_SHARE * (row + len(part)))
@@ -217,24 +219,31 @@ def _rows(lines: list[str], layout: TextLayout, damage: Damage, allowed: int) ->
 
 
 @contextmanager
-def _lines(path: Path) -> Iterator[tuple[Iterator[str], IO[bytes]]]:
-    """Open a text, packed or not: its lines, and the file on disk for the share that is done."""
+def _lines(path: Path, damage: Damage) -> Iterator[tuple[Iterator[str], IO[bytes]]]:
+    """Open a text, packed or not: its lines up to damaged packing, and the file on disk for the share that is done."""
     with open(path, "rb") as file:
         head = file.read(2)
         file.seek(0)
         if head == GZIP:
             with gzip.open(file) as unpacked:
-                yield _unpacked_lines(unpacked, path), file
+                yield _unpacked_lines(unpacked, path, damage), file
         elif head == ZIP:
             with zipfile.ZipFile(file) as archive, archive.open(_texts_in(archive)[0]) as unpacked:
-                yield _unpacked_lines(unpacked, path), file
+                yield _unpacked_lines(unpacked, path, damage), file
         else:
-            yield _unpacked_lines(file, path), file
+            yield _unpacked_lines(file, path, damage), file
 
 
-def _unpacked_lines(file: Any, path: Path) -> Iterator[str]:
+def _unpacked_lines(file: Any, path: Path, damage: Damage) -> Iterator[str]:
     packed_bytes, unpacked_bytes = path.stat().st_size, 0
-    while line := file.readline(LINE_BYTES):
+    while True:
+        try:
+            line = file.readline(LINE_BYTES)
+        except PACKING_ERRORS:
+            damage.broken_ends += 1
+            return
+        if not line:
+            return
         unpacked_bytes += len(line)
         check_expansion(packed_bytes, unpacked_bytes, path)
         yield line.decode("utf-8-sig", "replace")
@@ -249,7 +258,7 @@ def is_text(path: Path, head: bytes) -> bool:
     if b"\0" in head and not head.startswith((GZIP, ZIP)):
         return False
     try:
-        with _lines(path) as (lines, _):
+        with _lines(path, Damage()) as (lines, _):
             first = list(islice(lines, HEAD_LINES))
     except (*FILE_ERRORS, RecordingError):
         return False

@@ -67,6 +67,26 @@ def test_packed_texts_are_read(tmp_path: Path) -> None:
         assert shares == sorted(shares) and shares[-1] == 1.0
 
 
+@pytest.mark.parametrize("packing", ["gz", "zip"])
+def test_of_damaged_packing_the_lines_before_are_read(tmp_path: Path, packing: str) -> None:
+    events = moving_edge(20_000)
+    text = (LAYOUTS["named"][0] + lines_of(LAYOUTS["named"][1], events)).encode()
+    path = tmp_path / f"a.{packing}"
+    if packing == "gz":
+        data = gzip.compress(text)
+        path.write_bytes(data[: len(data) // 2])
+    else:
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("a.csv", text)
+        data = bytearray(path.read_bytes())
+        data[-400] ^= 0xFF  # what follows unpacks to other lines, of which few may be there
+        path.write_bytes(data)
+    recording = open_recording(path, sensor=(1280, 720))
+    found = columns(recording.read())
+    assert len(found) > 5000 and found[:5000] == columns(events)[:5000]
+    assert recording.damage.broken_ends == 1
+
+
 def test_lines_that_are_no_events_cost_themselves(tmp_path: Path) -> None:
     events = moving_edge(N)
     lines = lines_of(LAYOUTS["named"][1], events).splitlines()
