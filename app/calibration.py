@@ -9,7 +9,7 @@ from typing import Any
 
 import tomli_w
 
-from spinscope.pipeline.calibration.board import Board, BoardView, board_views
+from spinscope.pipeline.calibration.board import Board, BoardView, Pattern, board_views
 from spinscope.pipeline.calibration.camera_calibration import calibrate_camera, focal_length_px
 from spinscope.pipeline.calibration.table_pose import table_pose
 from spinscope.pipeline.camera import Camera
@@ -24,7 +24,7 @@ def calibrate_by_board(
     recordings: Sequence[Path],
     size: tuple[int, int],
     square_mm: float,
-    pattern: Any,
+    pattern: Pattern,
     pixel_um: float,
     reading: ReadingOptions,
     out: Path,

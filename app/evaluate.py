@@ -134,7 +134,7 @@ def check_folder(folder: Path, choices: Choices, console: Console | None = None)
     for finding in missing:
         console.print(f"{finding.recording}: {finding.what}", markup=False, highlight=False, soft_wrap=True)
     count = len(found.recordings) + len(found.wrong)
-    lacking = len({finding.recording for finding in missing})
+    lacking = len({finding.recording for finding in missing} - {found.path.name})
     console.print(f"{count} recordings, {lacking} lack something; see docs/recording_protocol.md", highlight=False)
     return 1 if missing else 0
 

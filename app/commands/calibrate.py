@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -11,6 +11,9 @@ from spinscope.pipeline.recordings import ReadingOptions
 
 from ..terminal import ProgressBar, note
 from .options import RECORDING, FixedBall, reading_options
+
+if TYPE_CHECKING:
+    from spinscope.pipeline.calibration.board import Pattern
 
 
 class BoardSize(click.ParamType[tuple[int, int]]):
@@ -46,7 +49,7 @@ def camera(
     recordings: tuple[Path, ...],
     board: tuple[int, int] | None,
     square_mm: float | None,
-    pattern: str,
+    pattern: Pattern,
     ball_distance_m: float | None,
     ball_mm: float,
     fixed_ball: tuple[float, float, float] | str,

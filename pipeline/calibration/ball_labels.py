@@ -27,10 +27,11 @@ Floats = NDArray[np.float64]
 EXPOSURE_US, STEP_US = 10_000, 2_500  # the supplement's; four labels an exposure, for its motion to be followed
 LATENCY_US = 40.0  # of the pixels, as `track.latency_us`: events show the scene of so long before
 # How far outside the ball its edge leaves events, and how far behind it both edges together: means of 15 simulated
-# flights of 4 to 12 m/s (seeds 78001 to 78003), which scatter by 0.07 and 0.09 px about them.
-OUTSIDE_PX, LAG_PX = 0.83, 0.27
+# flights of 4 to 12 m/s (seeds 78001 to 78003), which scatter by 0.08 px about each of them.
+OUTSIDE_PX, LAG_PX = 0.81, 0.18
 NEIGHBOURS = 2  # events around an event that is no noise: a pixel's eight neighbours hold so many
 CLOSING_PX = 5  # gaps that an outline of few events may have
+OPENING_SHARE = 0.5  # disc that fits into the area everywhere, over the ball's diameter: what does not hold it is noise
 LEAST_FILL = 0.9  # area of the blob's hull over that of the stadium of its length and width
 LEAST_LENGTH = 1.15  # a blob's length over its width: what moves less is no ball in flight
 RADIUS_RANGE_PX = (3.0, 200.0)
@@ -197,9 +198,25 @@ def _blobs(events: EventBatch, begin_us: int, size: tuple[int, int]) -> Iterator
         if x == 0 or y == 0 or x + width == size[1] or y + height == size[0] or min(width, height) < RADIUS_RANGE_PX[0]:
             continue
         mine = seen[y : y + height, x : x + width] & (part[y : y + height, x : x + width] == number)
-        hull = cv2.convexHull(cv2.findNonZero(mine.astype(np.uint8)))
-        if len(hull) >= 5 and (blob := _stadium(hull.reshape(-1, 2) + np.array([x, y]), begin_us)) is not None:
-            yield blob
+        swept = _without_spurs(mine.astype(np.uint8), kernel)
+        hull = cv2.convexHull(cv2.findNonZero(swept)) if swept.any() else ()
+        if len(hull) >= 5:
+            blob = _stadium(np.reshape(hull, (-1, 2)) + np.array([x, y]) - CLOSING_PX, begin_us)
+            if blob is not None:
+                yield blob
+
+
+def _without_spurs(mine: NDArray[np.uint8], kernel: NDArray[Any]) -> NDArray[np.uint8]:
+    """The area that a ball swept, filled, without noise that sticks to it; CLOSING_PX larger on every side."""
+    import cv2
+
+    padded = cv2.copyMakeBorder(mine, *(CLOSING_PX,) * 4, cv2.BORDER_CONSTANT)
+    closed = cv2.morphologyEx(padded, cv2.MORPH_CLOSE, kernel)
+    outlines, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    filled = cv2.drawContours(np.zeros_like(closed), outlines, -1, 1, cv2.FILLED)
+    side = int(OPENING_SHARE * min(mine.shape)) | 1  # odd, as a disc in pixels has a middle
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    return np.asarray(cv2.morphologyEx(filled, cv2.MORPH_OPEN, disc), np.uint8)
 
 
 def _stadium(hull_px: Floats, begin_us: int) -> _Blob | None:

@@ -16,6 +16,7 @@ from ..recordings import Recording
 from ..recordings.in_memory import RecordingInMemory
 
 Floats = NDArray[np.float64]
+Pattern = Literal["chessboard", "charuco"]
 
 BIN_US = 1000
 # A flash: milliseconds with at least so many times the median's ON events, and so many pixels' worth of them.
@@ -48,7 +49,7 @@ class Board:
     columns: int
     rows: int
     square_mm: float
-    pattern: Literal["chessboard", "charuco"] = "chessboard"
+    pattern: Pattern = "chessboard"
 
     def __post_init__(self) -> None:
         if not (3 <= self.columns <= 100 and 3 <= self.rows <= 100):

@@ -12,7 +12,6 @@ from pathlib import Path
 from ..biases import BiasParameters
 from ..errors import RecordingError, SpinscopeError
 from ..recordings import readable_suffixes
-from ..results import Truth
 from ..session import Choices, Session
 from ..sidecar import Sidecar, StatedTruth, biases_beside
 from .tables import Cell, ResultTable, Row, distinct
@@ -85,14 +84,6 @@ class LabRecording:
     def session(self) -> Session:
         """The open recording, of its whole length; raises SpinscopeError."""
         return Session.open(self.path, self.choices)
-
-    @property
-    def simulated(self) -> Truth | None:
-        """The simulator's truth that the file carries; None in real ones and where it is damaged."""
-        try:
-            return self.session.truth
-        except RecordingError:
-            return None
 
     def from_whole_ticks(self, start_ms: float, end_ms: float) -> Session:
         """A session of a part, counted from the start of the tick with the first event, so that no tick is cut."""

@@ -13,6 +13,7 @@ from spinscope.pipeline.calibration.ball_labels import BallLabels, ball_labels
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.evaluation import TaskContext, evaluate_real
 from spinscope.pipeline.evaluation.tables import where
+from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.recordings import write_recording
 from spinscope.pipeline.results import Truth
 from spinscope.pipeline.simulator import SimulatedRecording, flight, simulate_scene
@@ -66,6 +67,22 @@ def test_detector_is_judged_by_labels(made: SimulatedRecording, tmp_path: Path) 
     assert {row["speed_m_s"] for row in ours} == {10.0} and all(row["found"] for row in ours)
     assert np.mean([float(str(row["centre_error_px"])) for row in ours]) < 0.4
     assert [table.title for table in found.tables[1:]] == ["Ball detector by scene", "Ball detector by speed"]
+
+
+def test_noise_beside_the_ball_moves_no_label(made: SimulatedRecording) -> None:
+    """Clumps of events that stick to the outline would pull at the hull by pixels."""
+    random = np.random.default_rng(78_012)
+    truth, count = made.truth, 3000
+    t_us = np.sort(random.integers(int(truth.t_us[0]), int(truth.t_us[-1]), count))
+    x, y, radius = (np.interp(t_us, truth.t_us, column) for column in (truth.x_px, truth.y_px, truth.radius_px))
+    angle, beyond = random.uniform(0, 2 * np.pi, count), random.uniform(0, 3, count)
+    columns = np.rint(x + (radius + beyond) * np.cos(angle)), np.rint(y + (radius + beyond) * np.sin(angle))
+    inside = (columns[0] >= 0) & (columns[0] < 1280) & (columns[1] >= 0) & (columns[1] < 720)
+    clumps = EventBatch(t_us, *(column.clip(0, 1279).astype(np.uint16) for column in columns), np.ones(count, bool))
+    both = EventBatch.concatenate([made.events, clumps[np.flatnonzero(inside)]])
+    labels = ball_labels(both[np.argsort(both.t_us, kind="stable")], SIZE)
+    off_px, _ = errors_px(labels, truth)
+    assert labels.t_us.size > 15 and off_px.mean() < 0.5 and off_px.max() < 1.2
 
 
 def test_nothing_is_labelled_where_no_ball_flies(made: SimulatedRecording, tmp_path: Path) -> None:
