@@ -14,7 +14,7 @@ from ..events import EventBatch
 from .clock import now_s
 from .event_camera import CameraPacket, EventCamera
 
-PACKET_US = 1000  # of USB packets at millions of events a second
+PACKET_US = 1000  # of real time, as of USB packets at millions of events a second
 LONGEST_WAIT_S = 0.05
 FAULT_US = 1_000_000  # a fault comes so long after the start, and again after each such time
 STALL_S = 0.5
@@ -79,6 +79,7 @@ class ReplayCamera(EventCamera):
         self._reset_us = 0  # what clock resets have taken off the recording's times
         self._burst_until_us = -1
         self.can_wait = speed == float("inf")
+        self._packet_us = PACKET_US if self.can_wait else max(PACKET_US, round(PACKET_US * speed))
         self._pieces = self._cut()
 
     def read(self) -> CameraPacket | None:
@@ -162,9 +163,9 @@ class ReplayCamera(EventCamera):
 
     def _split(self, events: EventBatch, last_us: int | None) -> Iterator[_Piece]:
         """The packets of a batch; the last one ends with the batch, whose last time may go on in the next batch."""
-        first_us, end_us = int(events.t_us[0]), int(events.t_us[-1]) + 1
+        first_us, end_us, packet_us = int(events.t_us[0]), int(events.t_us[-1]) + 1, self._packet_us
         begin_us = first_us if last_us is None else min(last_us, first_us)
-        ends = np.append(np.arange((begin_us // PACKET_US + 1) * PACKET_US, end_us, PACKET_US), end_us)
+        ends = np.append(np.arange((begin_us // packet_us + 1) * packet_us, end_us, packet_us), end_us)
         starts = joined([0], rows := np.searchsorted(events.t_us, ends).tolist())
         for start, stop, upto_us in zip(starts, rows, ends.tolist(), strict=False):
             # Events of the batch's last time may follow: they are not known to be all.
