@@ -81,7 +81,7 @@ def report_html(session: ShotSession, words: ShotWords) -> str:
 
 
 def answers(players: Mapping[str, SeriesStatistics], kind: str, words: ShotWords) -> list[str]:
-    """Sentences on who has the most spin of a kind, and whether each got better."""
+    """Answer in sentences: the player with the most spin of a kind, and whether each got better."""
     known = {name: one for name, one in players.items() if one.count >= 3 and one.median_rps is not None}
     found = []
     if len(known) > 1:

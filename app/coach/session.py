@@ -17,7 +17,7 @@ from typing import Any
 
 from spinscope.pipeline.errors import ParameterError, RecordingError
 
-from .shot_record import AnalyzedRecording, ShotRecord
+from .shot_record import RecordingShots, ShotRecord
 
 TABLE_FILE = "session.sqlite"
 FORMAT = 1
@@ -41,7 +41,7 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class KnownRecording:
-    """Identity of a recording's results in a session: all that they depend on, and the error where there are none."""
+    """Content, settings and program behind a session's results of a recording, and the error where there are none."""
 
     recording_hash: str
     settings_hash: str
@@ -154,7 +154,7 @@ class ShotSession:
                 [(*checked.values(), revision, shot_id) for shot_id in shot_ids],
             )
 
-    def add(self, path: str, known: KnownRecording, found: AnalyzedRecording | None) -> list[int]:
+    def add(self, path: str, known: KnownRecording, found: RecordingShots | None) -> list[int]:
         """Put the analysis of a recording in the place of an earlier one, in one transaction; ids of its shots.
 
         Each shot takes over id, names and marks of the earlier shot with which it shares most of its time. Earlier

@@ -22,7 +22,7 @@ from spinscope.pipeline.session import Choices
 from spinscope.pipeline.sidecar import Sidecar
 
 from .session import KnownRecording, ShotSession
-from .shot_record import AnalyzedRecording, ShotRecord, analyze_for_session
+from .shot_record import RecordingShots, ShotRecord, analyze_for_session
 
 POLL_S = 0.4  # a new shot is to appear within a second of its end
 CRASHED = "the process that read it was ended, by lack of memory or a fault of a library"
@@ -135,7 +135,7 @@ class SessionAnalysis:
 
     def _results(
         self, pending: Sequence[tuple[Path, KnownRecording]]
-    ) -> Iterator[tuple[Path, KnownRecording, AnalyzedRecording | None]]:
+    ) -> Iterator[tuple[Path, KnownRecording, RecordingShots | None]]:
         """Recordings with their analysis, in any order; None with the error of what cannot be analyzed."""
         left = {}
         for number, (path, known) in enumerate(pending):
@@ -180,12 +180,12 @@ def settings_hash(choices: Choices) -> str:
     return digest([choices.parameters().as_dict(), choices.window_us, choices.fixed_ball, asdict(choices.reading)])
 
 
-def _unpacked(known: KnownRecording, text: str) -> tuple[KnownRecording, AnalyzedRecording | None]:
+def _unpacked(known: KnownRecording, text: str) -> tuple[KnownRecording, RecordingShots | None]:
     written = json.loads(text)
     if "error" in written:
         return _failed(known, written["error"]), None
     shots = tuple(ShotRecord(**shot) for shot in written["shots"])
-    return known, AnalyzedRecording(shots, written["reason"], tuple(written["warnings"]))
+    return known, RecordingShots(shots, written["reason"], tuple(written["warnings"]))
 
 
 def _failed(known: KnownRecording, error: str) -> KnownRecording:

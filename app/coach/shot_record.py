@@ -88,15 +88,15 @@ class ShotRecord:
 
 
 @dataclass(frozen=True, slots=True)
-class AnalyzedRecording:
-    """Results of one recording in a session: its shots, or why there are none."""
+class RecordingShots:
+    """Shots of one recording, or the reason why there are none."""
 
     shots: tuple[ShotRecord, ...]
     no_shot_reason: str | None
     warnings: tuple[str, ...]
 
 
-def analyze_for_session(path: Path, recording_hash: str, choices: Choices, folder: Path) -> AnalyzedRecording:
+def analyze_for_session(path: Path, recording_hash: str, choices: Choices, folder: Path) -> RecordingShots:
     """Analyze a recording and write its shots' events and pictures into a session's folder; raises SpinscopeError."""
     result = analyzed(path, choices)
     session = result.session
@@ -115,7 +115,7 @@ def analyze_for_session(path: Path, recording_hash: str, choices: Choices, folde
             record["picture_file"] = f"pictures/{name}.png"
             (folder / record["picture_file"]).write_bytes(_png(picture))
         records.append(ShotRecord(**record))
-    return AnalyzedRecording(tuple(records), result.no_shot_reason, tuple(session.warnings))
+    return RecordingShots(tuple(records), result.no_shot_reason, tuple(session.warnings))
 
 
 def _record(result: Result, shot: Shot, logo: LogoEvents | None, number: int) -> dict[str, Any]:
@@ -150,7 +150,7 @@ def _record(result: Result, shot: Shot, logo: LogoEvents | None, number: int) ->
 def shot_detail(
     session: Session, shot: Shot, trusted: SpinEstimate | None, velocity_m_s: Floats | None, logo: LogoEvents | None
 ) -> dict[str, Any]:
-    """Content of the view of a shot, ready for JSON.
+    """Drawn details of a shot, ready for JSON.
 
     Returns
     -------

@@ -115,7 +115,7 @@ class SpinProofPoints(Response):
 
 
 class ShotDetail(Response):
-    """Content of the view of a shot; directions in the camera frame, `texture` a PNG in base64."""
+    """Drawn details of a shot; directions in the camera frame, `texture` a PNG in base64."""
 
     shot: CoachShot
     spin_rps: list[float] | None

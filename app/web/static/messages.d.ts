@@ -87,7 +87,7 @@ export type SessionNames = { sessions: string[] };
 export type SessionShots = { revision: number; shots: CoachShot[]; analysis: AnalysisState; now: Names };
 /** Parameters, and the clip when it is not the first one of the recording. */
 export type SettingsRequest = { parameters: Record<string, Record<string, any>>; start_us?: number | null; end_us?: number | null };
-/** What the view of a shot draws; directions in the camera frame, `texture` a PNG in base64. */
+/** Drawn details of a shot; directions in the camera frame, `texture` a PNG in base64. */
 export type ShotDetail = { shot: CoachShot; spin_rps: number[] | null; reference_us: number; hitter: number[][] | null; texture: string | null; proof: SpinProofPoints | null; flight: FlightPath | null };
 /** One shot with the estimate of every method. */
 export type ShotMetrics = { start_us: number; end_us: number; logo_events: number; speed_m_s: number | null; best: string | null; best_reason: string | null; kind: string | null; sentence: string; spin: Record<string, EstimateMetrics> };

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from spinscope.app.coach.session import KnownRecording
-from spinscope.app.coach.shot_record import AnalyzedRecording, ShotRecord
+from spinscope.app.coach.shot_record import RecordingShots, ShotRecord
 
 KNOWN = KnownRecording("content", "settings", "version", None)
 
@@ -31,6 +31,6 @@ def shot(number: int = 1, start_us: int = 0, end_us: int = 100_000, **others: An
     return ShotRecord(**{**values, "shot": number, "start_us": start_us, "end_us": end_us, **others})
 
 
-def analysis(*shots: ShotRecord, reason: str | None = None) -> AnalyzedRecording:
+def analysis(*shots: ShotRecord, reason: str | None = None) -> RecordingShots:
     """An analysis that found these shots."""
-    return AnalyzedRecording(shots, reason, ())
+    return RecordingShots(shots, reason, ())
