@@ -1,4 +1,4 @@
-"""Controls of the page, made from the declarations of the parameters, in the order of the stages."""
+"""Controls of the page, made from the declarations of the parameters: the essential ones, then stage by stage."""
 
 from __future__ import annotations
 
@@ -10,6 +10,16 @@ from spinscope.pipeline.registry import STAGES, Parameters
 
 from .schemas import ControlInfo, SectionInfo
 
+# What the paper tunes (its sections 3.1 to 3.3), and the tick that all times are cut to.
+ESSENTIALS = (
+    "filter.threshold_us",
+    "surface.k_px",
+    "logo.pad_px",
+    "flow.t_acc_from",
+    "flow.t_acc_us",
+    "flow.expected_spin_rps",
+    "track.tick_us",
+)
 # Fields that have a section of their own, after their group's.
 OWN_SECTIONS = {"surface": {"Cleaning": ("cleaning",)}}
 # Parameters of the set-up and not of the method: a preset leaves it alone unless it names it itself.
@@ -21,18 +31,30 @@ SETUP = {
 
 
 def sections() -> list[SectionInfo]:
-    """Groups of controls, stage by stage and then the set-up."""
+    """Groups of controls: the essentials, all others stage by stage, and then the set-up."""
     parameters, of_stages = Parameters(), {stage.group for stage in STAGES}
-    made = []
+    made = [SectionInfo(title="Essentials", is_setup=False, is_open=True, controls=_essentials(parameters))]
     for group in sorted(parameters.as_dict(), key=lambda name: name not in of_stages):
         declared, own = parameters.group(group).tunables(), OWN_SECTIONS.get(group, {})
         named = {field for fields in own.values() for field in fields}
+        named |= {name.partition(".")[2] for name in ESSENTIALS if name.startswith(f"{group}.")}
         rest = tuple(field for field in declared if field not in named)
         title = STAGES[group].label if group in STAGES else group.capitalize()
         for heading, fields in {title: rest, **own}.items():
             controls = [_control(group, field, declared[field]) for field in fields]
-            made.append(SectionInfo(title=heading, is_setup=group not in of_stages, controls=controls))
+            is_setup = group not in of_stages
+            made.append(SectionInfo(title=heading, is_setup=is_setup, is_open=False, controls=controls))
     return made
+
+
+def _essentials(parameters: Parameters) -> list[ControlInfo]:
+    """Controls of the essential parameters, labelled with their group, too."""
+    names = [name.split(".") for name in ESSENTIALS]
+    controls = [_control(group, field, parameters.group(group).tunables()[field]) for group, field in names]
+    return [
+        control.model_copy(update={"label": f"{group} {control.label}"})
+        for (group, _), control in zip(names, controls, strict=True)
+    ]
 
 
 def setup_of(parameters: Parameters) -> dict[str, dict[str, Any]]:

@@ -179,10 +179,11 @@ class ControlInfo(Response):
 
 
 class SectionInfo(Response):
-    """A group of controls; `is_setup` where it belongs to the set-up and not to the method."""
+    """A group of controls; `is_setup` where it belongs to the set-up, `is_open` where it is unfolded at first."""
 
     title: str
     is_setup: bool
+    is_open: bool
     controls: list[ControlInfo]
 
 

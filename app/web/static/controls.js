@@ -21,12 +21,21 @@ const SCALES = {
 export class Controls {
   /** @type {Map<string, Control>} */
   controls = new Map();
-  /** @type {{mark: any, names: string[]}[]} */
+  /** @type {{made: any, mark: any, names: string[]}[]} */
   sections = [];
+  /** @type {any[] | null} sections that were open before the search */
+  #open = null;
 
   constructor(/** @type {any} */ parent, /** @type {SectionInfo[]} */ sections, /** @type {Settings} */ settings) {
     this.settings = settings;
-    for (const section of sections) parent.append(this.#section(section));
+    const search = { type: "search", id: "search", placeholder: "Search settings", "aria-label": "Search settings" };
+    this.search = element("input", { ...search, oninput: () => this.#find() });
+    this.changed = element("div", {
+      id: "changed",
+      role: "group",
+      "aria-label": "Settings that differ from the preset",
+    });
+    parent.append(this.search, ...sections.map((section) => this.#section(section)), this.changed);
     settings.onChange(() => this.refresh());
     this.refresh();
   }
@@ -37,23 +46,59 @@ export class Controls {
       const count = names.filter((name) => this.differs(name)).length;
       mark.textContent = count ? `${count} changed` : "";
     }
+    const changed = [...this.controls.values()].filter(({ name }) => this.differs(name));
+    this.changed.replaceChildren(...changed.map((control) => this.#difference(control)));
+    this.changed.hidden = !changed.length;
+  }
+
+  #difference(/** @type {Control} */ control) {
+    const { name, value, before } = control;
+    const title = `${name} is ${value}, ${before} in the preset: click to see its control`;
+    return element("button.chip", { title, onclick: () => this.#reveal(control) }, `${name} = ${value}`);
+  }
+
+  #reveal(/** @type {Control} */ { row, box }) {
+    this.search.value = "";
+    this.#find();
+    row.closest("details").open = true;
+    row.scrollIntoView({ block: "center" });
+    box.focus();
+  }
+
+  // Shows the controls in whose name, label or help every word occurs, unfolded; without words, all as they were.
+  #find() {
+    /** @type {string[]} */
+    const words = this.search.value.toLowerCase().split(/\s+/).filter(Boolean);
+    if (words.length) this.#open ??= this.sections.filter(({ made }) => made.open);
+    for (const section of this.sections) {
+      let found = 0;
+      for (const name of section.names) {
+        const { row, text } = /** @type {Control} */ (this.controls.get(name));
+        row.hidden = !words.every((word) => text.includes(word));
+        if (!row.hidden) found += 1;
+      }
+      section.made.hidden = found === 0;
+      if (words.length) section.made.open = found > 0;
+      else if (this.#open) section.made.open = this.#open.includes(section);
+    }
+    if (!words.length) this.#open = null;
   }
 
   differs(/** @type {string} */ name) {
     return JSON.stringify(this.settings.get(name)) !== JSON.stringify(this.settings.presetValue(name));
   }
 
-  #section(/** @type {SectionInfo} */ { title, is_setup, controls }) {
+  #section(/** @type {SectionInfo} */ { title, is_open, controls }) {
     const mark = element("span.mark");
     const body = element("div.body");
-    const made = element("details.section", { open: !is_setup }, element("summary", {}, title, mark), body);
+    const made = element("details.section", { open: is_open }, element("summary", {}, title, mark), body);
     made.dataset.title = title;
     for (const description of controls) {
       const control = new Control(description, this);
       this.controls.set(description.name, control);
       body.append(control.row);
     }
-    this.sections.push({ mark, names: controls.map(({ name }) => name) });
+    this.sections.push({ made, mark, names: controls.map(({ name }) => name) });
     return made;
   }
 }
@@ -79,6 +124,7 @@ class Control {
     const { allowed, unit, help, label: text } = info;
     const range = allowed ? `\nAllowed: ${allowed}.` : "";
     const start = `\nDefault: ${this.#text(info.default) || "none"}${unit ? ` ${unit}` : ""}.`;
+    this.text = `${this.name} ${text} ${help}`.toLowerCase();
     this.title = `${this.name}\n${help}.${range}${start}`;
     this.reset = element("button.reset", {
       title: "Back to the preset's value",
@@ -88,6 +134,18 @@ class Control {
     const label = element("label", { htmlFor: id }, text);
     this.row = element("div.control", { title: this.title }, label, ...this.#inputs(id), this.reset);
     this.row.dataset.name = this.name;
+  }
+
+  get value() {
+    return this.#withUnit(this.settings.get(this.name));
+  }
+
+  get before() {
+    return this.#withUnit(this.settings.presetValue(this.name));
+  }
+
+  #withUnit(/** @type {any} */ value) {
+    return `${this.#text(value) || "auto"} ${this.info.unit}`.trim();
   }
 
   refresh() {

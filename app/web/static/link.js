@@ -67,7 +67,7 @@ function applied(/** @type {Opening} */ { presets, renamed }, /** @type {string[
     if (given in renamed) notice(`${given} is now called ${renamed[given]}`, "info", 12);
     const [group, name] = (renamed[given] ?? given ?? "").split(".");
     if (!Object.hasOwn(values, group) || !Object.hasOwn(values[group], name)) {
-      notice(`The address sets ${text.slice(0, 80)}, which is no setting: it is left out.`, "warning", 12);
+      notice(`The address sets ${text.slice(0, 80)}, which is no setting: it is left out.`, "warning", 0);
       continue;
     }
     try {

@@ -237,7 +237,7 @@ function showButtons() {
 }
 
 function shortcuts(/** @type {KeyboardEvent} */ event) {
-  const typing = /** @type {HTMLElement} */ (event.target).matches?.("input[type=text], textarea");
+  const typing = /** @type {HTMLElement} */ (event.target).matches?.("input[type=text], input[type=search], textarea");
   if (!(event.ctrlKey || event.metaKey) || typing) return;
   const key = event.key.toLowerCase();
   if (key === "z" && !event.shiftKey) settings.undo();

@@ -77,8 +77,8 @@ export type RunMessage = { kind: "run"; serial: number; state: "loading" | "comp
 export type RunMetrics = { ticks: number; tracked_share: number; residual_px: number | null; jitter_px: number | null; logo_events: number; shots: ShotMetrics[]; no_shot_reason: string | null; up_doubt: string | null };
 /** Run a clip with `parameters`, beside those pinned as A; the request with the highest serial is the newest. */
 export type RunRequest = { serial: number; parameters: Record<string, Record<string, any>>; pinned?: Record<string, Record<string, any>> | null; start_us: number; end_us: number; playhead_us?: number | null; interactive?: boolean; followed?: number | null };
-/** A group of controls; `is_setup` where it belongs to the set-up and not to the method. */
-export type SectionInfo = { title: string; is_setup: boolean; controls: ControlInfo[] };
+/** A group of controls; `is_setup` where it belongs to the set-up, `is_open` where it is unfolded at first. */
+export type SectionInfo = { title: string; is_setup: boolean; is_open: boolean; controls: ControlInfo[] };
 /** Statistics of the spin of a series of shots; None for what too few shots tell. */
 export type SeriesStatistics = { count: number; unseen: number; median_rps: number | null; best_rps: number | null; best_id: number | null; spread_rps: number | null; median_speed_m_s: number | null; ellipse: [number, number][] | null; trend: "rose" | "fell" | "unclear" | "too_few"; change_rps: number | null; change_std_rps: number | null };
 /** Sessions that are open. */

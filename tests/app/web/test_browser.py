@@ -81,6 +81,7 @@ class Tab:
     def slide(self, name: str, key: str = "ArrowUp", what: str = "done") -> None:
         """Press a key on a slider."""
         slider = self.page.locator(f"[data-name='{name}'] input[type=range]")
+        slider.evaluate("(slider) => { slider.closest('details').open = true; }")
         self.after(lambda: slider.press(key), what)
 
     def until(self, holds: str) -> None:
@@ -182,6 +183,7 @@ def test_every_group_of_sliders_changes_its_stages_and_nothing_above(tab: Tab) -
         tab.after(lambda: tab.page.keyboard.press("Control+z"))
         assert tab.value(name) == before and tab.computed() == set()
     choice = tab.page.locator("[data-name='surface.cleaning'] select")
+    choice.evaluate("(choice) => { choice.closest('details').open = true; }")
     tab.after(lambda: choice.select_option("off"))
     assert "surface" in tab.computed()
     tab.after(lambda: tab.page.locator("[data-name='surface.cleaning'] .reset").click())
@@ -456,6 +458,28 @@ def test_without_tools_the_viewer_fills_the_page_on_the_chosen_tab(browser: Any,
         context.close()
     finally:
         own.stop()
+
+
+def test_settings_are_found_by_words_and_what_differs_is_in_sight(browser: Any, server: Served) -> None:
+    """Without the viewer: the essentials, the search, the list of what differs, an address that sets nonsense."""
+    tab = bare_tab(browser, f"{server.address}#set=contrast.kernel_rad=0.05&set=__proto__.polluted=1")
+    page = tab.page
+    assert "which is no setting" in page.inner_text("#notices")
+    assert page.evaluate("[{}.polluted, Object.prototype.polluted].every((one) => one === undefined)")
+    chip = page.locator("#changed .chip")
+    assert chip.all_inner_texts() == ["contrast.kernel_rad = 0.05 rad"]
+    row, pad = page.locator("[data-name='contrast.kernel_rad']"), page.locator("[data-name='logo.pad_px']")
+    assert pad.is_visible() and not row.is_visible()
+    page.fill("#search", "sigma near BALL")
+    assert row.is_visible() and not pad.is_visible()
+    page.fill("#search", "")
+    assert pad.is_visible() and not row.is_visible()
+    chip.click()
+    assert row.is_visible() and chip.is_visible()
+    tab.after(lambda: row.locator(".reset").click())
+    assert page.locator("#changed").is_hidden()
+    assert tab.errors == []
+    page.context.close()
 
 
 def test_the_tools_of_a_page_can_be_turned_off(browser: Any, server: Served) -> None:

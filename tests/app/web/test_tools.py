@@ -12,7 +12,7 @@ import pytest
 from spinscope.app.tuning.bias_sweep import known_biases
 from spinscope.app.tuning.optimization import REFUSED, cost_of
 from spinscope.app.tuning.parameter_sweep import scale_of, sweep_values
-from spinscope.app.web.controls import sections
+from spinscope.app.web.controls import ESSENTIALS, sections
 from spinscope.pipeline.biases import BiasParameters
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.metrics import EstimateMetrics, RunMetrics, ShotMetrics
@@ -28,7 +28,15 @@ def test_every_parameter_has_one_control() -> None:
     wanted = [f"{group}.{field}" for group, fields in Parameters().as_dict().items() for field in fields]
     assert sorted(names) == sorted(wanted)
     titles = [section.title for section in sections() if not section.is_setup]
-    assert titles[:3] == ["Filter", "Surface (EROS)", "Cleaning"] and titles[-2:] == ["Trajectory", "Combined"]
+    assert titles[:4] == ["Essentials", "Filter", "Surface (EROS)", "Cleaning"]
+    assert titles[-2:] == ["Trajectory", "Combined"]
+
+
+def test_the_essentials_are_open_on_top_and_say_which_stage_they_are_of() -> None:
+    first, *others = sections()
+    assert first.is_open and not any(section.is_open for section in others)
+    assert [control.name for control in first.controls] == list(ESSENTIALS)
+    assert {control.label for control in first.controls} >= {"filter threshold", "surface k", "logo pad", "track tick"}
 
 
 @pytest.mark.parametrize("name", ["logo.pad_px", "filter.threshold_us", "surface.k_px", "track.coast_us"])
