@@ -16,7 +16,7 @@ from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.recordings import ReadingOptions, RecordingInfo, open_recording, summary
 from spinscope.pipeline.session import Progress
 
-from ..terminal import ProgressBar, console
+from ..terminal import ProgressBar, console, note
 from .options import RECORDING, reading_options, write_text
 
 # Of the table, with their alignment.
@@ -119,7 +119,11 @@ def information(path: Path, reading: ReadingOptions, on_progress: Progress) -> R
     def report(share: float) -> None:
         on_progress(share, "reading")
 
-    return summary(open_recording(path, **asdict(reading), on_progress=report), report)
+    recording = open_recording(path, **asdict(reading), on_progress=report)
+    if recording.is_large:
+        size_px = f"{recording.width_px} x {recording.height_px} px (from: {recording.sensor_from})"
+        note(f"{recording.format}, {size_px}, {path.stat().st_size / 1e6:,.0f} MB: counting the events ...")
+    return summary(recording, report)
 
 
 def print_information(info: RecordingInfo) -> None:
