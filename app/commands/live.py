@@ -37,14 +37,21 @@ def source_options(command: Callable[..., None]) -> Callable[..., None]:
 
 @click.command()
 @click.option("--headless", is_flag=True, help="Without a page: lines of JSON.")
-@click.option("--jsonl", "lines", default="-", metavar="OUT", help="File or pipe of the lines; - is standard output.")
+@click.option("--jsonl", "lines", metavar="OUT", help="File or pipe of the lines; - for standard output.")
+@click.option("--page-port", type=click.IntRange(0, 65535), help="Port of the page; another free one if it is busy.")
+@click.option("--no-browser", is_flag=True, help="Only print the page's address.")
 @source_options
 @session_options
-def live(headless: bool, lines: str, **options: Any) -> None:
-    """Show the shots of a running camera as they end, one line of JSON each, and the state every second."""
-    if not headless:
-        raise click.UsageError("the page of a running camera is not there yet: give --headless, or use `watch`")
-    _run(lines=lines, **options)
+def live(headless: bool, lines: str | None, page_port: int | None, no_browser: bool, **options: Any) -> None:
+    """Show the shots of a running camera as they end: in the tuner's page, or as lines of JSON.
+
+    The page opens with the first shot. It holds every shot so far, to be scrubbed, compared and tuned while the camera
+    runs on; loaded again it lists the new ones.
+    """
+    if headless:
+        _run(lines=lines or "-", **options)
+    else:
+        _run(lines=lines, page={"port": page_port, "open_browser": not no_browser}, **options)
 
 
 @click.command()
@@ -76,6 +83,7 @@ def _run(
     method: str,
     choices: Choices,
     table: Path | None = None,
+    page: dict[str, Any] | None = None,
 ) -> None:
     from ..live.headless import Outputs, run_headless
     from ..live.opening import CameraChoice
@@ -85,4 +93,10 @@ def _run(
         raise click.UsageError("--split-mb and --split-s go with --record NAME.raw")
     chosen = CameraChoice(serial=serial, biases=biases, replay=replay, speed=speed, loops=loops, fault=fault)
     recording = None if record is None else RecordChoice(record, split_mb, split_s)
-    run_headless(chosen, choices, check_method(method), Outputs(lines=lines, port=port, table=table, record=recording))
+    to = Outputs(lines=lines, port=port, table=table, record=recording)
+    if page is None:
+        run_headless(chosen, choices, check_method(method), to)
+    else:
+        from ..live.page import run_with_page
+
+        run_with_page(chosen, choices, check_method(method), to, **page)

@@ -6,7 +6,7 @@ import gc
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -48,10 +48,23 @@ class Outputs:
     record: RecordChoice | None = None
 
 
-def run_headless(chosen: CameraChoice, choices: Choices, method: str, to: Outputs) -> None:
-    """Run until the camera ends or Ctrl-C, writing each shot as it ends and the state once a second.
+Begun = Callable[[Callable[[], None]], None]
 
-    Raises SpinscopeError for what cannot be opened or written.
+
+def run_headless(
+    chosen: CameraChoice, choices: Choices, method: str, to: Outputs, on_start: Begun | None = None
+) -> None:
+    """Run until the camera ends or is told to, writing each shot as it ends and the state once a second.
+
+    Parameters
+    ----------
+    on_start : callable, optional
+        `on_start(stop)` gets what ends the run; Ctrl-C does by default, in the main thread alone.
+
+    Raises
+    ------
+    SpinscopeError
+        For what cannot be opened or written.
     """
     table = None if to.table is None else ShotTable(to.table)
     camera, session, reopen = open_live(chosen, choices)
@@ -74,9 +87,11 @@ def run_headless(chosen: CameraChoice, choices: Choices, method: str, to: Output
 
         run = LiveRun(stream, session.parameters, method, with_balls=server is not None)
         note(f"live: {camera.name} {camera.serial}, {camera.width_px} x {camera.height_px} px; Ctrl-C ends it")
+        if on_start is not None:
+            on_start(run.stop)
         if table is not None:
             at_end.callback(table.close)
-        with ends_on_signals(run.stop):
+        with ends_on_signals(run.stop) if on_start is None else nullcontext():
             for one in run.outputs():
                 of_shot = (session.camera, session.ball_radius_m) if isinstance(one, LiveShot) else ()
                 line = one.to_dict(*of_shot)

@@ -23,6 +23,11 @@ MARGIN_US = 20_000  # of events before and after a shot: analysed anew it begins
 LIVE_COLUMNS: dict[str, type] = {"number": int, "date": str, "events_file": str, "latency_ms": float}
 
 
+def events_folder(table: Path) -> Path:
+    """Folder of the events of a table's shots."""
+    return table.with_name(f"{table.stem}_shots")
+
+
 class ShotTable:
     """CSV, JSON lines or Parquet with one row a shot; the same name goes on with the rows that are there.
 
@@ -45,7 +50,7 @@ class ShotTable:
     def __init__(self, path: Path) -> None:
         check_table_name(path)
         self.path, self.columns = path, {**LIVE_COLUMNS, **shot_columns()}
-        self.folder = path.with_name(f"{path.stem}_shots")
+        self.folder = events_folder(path)
         is_parquet = path.suffix.lower() == ".parquet"
         self._rows = path.with_name(f"{path.name}.rows.jsonl") if is_parquet else path
         self._is_csv = path.suffix.lower() == ".csv"

@@ -15,7 +15,7 @@ import pytest
 from click.testing import CliRunner
 
 from spinscope.app.cli import cli
-from spinscope.app.live import headless
+from spinscope.app.live import headless, page
 from spinscope.app.live.json_lines import JsonServer
 from spinscope.app.live.shot_table import ShotTable
 from spinscope.pipeline.cameras import RecentEvents
@@ -110,6 +110,26 @@ def test_watch_writes_a_table(bounce: Session, tmp_path: Path) -> None:
     assert len(list((tmp_path / "day_shots").iterdir())) == 2
 
 
+def test_the_page_opens_with_the_first_shot(bounce: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    served: list[tuple[Path, int]] = []
+
+    def serve(path: Path, choices: object, port: int | None, *, open_browser: bool) -> None:
+        assert not open_browser and port == 0
+        served.append((path, len(open_recording(path).read())))
+
+    monkeypatch.setattr(page, "serve", serve)
+    result = run("live", "--replay", bounce.recording.path, *QUICK, "--no-browser", "--page-port", 0)
+    assert result.exit_code == 0, result.output
+    ((path, events),) = served
+    assert path.name == "shot_00001.h5" and events > 10_000
+    assert not path.exists()  # goes with the program
+
+
+def test_a_camera_without_a_shot_opens_no_page(samples: Path) -> None:
+    result = run("live", "--replay", samples / "own/spinner_top.h5", *QUICK, "--no-browser")
+    assert result.exit_code == 0 and "0 shots in" in result.stderr
+
+
 def test_a_table_of_others_is_refused(bounce: Session, tmp_path: Path) -> None:
     (tmp_path / "mine.csv").write_text("a,b\n1,2\n")
     result = run("watch", tmp_path / "mine.csv", "--replay", bounce.recording.path)
@@ -148,7 +168,6 @@ def test_recent_events_are_bounded() -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("live",), "--headless"),
         (("live", "--headless", "--loop"), "--replay FILE"),
         (("live", "--headless", "--split-s", "5"), "--record NAME.raw"),
         (("watch", "table.txt"), "a table is one of"),
