@@ -31,7 +31,7 @@ from .recordings import RawWriter
 from .recordings.in_memory import RecordingInMemory
 from .registry import STAGES, Parameters
 from .results import Packet
-from .session import DEFAULT_SAMPLE, SAMPLES, Choices, Session, method_targets
+from .session import SAMPLES, Choices, Session, method_targets
 from .shots import Shot, ShotLog
 from .stages.track_result import BallTrack
 
@@ -191,8 +191,8 @@ def raw_file(path: Path, width_px: int, height_px: int, attributes: Mapping[str,
 
 def load_kernels() -> None:
     """Run all stages over shots with a contact and with two balls, so that no kernel is loaded in the first shot."""
-    for sample in (DEFAULT_SAMPLE, SAMPLES / "own" / "bounce.h5", SAMPLES / "own" / "two_balls.h5"):
-        Session.open(sample).estimate()
+    for sample in ("bounce.h5", "two_balls.h5"):
+        Session.open(SAMPLES / "own" / sample).estimate()
 
 
 def _without_events(packet: Packet) -> Packet:
