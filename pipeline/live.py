@@ -341,7 +341,7 @@ class LiveRun:
             self._tracked.put((replace(one, packet=_without_events(one.packet)), chain, self._kept(tick)))
 
     def _kept(self, tick: Tick) -> Tick:
-        """What the spins need of a tick, as soon as there is room for it."""
+        """The part of a tick that the spins need, as soon as there is room for it."""
         if not tick.track.balls:
             return Tick({"track": tick.track}, _without_events(tick.packet), ())
         self._room.acquire()
