@@ -39,6 +39,7 @@ const OFFERED = {
   stroke: ["topspin", "push", "serve", "smash"],
   drill: ["maximum topspin", "backspin rally", "serves"],
 };
+const ROWS_AT_ONCE = 40; // a projector shows 20
 const CONFIDENCE = ["rough", "good", "sure"];
 /** @type {Record<string, (shot: CoachShot) => string | number | null>} */
 const SORT_BY = {
@@ -160,6 +161,7 @@ export class ShotFilter extends EventTarget {
 export class ShotList {
   /** @type {Set<number>} */
   #selected = new Set();
+  #filled = 0;
   #sort = { column: "time", isFalling: true };
 
   /** @param {{shots: Shots, filter: ShotFilter, go: (place: string) => void}} page */
@@ -234,7 +236,15 @@ export class ShotList {
     const shown = this.#shown();
     this.ids = shown.map((shot) => shot.id);
     for (const id of [...this.#selected]) if (!this.ids.includes(id)) this.#selected.delete(id);
-    this.rows.replaceChildren(...shown.map((shot) => this.#row(shot)));
+    // What is in view first: the rest of a long list is made while it is looked at.
+    const filled = ++this.#filled;
+    this.rows.replaceChildren(...shown.slice(0, ROWS_AT_ONCE).map((shot) => this.#row(shot)));
+    const more = (/** @type {number} */ first) => {
+      if (first >= shown.length || filled !== this.#filled) return;
+      this.rows.append(...shown.slice(first, first + ROWS_AT_ONCE).map((shot) => this.#row(shot)));
+      setTimeout(() => more(first + ROWS_AT_ONCE), 0);
+    };
+    setTimeout(() => more(ROWS_AT_ONCE), 0);
     if (!shown.length) {
       const why = this.shots.list.length ? text("empty") : text("no_shots_yet");
       this.rows.append(element("tr", {}, element("td.empty", { colSpan: COLUMNS.length + 3 }, why)));

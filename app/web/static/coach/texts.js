@@ -58,9 +58,22 @@ export function term(key, about = key) {
   return made;
 }
 
+/** @type {Map<string, any>} making a formatter takes longer than drawing a row of the list */
+const formatters = new Map();
+
+/** @template T @param {string} key @param {(language: string) => T} make @returns {T} */
+function formatter(key, make) {
+  const whole = `${chosen.language} ${key}`;
+  if (!formatters.has(whole)) formatters.set(whole, make(chosen.language));
+  return formatters.get(whole);
+}
+
 /** @param {number} value @param {number} digits */
 export const decimal = (value, digits = 0) =>
-  value.toLocaleString(chosen.language, { minimumFractionDigits: digits, maximumFractionDigits: digits });
+  formatter(
+    `number ${digits}`,
+    (language) => new Intl.NumberFormat(language, { minimumFractionDigits: digits, maximumFractionDigits: digits }),
+  ).format(value);
 
 export const inSpinUnit = (/** @type {number} */ rps) => (chosen.spin === "rpm" ? 60 * rps : rps);
 export const inSpeedUnit = (/** @type {number} */ m_s) => (chosen.speed === "km_h" ? 3.6 * m_s : m_s);
@@ -102,19 +115,19 @@ export function toldBy(shot) {
 /** Language and units, for what the server writes. */
 export const wordsQuery = () => `language=${chosen.language}&spin_unit=${chosen.spin}&speed_unit=${chosen.speed}`;
 
+/** @type {Record<string, Intl.DateTimeFormatOptions>} */
+const TIMES = {
+  time: { hour: "2-digit", minute: "2-digit", second: "2-digit" },
+  "day and time": { day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" },
+  day: { year: "numeric", month: "short", day: "numeric" },
+};
+
+/** @param {CoachShot} shot @param {string} what */
+const dateWords = (shot, what) =>
+  formatter(what, (language) => new Intl.DateTimeFormat(language, TIMES[what])).format(1000 * shot.recorded_s);
+
 /** Time of day, or with the day. @param {CoachShot} shot */
-export const timeWords = (shot, withDay = false) =>
-  new Date(1000 * shot.recorded_s).toLocaleString(
-    chosen.language,
-    withDay
-      ? { day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" }
-      : { hour: "2-digit", minute: "2-digit", second: "2-digit" },
-  );
+export const timeWords = (shot, withDay = false) => dateWords(shot, withDay ? "day and time" : "time");
 
 /** @param {CoachShot} shot */
-export const dayOf = (shot) =>
-  new Date(1000 * shot.recorded_s).toLocaleDateString(chosen.language, {
-    year: "numeric",
-    month: "short",
-    day: "numeric",
-  });
+export const dayOf = (shot) => dateWords(shot, "day");
