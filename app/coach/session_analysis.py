@@ -14,6 +14,7 @@ from joblib import cpu_count
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from spinscope.app.batch import program_version, recordings_in
+from spinscope.app.terminal import note
 from spinscope.pipeline.errors import RecordingError, SpinscopeError
 from spinscope.pipeline.evaluation.tables import Row
 from spinscope.pipeline.evaluation.tasks import Task, TaskContext, digest, executor, performed
@@ -98,7 +99,7 @@ class SessionAnalysis:
             try:
                 self.run_once()
             except SpinscopeError as error:  # of the session itself, as a full disk
-                self.session.folder.joinpath("error.txt").write_text(f"{error}\n", encoding="utf-8")
+                note(f"warning: {error}")
             self._ended.wait(POLL_S)
 
     def _tell(self, progress: AnalysisProgress) -> None:
