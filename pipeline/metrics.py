@@ -21,9 +21,9 @@ from .spin_terms import Kind, kind_of_spin, km_h, rpm
 Floats = NDArray[np.float64]
 
 
-def _metric(label: str, unit: str = "") -> Any:
-    """Declare a metric that is shown: its label and unit (% for a share of 0 to 1)."""
-    return dataclasses.field(metadata={"label": label, "unit": unit})
+def _metric(label: str, unit: str = "", help: str = "") -> Any:
+    """Declare a metric that is shown: its label, unit (% for a share of 0 to 1) and explanation."""
+    return dataclasses.field(metadata={"label": label, "unit": unit, "help": help})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,12 +40,12 @@ class EstimateMetrics:
 
     status: str
     reason: str | None
-    magnitude_rps: float | None = _metric("Spin", "rps")
+    magnitude_rps: float | None = _metric("Spin", "rps", "Magnitude of the spin.")
     magnitude_std_rps: float | None
     axis: list[float] | None
-    axis_std_deg: float | None = _metric("1σ of the axis", "°")
-    error_rps: float | None = _metric("Error against truth", "rps")
-    error_deg: float | None = _metric("Axis error against truth", "°")
+    axis_std_deg: float | None = _metric("1σ of the axis", "°", "Stated error of the axis, both directions together.")
+    error_rps: float | None = _metric("Error against truth", "rps", "Magnitude less the true one, absolute.")
+    error_deg: float | None = _metric("Axis error against truth", "°", "Angle between the signed axes, 0 to 180°.")
     error_share: float | None
 
 
@@ -68,7 +68,7 @@ class ShotMetrics:
     start_us: int
     end_us: int
     logo_events: int
-    speed_m_s: float | None = _metric("Speed", "m/s")
+    speed_m_s: float | None = _metric("Speed", "m/s", "Mean speed of the ball over the shot with the most logo events.")
     best: str | None
     best_reason: str | None
     kind: str | None
@@ -95,10 +95,18 @@ class RunMetrics:
     """
 
     ticks: int
-    tracked_share: float = _metric("Ticks tracked", "%")
-    residual_px: float | None = _metric("Residual of the circle", "px")
-    jitter_px: float | None = _metric("Track jitter", "px")
-    logo_events: int = _metric("Logo events")
+    tracked_share: float = _metric("Ticks tracked", "%", "Share of the ticks in which a circle was measured.")
+    residual_px: float | None = _metric(
+        "Residual of the circle",
+        "px",
+        "RMS distance of the measured circles from the Kalman filter's, centre and radius.",
+    )
+    jitter_px: float | None = _metric(
+        "Track jitter", "px", "1 sigma of the measured centres along one axis, from their second differences."
+    )
+    logo_events: int = _metric(
+        "Logo events", help="Events inside the ball less the pad, of all shots: the evidence of the spin."
+    )
     shots: list[ShotMetrics]
     no_shot_reason: str | None
     up_doubt: str | None

@@ -89,21 +89,35 @@ def _arrows(run: ViewedRun) -> list[Chunk]:
     if run.true_spins_rps is not None:
         spins = np.nan_to_num(run.true_spins_rps) * run.has_ball[:, None]
         chunks += _arrow(run, f"{at.SPIN_ARROWS}/truth", list(spins), at.TRUTH_COLOUR, 0.02)
-    shown = [vector_of(shown_estimate(tick)[0]) for tick in run.ticks]
-    return [*chunks, *_arrow(run, at.SPIN_SHOWN, shown, at.RING_COLOUR, 0.06)]
+    shown = [shown_estimate(tick) for tick in run.ticks]
+    vectors, trusted = [vector_of(estimate) for estimate, _ in shown], [is_trusted for _, is_trusted in shown]
+    return [*chunks, *_arrow(run, at.SPIN_SHOWN, vectors, at.RING_COLOUR, 0.06, trusted)]
 
 
-def _arrow(run: ViewedRun, entity: str, vectors: list[Floats], colour: at.Colour, thickness: float) -> list[Chunk]:
+def _arrow(
+    run: ViewedRun,
+    entity: str,
+    vectors: list[Floats],
+    colour: at.Colour,
+    thickness: float,
+    trusted: list[bool] | None = None,
+) -> list[Chunk]:
+    """Arrow along a spin at every tick; where it is not trusted pale, and labelled so."""
     spins = np.array(vectors).reshape(-1, 3)
     magnitudes = np.linalg.norm(spins, axis=1)
     known = magnitudes > 0
+    sures = np.array(trusted)[known] if trusted is not None else np.ones(int(known.sum()), bool)
     axes = spins[known] / magnitudes[known, None]
     columns = rr.Arrows3D.columns(
         origins=axes * run.ball_radius_m,
         vectors=axes * (magnitudes[known, None] * RPS_M),
-        labels=[f"{magnitude:.1f} rps" for magnitude in magnitudes[known]],
+        labels=[
+            f"{magnitude:.1f} rps{'' if sure else ', not trusted'}"
+            for magnitude, sure in zip(magnitudes[known], sures, strict=True)
+        ],
+        colors=[colour if sure else at.DOUBTED_COLOUR for sure in sures],
     )
-    look = {"colors": colour, "radii": thickness * run.ball_radius_m, "show_labels": entity == at.SPIN_SHOWN}
+    look = {"radii": thickness * run.ball_radius_m, "show_labels": entity == at.SPIN_SHOWN}
     return [styled(entity, rr.Arrows3D, **look), columns_at(entity, run.times_us, columns, [0, *known.astype(int)])]
 
 

@@ -88,6 +88,7 @@ PATH_COLOUR: Colour = (76, 217, 100)
 OTHERS_COLOUR: Colour = (200, 206, 212)
 CONTACT_COLOUR: Colour = (255, 112, 167)
 RING_COLOUR: Colour = (255, 213, 79)
+DOUBTED_COLOUR: Colour = (150, 143, 122)  # of an answer that is shown and not trusted: the ring's, pale
 RATE_COLOUR: Colour = (174, 213, 129)
 BACKGROUND: Colour = (16, 16, 16)
 STATUS_COLOURS: dict[str, Colour] = {

@@ -134,9 +134,12 @@ class _TickState:
         speed = None if velocity is None else float(np.linalg.norm(velocity))
         big = "In place" if self.run.fixed else "-" if speed is None else f"{km_h(speed):.0f} km/h"
         speed_lines = big, "" if speed is None else f"{speed:.1f} m/s"
-        if self.answer is None or not self.answer[2]:
-            return ("-", ""), speed_lines, ("Spin not known", "no estimate is trusted yet")
-        estimate, kind, _ = self.answer
+        if self.answer is None:
+            return ("-", ""), speed_lines, ("Spin not known", "no method has an answer")
+        estimate, kind, is_trusted = self.answer
+        if not is_trusted:
+            doubted = f"{estimate.magnitude_rps:.0f} rps, {kind.name}: not trusted"
+            return ("-", doubted), speed_lines, ("Spin not known", self.tick.balls[0].best_reason or "not trusted")
         magnitude, std = estimate.magnitude_rps or 0.0, estimate.magnitude_std_rps
         margin = "" if std is None else f" ± {rpm(std):.0f}"
         more = kind.sentence.removeprefix(kind.name).strip(" ,")

@@ -82,9 +82,7 @@ def recording_description(recording: OpenRecording) -> RecordingDescription:
 
 def _metrics(metrics: type[RunMetrics | ShotMetrics | EstimateMetrics]) -> list[MetricInfo]:
     declared = [field for field in dataclasses.fields(metrics) if field.metadata]
-    return [
-        MetricInfo(name=field.name, label=field.metadata["label"], unit=field.metadata["unit"]) for field in declared
-    ]
+    return [MetricInfo(name=field.name, **field.metadata) for field in declared]
 
 
 def _css(colour: entities.Colour) -> str:

@@ -128,11 +128,12 @@ class MethodInfo(Choice):
 
 
 class MetricInfo(Response):
-    """A metric of a run, shot or estimate: field name, label and unit (% for a share of 0 to 1)."""
+    """A metric of a run, shot or estimate: field name, label, unit (% for a share of 0 to 1) and explanation."""
 
     name: str
     label: str
     unit: str
+    help: str
 
 
 class EventRate(Response):

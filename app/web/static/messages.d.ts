@@ -41,8 +41,8 @@ export type FlightPath = { frame: "table" | "hitter"; t_us: number[]; points_m: 
 export type Kept = { revision: number };
 /** A spin method with its colour, as CSS. */
 export type MethodInfo = { name: string; label: string; help: string; colour: string };
-/** A metric of a run, shot or estimate: field name, label and unit (% for a share of 0 to 1). */
-export type MetricInfo = { name: string; label: string; unit: string };
+/** A metric of a run, shot or estimate: field name, label, unit (% for a share of 0 to 1) and explanation. */
+export type MetricInfo = { name: string; label: string; unit: string; help: string };
 /** Names of a shot; None clears one. */
 export type Names = { player: string | null; wing: string | null; stroke: string | null; drill: string | null };
 /** Set names, marks, or that shots are deleted; what is not given stays. */

@@ -4,6 +4,9 @@
 
 import { element, milliseconds, number } from "./elements.js";
 
+const SPIN_HELP = "Magnitude ± 1 sigma that the method states. ✔: the one answer that the program itself trusts.";
+const AXIS_HELP = "Unit vector in the camera frame (x right, y down, z into the scene), right-hand rule; ± 1 sigma.";
+
 export class Results extends EventTarget {
   /** @type {string | null} of the largest shot, for the coach */
   sentence = null;
@@ -43,25 +46,31 @@ export class Results extends EventTarget {
     const { run_metrics, shot_metrics, methods, estimate_metrics } = this.opening;
     const shots = both.map(mainShot);
     const rows = [
-      ...run_metrics.map((metric) => row(metric.label, both.map((one) => shown(one, metric)))),
-      ...shot_metrics.map((metric) => row(metric.label, shots.map((shot) => shown(shot, metric)))),
+      ...run_metrics.map((metric) => row(metric.label, both.map((one) => shown(one, metric)), metric.help)),
+      ...shot_metrics.map((metric) => row(metric.label, shots.map((shot) => shown(shot, metric)), metric.help)),
     ];
     const errors = estimate_metrics.filter(({ name }) => name.startsWith("error_"));
     for (
-      const { name, label, colour } of methods.filter((method) => shots.some(Boolean) && this.#methods.has(method.name))
+      const { name, label, colour, help } of methods.filter((method) =>
+        shots.some(Boolean) && this.#methods.has(method.name)
+      )
     ) {
       const estimates = shots.map((shot) => shot?.spin[name]);
-      const heading = element("th", { colSpan: 1 + both.length, style: `color: ${colour}` }, label);
+      const heading = element("th", { colSpan: 1 + both.length, style: `color: ${colour}`, title: help }, label);
       rows.push(element("tr.method", {}, heading));
-      const reasons = estimates.map((estimate) => estimate?.reason).filter(Boolean).join("\n");
-      rows.push(row("spin", estimates.map((e, i) => spin(e) + (shots[i]?.best === name ? " ✔ trusted" : "")), reasons));
-      rows.push(row("axis", estimates.map(axis)));
+      const trusted = shots.map((shot) => shot?.best === name);
+      const spins = row("spin", estimates.map((e, i) => spin(e) + (trusted[i] ? " ✔ trusted" : "")), SPIN_HELP);
+      const axes = row("axis", estimates.map(axis), AXIS_HELP);
+      for (const one of [spins, axes]) {
+        trusted.forEach((is, i) => one.cells[1 + i].classList.toggle("doubted", !is));
+        rows.push(one);
+      }
       for (const metric of errors) {
         const values = estimates.map((estimate) => shown(estimate, metric));
-        if (values.some((value) => value !== "–")) rows.push(row(metric.label.toLowerCase(), values));
+        if (values.some((value) => value !== "–")) rows.push(row(metric.label.toLowerCase(), values, metric.help));
       }
     }
-    rows.push(row("Computing time", costs_ms.map(milliseconds)));
+    rows.push(row("Computing time", costs_ms.map(milliseconds), "All stages, when they were last computed."));
     const counts = both.map(({ shots: all }) => (all.length > 1 ? `${all.length} shots, the largest` : ""));
     const columns = both.length > 1 ? ["A", "B"] : [""];
     const names = columns.map((c, i) => [c, counts[i]].filter(Boolean).join(": "));

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from spinscope.app.viewer import entities
+from spinscope.app.viewer.ball import _arrow
 from spinscope.app.viewer.ball_projections import TEXTURE_PX
 from spinscope.app.viewer.rrd import write_rrd
 from spinscope.app.viewer.run import ViewedRun, shown_estimate
@@ -56,6 +57,17 @@ def test_the_shown_arrow_points_along_the_trusted_spin(flight: ViewedRun, logged
     (ring,) = np.array(logged[entities.SPIN_RING].at("strips", tick.packet.end_us))
     sense = np.cross(ring[0], ring[1]) @ estimate.axis
     assert sense > 0  # the ring runs the way the ball turns
+
+
+def test_an_arrow_that_is_not_trusted_is_pale_and_says_so(flight: ViewedRun) -> None:
+    vectors = [np.array([0.0, 0.0, 20.0])] * len(flight.ticks)
+    trusted = [row % 2 == 0 for row in range(len(flight.ticks))]
+    _, drawn = _arrow(flight, entities.SPIN_SHOWN, vectors, entities.RING_COLOUR, 0.06, trusted)
+    columns = drawn.to_record_batch().to_pydict()
+    labels = next(value for name, value in columns.items() if name.endswith("labels"))
+    colours = next(value for name, value in columns.items() if name.endswith("colors"))
+    assert labels[1:3] == [["20.0 rps"], ["20.0 rps, not trusted"]]
+    assert colours[1] != colours[2] and colours[1] == colours[3]
 
 
 def test_the_path_is_the_ticks_places_in_pieces(flight: ViewedRun, logged: dict[str, Rows]) -> None:
