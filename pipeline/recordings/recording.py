@@ -32,7 +32,7 @@ from .sensor import KNOWN_SENSORS, Resolution, check_resolution, smallest_known
 HASH_ALL_BYTES = 64 << 20  # larger files are large: half a second and more to read
 HASH_BLOCK_BYTES = 1 << 20
 EVENT_BYTES = 13  # 8 + 2 + 2 + 1
-LAST_COORDINATE = np.iinfo(np.uint16).max  # larger ones are broken, whatever they say
+LAST_COORDINATE = (1 << 16) - 1  # larger ones are broken, whatever they say
 MAX_STRAY_SHARE = 1e-3  # of events that lie outside every known sensor and do not count for its size
 USUAL_EVENT_BYTES = 4  # in RAW: exactly so in EVT2, 4 to 5 in EVT3 where few pixels of a row fire together
 
@@ -279,7 +279,9 @@ class Recording:
             events, strays = events + len(block), strays + len(block) - len(held)
             for extent_px, part in zip(extents_px, (block, held), strict=True):
                 if len(part):
-                    extent_px[:] = np.maximum(extent_px, np.minimum((part.x.max(), part.y.max()), LAST_COORDINATE) + 1)
+                    extent_px[:] = np.maximum(
+                        extent_px, [min(int(c.max()), LAST_COORDINATE) + 1 for c in (part.x, part.y)]
+                    )
         return tuple(extents_px[int(strays <= MAX_STRAY_SHARE * events)].tolist())
 
     def _index_key(self) -> str:

@@ -27,9 +27,9 @@ BATCH_EVENTS = 50_000
 
 
 def tasks(quick: bool) -> list[Task]:
-    """One event rate a task."""
-    seconds = QUICK_SECONDS if quick else SECONDS
-    return [Task(measure, {"rate_mev_s": rate, "seconds": seconds}, keep=False) for rate in RATES_MEV_S]
+    """One event rate a task; quick: the first one, for a shorter time."""
+    rates, seconds = (RATES_MEV_S[:1], QUICK_SECONDS) if quick else (RATES_MEV_S, SECONDS)
+    return [Task(measure, {"rate_mev_s": rate, "seconds": seconds}, keep=False) for rate in rates]
 
 
 def busy_round(sample: Session, rate_mev_s: float) -> EventBatch:

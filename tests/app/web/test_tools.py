@@ -271,7 +271,7 @@ def test_the_window_of_the_opened_recording_is_not_asked_of_the_folders_others(s
     for name in ("flight_back", "flight_fast_top"):  # 113 and 96 ms long
         (tmp_path / f"{name}.h5").symlink_to(samples / f"{name}.h5")
         (tmp_path / f"{name}.bias").write_text("10 % bias_diff_on\n", encoding="utf-8")
-    (tmp_path / "take.bag").write_bytes(b"#ROSBAG V2.0\n")
+    (tmp_path / "take.mp4").write_bytes(b"#ROSBAG V2.0\n")
     tuner = served(tmp_path / "flight_back.h5", choices=Choices(window_us=(97_000, 113_000)))
     try:
         page = tuner.open()

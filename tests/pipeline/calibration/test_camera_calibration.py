@@ -19,7 +19,7 @@ from spinscope.pipeline.camera import Camera, CameraParameters
 from spinscope.pipeline.errors import ParameterError, RecordingError
 from spinscope.pipeline.kernels.rotation import rotations
 from spinscope.pipeline.presets import preset
-from spinscope.pipeline.recordings import write_recording
+from spinscope.pipeline.recordings import ReadingOptions, write_recording
 from spinscope.pipeline.recordings.in_memory import RecordingInMemory
 from spinscope.pipeline.session import Choices, Session
 from spinscope.pipeline.simulated_recordings import simulate_to_file
@@ -60,7 +60,9 @@ def test_a_blinking_board_tells_the_camera(made: SimulatedBoard, tmp_path: Path)
     write_recording(tmp_path / "board.raw", made.events, width_px=SIZE[0], height_px=SIZE[1])
     (tmp_path / "none.raw").write_bytes(b"% evt 3.0\n% end\n")
     files = [tmp_path / "board.raw", tmp_path / "none.raw"]
-    said = calibrate_by_board(files, (9, 6), 20.0, "chessboard", 4.86, SIZE, tmp_path / "camera.toml")
+    said = calibrate_by_board(
+        files, (9, 6), 20.0, "chessboard", 4.86, ReadingOptions(sensor=SIZE), tmp_path / "camera.toml"
+    )
     assert said[0].startswith("left out:") and "none.raw" in said[0] and "reprojection error" in said[-2]
     assert (tmp_path / "camera.png").read_bytes().startswith(b"\x89PNG")
     camera = Camera.of(preset(tmp_path / "camera.toml").camera, *SIZE)
@@ -150,7 +152,7 @@ def test_focal_length_by_a_ball(tmp_path: Path) -> None:
     assert truth is not None
     circle = float(truth.x_px[0]), float(truth.y_px[0]), float(truth.radius_px[0])
     distance_m = float(np.linalg.norm(truth.position_m[0]))
-    calibrate_by_ball(tmp_path / "ball.h5", distance_m, 40.0, circle, 4.86, None, tmp_path / "camera.toml")
+    calibrate_by_ball(tmp_path / "ball.h5", distance_m, 40.0, circle, 4.86, ReadingOptions(), tmp_path / "camera.toml")
     assert tomllib.loads((tmp_path / "camera.toml").read_text())["camera"]["focal_length_mm"] == pytest.approx(12.0)
 
 

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from spinscope.pipeline.errors import RecordingError
-from spinscope.pipeline.recordings import open_recording
+from spinscope.pipeline.recordings import open_recording, write_recording
 from spinscope.pipeline.simulated_recordings import DESCRIPTION, description_in
-from tests.pipeline.recordings.sound_files import some_events, write_dat
+from tests.pipeline.recordings.sound_files import HEIGHT_PX, WIDTH_PX, some_events
 from tests.pipeline.recordings.test_recordings_columns import some_columns, write_columns
 from tests.pipeline.recordings.test_recordings_fuzz import MOST_GROWTH_BYTES, peak_bytes
 
@@ -67,7 +67,7 @@ def huge_sensor(path: Path) -> None:
 
 
 def huge_sensor_of_dat(path: Path) -> None:
-    write_dat(path, some_events(50))
+    write_recording(path, some_events(50), width_px=WIDTH_PX, height_px=HEIGHT_PX)
     path.write_bytes(path.read_bytes().replace(b"Width 320", b"Width 65535"))
 
 
