@@ -279,9 +279,8 @@ class Recording:
             events, strays = events + len(block), strays + len(block) - len(held)
             for extent_px, part in zip(extents_px, (block, held), strict=True):
                 if len(part):
-                    extent_px[:] = np.maximum(
-                        extent_px, [min(int(c.max()), LAST_COORDINATE) + 1 for c in (part.x, part.y)]
-                    )
+                    most = (min(int(column.max()), LAST_COORDINATE) + 1 for column in (part.x, part.y))
+                    extent_px[:] = np.maximum(extent_px, tuple(most))
         return tuple(extents_px[int(strays <= MAX_STRAY_SHARE * events)].tolist())
 
     def _index_key(self) -> str:

@@ -240,10 +240,10 @@ def test_the_page_fetches_nothing_from_elsewhere(tuner: Served) -> None:
     policy = index.headers["content-security-policy"]
     assert "default-src 'self'" in policy and "http" not in policy
     static = Path(__file__).parents[3] / "app/web/static"
-    for path in static.iterdir():
+    for path in (path for path in static.rglob("*") if path.is_file()):
         text = path.read_text(encoding="utf-8").replace("http://www.w3.org/", "")
         assert "http://" not in text and "https://" not in text, path
-        assert httpx.get(f"{tuner.address}static/{path.name}").status_code == 200
+        assert httpx.get(f"{tuner.address}static/{path.relative_to(static).as_posix()}").status_code == 200
 
 
 def test_the_viewer_is_served_with_its_class_and_its_program(tuner: Served) -> None:

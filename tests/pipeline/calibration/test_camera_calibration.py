@@ -60,9 +60,8 @@ def test_a_blinking_board_tells_the_camera(made: SimulatedBoard, tmp_path: Path)
     write_recording(tmp_path / "board.raw", made.events, width_px=SIZE[0], height_px=SIZE[1])
     (tmp_path / "none.raw").write_bytes(b"% evt 3.0\n% end\n")
     files = [tmp_path / "board.raw", tmp_path / "none.raw"]
-    said = calibrate_by_board(
-        files, (9, 6), 20.0, "chessboard", 4.86, ReadingOptions(sensor=SIZE), tmp_path / "camera.toml"
-    )
+    reading, out = ReadingOptions(sensor=SIZE), tmp_path / "camera.toml"
+    said = calibrate_by_board(files, (9, 6), 20.0, "chessboard", 4.86, reading, out)
     assert said[0].startswith("left out:") and "none.raw" in said[0] and "reprojection error" in said[-2]
     assert (tmp_path / "camera.png").read_bytes().startswith(b"\x89PNG")
     camera = Camera.of(preset(tmp_path / "camera.toml").camera, *SIZE)
