@@ -25,7 +25,6 @@ from rich.markup import escape
 from rich.table import Table as ScreenTable
 
 from spinscope.pipeline.evaluation import (
-    SUITES,
     LabFolder,
     Report,
     SceneChoices,
@@ -36,6 +35,7 @@ from spinscope.pipeline.evaluation import (
 )
 from spinscope.pipeline.evaluation.plots import draw
 from spinscope.pipeline.evaluation.protocol import protocol_findings
+from spinscope.pipeline.evaluation.suites import SUITES
 from spinscope.pipeline.evaluation.tasks import Progress, write_whole
 from spinscope.pipeline.session import Choices
 

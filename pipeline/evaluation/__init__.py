@@ -1,13 +1,14 @@
-"""The paper's experiments on simulated and real recordings, as suites; `spinscope evaluate` runs them."""
+"""The paper's experiments on simulated and real recordings, as suites; `spinscope evaluate` runs them.
 
-from . import suites  # registers them
+`pipeline.evaluation.suites` loads and registers them: batches of recordings need the tasks alone.
+"""
+
 from .lab_recordings import LabFolder, LabRecording
-from .suite import SUITES, Report, Suite, evaluate, evaluate_real
+from .suite import Report, Suite, evaluate, evaluate_real
 from .tables import ResultTable, Row, Summary
 from .tasks import SceneChoices, Task, TaskContext, executor
 
 __all__ = [
-    "SUITES",
     "LabFolder",
     "LabRecording",
     "Report",
@@ -21,5 +22,4 @@ __all__ = [
     "evaluate",
     "evaluate_real",
     "executor",
-    "suites",
 ]

@@ -22,8 +22,9 @@ from spinscope.app.evaluate import (
     write_page,
 )
 from spinscope.pipeline.errors import ParameterError, RecordingError
-from spinscope.pipeline.evaluation import SUITES, ResultTable, Row, Suite, Summary, Task, TaskContext
+from spinscope.pipeline.evaluation import ResultTable, Row, Suite, Summary, Task, TaskContext
 from spinscope.pipeline.evaluation.plots import curve, panels
+from spinscope.pipeline.evaluation.suites import SUITES
 
 
 def measure(context: TaskContext, number: int) -> list[Row]:

@@ -98,7 +98,7 @@ def test_it_has_its_curve_its_arrow_its_mark_on_the_score_and_its_row(samples: P
         assert curve.static["names"] == [label]
         assert curve.static["colors"] == [0x0A141EFF]
     assert logged[f"{entities.SPIN_MAGNITUDE}/toy"].at("values", end_us) == [25.0]
-    assert logged[f"{entities.SPIN_ARROWS}/toy"].static["colors"] == [0x0A141EFF]
+    assert logged[f"{entities.SPIN_ARROWS}/toy"].at("colors", end_us) == [0x0A141EFF]
     (places,) = logged[f"{entities.SCORE_MAGNITUDE}/toy"].at("abscissa", end_us)
     assert places["buffer"] == [25.0]
     (text,) = logged[entities.SUMMARY].at("text", end_us)

@@ -12,8 +12,9 @@ import pytest
 from click.testing import CliRunner
 
 from spinscope.app.cli import cli
-from spinscope.pipeline.evaluation import SUITES, ResultTable, Row, Suite, Task, TaskContext
+from spinscope.pipeline.evaluation import ResultTable, Row, Suite, Task, TaskContext
 from spinscope.pipeline.evaluation.plots import curve, panels
+from spinscope.pipeline.evaluation.suites import SUITES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

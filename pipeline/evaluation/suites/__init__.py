@@ -3,7 +3,8 @@
 from importlib import import_module
 from pkgutil import iter_modules
 
-from ..suite import SUITES, Suite
+from ..suite import SUITES as SUITES
+from ..suite import Suite
 
 for _found in iter_modules(__path__):
     _module = import_module(f"{__name__}.{_found.name}")

@@ -12,6 +12,7 @@ from spinscope.app.cli import cli
 from spinscope.pipeline.calibration.ball_labels import BallLabels, ball_labels
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.evaluation import TaskContext, evaluate_real
+from spinscope.pipeline.evaluation.suites import SUITES
 from spinscope.pipeline.evaluation.tables import where
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.recordings import write_recording
@@ -58,6 +59,7 @@ def test_labels_at_the_papers_speeds(speed_m_s: float, seed: int) -> None:
 
 def test_detector_is_judged_by_labels(made: SimulatedRecording, tmp_path: Path) -> None:
     write_recording(tmp_path / "a.raw", made.events, width_px=1280, height_px=720)
+    assert "detector" in SUITES.names
     (missing,) = evaluate_real("detector", tmp_path, TaskContext()).tables
     assert "make them with `spinscope label`" in str(missing.rows[-1][2])
     done = CliRunner().invoke(cli, ["label", str(tmp_path / "a.raw")])

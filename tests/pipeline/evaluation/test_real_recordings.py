@@ -12,10 +12,10 @@ from spinscope.app.evaluate import check_folder, evaluate_suite, write_page
 from spinscope.pipeline.api import estimate
 from spinscope.pipeline.biases import PAPER, write_biases
 from spinscope.pipeline.errors import ParameterError, RecordingError
-from spinscope.pipeline.evaluation import SUITES, LabFolder, SceneChoices, TaskContext, evaluate, evaluate_real
+from spinscope.pipeline.evaluation import LabFolder, SceneChoices, TaskContext, evaluate, evaluate_real
 from spinscope.pipeline.evaluation.protocol import protocol_findings
 from spinscope.pipeline.evaluation.rendering import render
-from spinscope.pipeline.evaluation.suites import filters, runtime, spinner, thrower
+from spinscope.pipeline.evaluation.suites import SUITES, filters, runtime, spinner, thrower
 from spinscope.pipeline.evaluation.tables import Row, where
 from spinscope.pipeline.recordings import write_recording
 from spinscope.pipeline.registry import Parameters

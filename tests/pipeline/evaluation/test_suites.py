@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from spinscope.pipeline.errors import ParameterError
-from spinscope.pipeline.evaluation import SUITES, Report, TaskContext, evaluate
+from spinscope.pipeline.evaluation import Report, TaskContext, evaluate
 from spinscope.pipeline.evaluation.plots import draw
+from spinscope.pipeline.evaluation.suites import SUITES
 from spinscope.pipeline.evaluation.suites.biases import picture_of
 from spinscope.pipeline.evaluation.tables import Row, where
 
