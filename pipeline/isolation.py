@@ -130,7 +130,10 @@ class _Process:
     def send(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
         """Call a function; raises nothing where the process has ended, which `receive` then tells."""
         self.is_idle = False
-        self._write(pickle.dumps((function, arguments)))
+        folder = None  # of relative paths
+        with suppress(OSError):  # it has been removed: only absolute paths are of use
+            folder = os.getcwd()
+        self._write(pickle.dumps((function, arguments, folder)))
 
     def ask(self, wish: bytes) -> None:
         """Ask for the next value, or for none."""
@@ -224,7 +227,10 @@ def serve() -> None:
     _limit_memory()
     try:
         while True:
-            function, arguments = pickle.load(requests)
+            function, arguments, folder = pickle.load(requests)
+            if folder is not None:
+                with suppress(OSError):
+                    os.chdir(folder)
             _answer(function(*arguments), requests, answers)
     except (EOFError, BrokenPipeError):  # the caller has gone
         os._exit(BROKEN_PIPE_EXIT)

@@ -7,6 +7,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -108,6 +109,13 @@ def test_errors_arrive_and_bugs_with_their_traceback() -> None:
         call(refuse)
     with pytest.raises(RuntimeError, match=r"in fail\n.*\nLookupError: a bug of ours"):
         call(fail)
+
+
+def test_relative_paths_are_of_the_callers_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("a", "b"):  # the process is kept from one call to the next
+        (tmp_path / name).mkdir()
+        monkeypatch.chdir(tmp_path / name)
+        assert call(os.getcwd) == os.getcwd()
 
 
 def test_what_takes_long_in_sound_files_too_is_waited_for() -> None:
