@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import glob
 import json
 import traceback
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -19,12 +18,10 @@ from spinscope.pipeline.errors import ParameterError, RecordingError, SpinscopeE
 from spinscope.pipeline.evaluation.tables import Row
 from spinscope.pipeline.evaluation.tasks import Task, TaskContext, digest, executor, performed, text_digest
 from spinscope.pipeline.files import check_writable
-from spinscope.pipeline.recordings import is_recording, readable_suffixes
 from spinscope.pipeline.recordings.recording import file_identity
 from spinscope.pipeline.result_rows import ResultRow, shot_columns, shot_rows, tick_columns, tick_rows
 from spinscope.pipeline.session import Choices, Progress
 from spinscope.pipeline.sidecar import Sidecar
-from spinscope.pipeline.truth_table import TRUTH_TABLE
 
 from .analysis import analyzed
 from .result_journal import JournalEntry, ResultJournal, journal_path, journals_of
@@ -85,30 +82,6 @@ class BatchSummary:
     recordings: int
     known: int
     failed: tuple[str, ...]
-
-
-def recordings_in(names: Sequence[Path], others: Collection[Path] = ()) -> list[Path]:
-    """Recordings named by files, folders (with those below) and patterns like `day1/*.raw`; each once.
-
-    A folder's recordings are told by their suffixes, texts by their content; `others` are no recordings. Raises
-    RecordingError for a folder or a pattern without one.
-    """
-    found: dict[Path, None] = {}
-    not_these = {path.absolute() for path in others}
-    for name in names:
-        if name.is_dir():
-            below = (path for path in sorted(name.rglob("*")) if path.name != TRUTH_TABLE and is_recording(path))
-            these = [path for path in below if path.absolute() not in not_these]
-            if not these:
-                raise RecordingError(f"the folder holds no recordings ({', '.join(readable_suffixes())}): {name}")
-        elif not name.exists() and glob.has_magic(str(name)):
-            these = sorted(path for path in map(Path, glob.glob(str(name), recursive=True)) if path.is_file())
-            if not these:
-                raise RecordingError(f"no file fits the pattern: {name}")
-        else:
-            these = [name]
-        found |= dict.fromkeys(these)
-    return list(found)
 
 
 def analyze_to_table(recordings: Sequence[Path], work: BatchWork, on_progress: Progress | None = None) -> BatchSummary:

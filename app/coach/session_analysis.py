@@ -13,11 +13,12 @@ from typing import Any
 from joblib import cpu_count
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-from spinscope.app.batch import program_version, recordings_in
+from spinscope.app.batch import program_version
 from spinscope.app.terminal import note
 from spinscope.pipeline.errors import RecordingError, SpinscopeError
 from spinscope.pipeline.evaluation.tables import Row
 from spinscope.pipeline.evaluation.tasks import Task, TaskContext, digest, executor, performed
+from spinscope.pipeline.recording_folders import recordings_in
 from spinscope.pipeline.recordings.recording import file_identity
 from spinscope.pipeline.session import Choices
 from spinscope.pipeline.sidecar import Sidecar

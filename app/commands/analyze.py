@@ -15,13 +15,14 @@ import click
 from spinscope.pipeline.errors import ParameterError, SpinscopeError
 from spinscope.pipeline.files import check_writable
 from spinscope.pipeline.flight_calibration import flight_calibration
+from spinscope.pipeline.recording_folders import recordings_in
 from spinscope.pipeline.registry import methods
 from spinscope.pipeline.result_rows import ResultRow, shot_rows
 from spinscope.pipeline.session import Choices, Result, Session
 from spinscope.pipeline.shots import BEGAN_WORDS, ENDED_WORDS
 
 from ..analysis import report_on
-from ..batch import BatchWork, absolute_choices, analyze_to_table, recordings_in
+from ..batch import BatchWork, absolute_choices, analyze_to_table
 from ..terminal import ProgressBar, note
 from .options import RECORDING, ListingCommand, RegisteredName, session_options, write_text
 

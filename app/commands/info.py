@@ -13,6 +13,7 @@ import click
 from rich.table import Table
 
 from spinscope.pipeline.errors import RecordingError
+from spinscope.pipeline.recording_folders import recordings_in
 from spinscope.pipeline.recordings import ReadingOptions, RecordingInfo, open_recording, summary
 from spinscope.pipeline.session import Progress
 
@@ -47,8 +48,6 @@ def info(recordings: tuple[Path, ...], reading: ReadingOptions, output: str | No
         with ProgressBar() as bar:
             found.append(information(recordings[0], reading, bar))
     else:
-        from ..batch import recordings_in  # loads all that analyzing needs
-
         found += informations(recordings_in(recordings), reading)
     if output:
         write_text(output, "".join(json.dumps(one.as_dict(), allow_nan=False) + "\n" for one in found))

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ..biases import BiasParameters
 from ..errors import RecordingError, SpinscopeError
-from ..recordings import readable_suffixes
+from ..recording_folders import recordings_in
 from ..session import Choices, Session
 from ..sidecar import Sidecar, StatedTruth, biases_beside
 from .tables import Cell, ResultTable, Row, distinct
@@ -118,11 +118,8 @@ class LabFolder:
         """The recordings of a folder and those below, of one ball (1 to 7) where asked for; raises RecordingError."""
         if not path.is_dir():
             raise RecordingError(f"there is no folder of recordings: give one that is there: {path}")
-        files = [one for one in sorted(path.rglob("*")) if one.suffix.lower() in readable_suffixes() and one.is_file()]
-        if not files:
-            raise RecordingError(f"the folder holds no recordings ({', '.join(readable_suffixes())}): {path}")
         found, wrong = [], {}
-        for file in files:
+        for file in recordings_in([path]):
             try:
                 recording = LabRecording.of(file, choices)
             except SpinscopeError as error:

@@ -20,11 +20,12 @@ import pytest
 from click.testing import CliRunner
 
 from spinscope.app import batch
-from spinscope.app.batch import BatchSummary, BatchWork, analyze_to_table, recordings_in
+from spinscope.app.batch import BatchSummary, BatchWork, analyze_to_table
 from spinscope.app.cli import cli
 from spinscope.app.result_journal import ResultJournal
 from spinscope.pipeline.errors import ParameterError, RecordingError
 from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.recording_folders import recordings_in
 from spinscope.pipeline.recordings.writing import write_recording
 from spinscope.pipeline.result_rows import shot_columns
 from spinscope.pipeline.session import Choices

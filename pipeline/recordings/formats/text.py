@@ -262,7 +262,12 @@ def is_text(path: Path, head: bytes) -> bool:
             first = list(islice(lines, HEAD_LINES))
     except (*FILE_ERRORS, RecordingError):
         return False
-    return any(_are_numbers(_words(line)) or named_columns(_words(line.lstrip(f"{COMMENT} "))) for line in first)
+    for line in first:
+        if _are_numbers(_words(line)) or named_columns(_words(line.lstrip(f"{COMMENT} "))):
+            return True
+        if _separator(line) is not None and len(_words(line)) >= COLUMNS and not line.startswith(tuple(COMMENT)):
+            return False  # names of other columns: of labels, or of a table of results
+    return False
 
 
 def write_csv(path: Path, content: RecordingContent) -> None:

@@ -109,6 +109,13 @@ def test_texts_with_many_such_lines_are_refused(tmp_path: Path) -> None:
         open_recording(tmp_path / "a.csv", sensor=(1280, 720)).read()
 
 
+def test_tables_of_other_columns_are_no_recordings(tmp_path: Path) -> None:
+    """Labels of the ball and tables of results lie beside recordings."""
+    for names in ("t_us,ball,x_px,y_px,radius_px,std_px", "recording,shot,start_us,end_us"):
+        (tmp_path / "a.csv").write_text(f"{names}\n" + "1000,1,20.5,30.2,10.1,0.2\n" * 9, encoding="utf-8")
+        assert not is_recording(tmp_path / "a.csv")
+
+
 def test_columns_that_cannot_be_told_apart_are_refused(tmp_path: Path) -> None:
     for text in ("1,2,3,4\n5,6,7,8\n", "1,2,3,1,9\n4,5,6,0,9\n"):
         (tmp_path / "a.csv").write_text(text, encoding="utf-8")
