@@ -212,6 +212,19 @@ class TestPage:
         tab.page.wait_for_selector(".start:has-text('0 of 10 balls')")
         assert session.setting("now") == {"player": "A", "drill": "maximum topspin"}
 
+    def test_a_shot_that_comes_in_leaves_what_is_being_filled_in(self, tab: Tab, session: ShotSession) -> None:
+        tab.go("tests")
+        tab.page.get_by_role("button", name="serves").click()
+        tab.page.fill(".start [name=player]", "B")
+        tab.page.get_by_role("button", name="serves").focus()
+        (new,) = session.add("new.raw", KNOWN, analysis(shot(1, recorded_s=1.8e9, spin_rps=91.4, topspin_rps=91.4)))
+        tab.until(f"window.coach.shots.get({new}) !== null")
+        tab.page.keyboard.press("Shift+Tab")
+        assert tab.page.input_value(".start [name=player]") == "B"
+        tab.page.locator(".start [name=player]").press("Enter")
+        tab.page.wait_for_selector(".start:has-text('0 of 10 balls')")
+        assert session.setting("now") == {"player": "B", "drill": "serves"}
+
     def test_a_new_shot_appears_by_itself(self, tab: Tab, session: ShotSession) -> None:
         tab.go("live")
         tab.page.evaluate("void (window.speechSynthesis.speak = (said) => window.said = said.text)")

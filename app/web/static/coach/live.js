@@ -4,7 +4,7 @@
 /** @import { Shots } from "./shots.js" */
 
 import { attempt, element } from "../elements.js";
-import { nameInputs, namesIn } from "./shot_list.js";
+import { nameInputs, takeNames } from "./shot_list.js";
 import { headline } from "./shot_view.js";
 import { chosen, kindWords, speedWords, spinWords, text, timeWords } from "./texts.js";
 
@@ -35,7 +35,7 @@ export class Live {
     );
     form.addEventListener("submit", (/** @type {Event} */ event) => {
       event.preventDefault();
-      attempt(() => this.shots.playNow(/** @type {any} */ (namesIn(inputs))));
+      attempt(() => this.shots.playNow(/** @type {any} */ (takeNames(inputs))));
     });
     this.root.replaceChildren(this.newest, element("label.check", {}, speak, text("speak")), form);
     const last = this.shots.list.sort((a, b) => a.id - b.id).pop();

@@ -12,6 +12,14 @@ import { choose, chosen, loadTexts, text } from "./texts.js";
 const PLACES = ["shots", "compare", "tests", "live"];
 const LANGUAGES = { en: "English", de: "Deutsch" };
 
+/** Whether somebody is in a text field, or has filled in names that are not yet sent. */
+function isTyping() {
+  const focused = document.activeElement;
+  return Boolean(focused?.matches("input") && focused.closest("form, .names, .filter")) ||
+    [.../** @type {NodeListOf<HTMLInputElement>} */ (document.querySelectorAll("form.names input"))]
+      .some((input) => input.value !== input.defaultValue);
+}
+
 class Page {
   shots = new Shots();
   filter = new ShotFilter();
@@ -58,7 +66,7 @@ class Page {
   /** Ids in the order of the list. */
   order = () => (this.filter.of(this.shots.list).map((shot) => shot.id));
 
-  async show() {
+  async show(isRefreshed = false) {
     const shown = ++this.#shown;
     const [name, ...rest] = this.place.split("/");
     this.view.close();
@@ -66,7 +74,7 @@ class Page {
     this.#pair = null;
     this.#header(name);
     const root = await attempt(() => this.#content(name, rest.map(Number)));
-    if (shown !== this.#shown || !root) return;
+    if (shown !== this.#shown || !root || (isRefreshed && isTyping())) return;
     byId("main").replaceChildren(root);
     document.body.dataset.place = this.place;
     scrollTo(0, 0);
@@ -90,20 +98,18 @@ class Page {
   async #refresh() {
     const [name] = this.place.split("/");
     this.#header(name);
-    const isTyping = document.activeElement?.closest("form, .names, .filter") &&
-      document.activeElement.matches("input");
-    if (name === "live" || isTyping) return;
+    if (name === "live" || isTyping()) return;
     if (name !== "shot") {
       const focused = document.activeElement?.getAttribute("aria-label");
       const scroll = scrollY;
-      await this.show();
+      await this.show(true);
       scrollTo(0, scroll);
       if (focused) {
         /** @type {HTMLElement | null} */ (document.querySelector(`[aria-label="${CSS.escape(focused)}"]`))?.focus();
       }
     } else if (this.view.id !== null) {
       const { t_us, isPlaying } = this.view.player?.motion ?? { t_us: 0, isPlaying: true };
-      await this.show();
+      await this.show(true);
       this.view.player?.motion.seek(t_us);
       if (!isPlaying) this.view.player?.pause();
     }

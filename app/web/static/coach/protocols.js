@@ -5,7 +5,7 @@
 
 import { attempt, element } from "../elements.js";
 import { seriesOf } from "./comparison.js";
-import { nameInputs, namesIn, nameWords, valuesOf } from "./shot_list.js";
+import { nameInputs, nameWords, takeNames, valuesOf } from "./shot_list.js";
 import { dayOf, kindWords, speedWords, spinWords, term, text } from "./texts.js";
 
 const TARGET = 10; // balls of a test, as coaches ask for
@@ -51,7 +51,7 @@ export class Protocols {
     );
     form.addEventListener("submit", (/** @type {Event} */ event) => {
       event.preventDefault();
-      attempt(() => this.shots.playNow(/** @type {any} */ (namesIn(inputs))));
+      attempt(() => this.shots.playNow(/** @type {any} */ (takeNames(inputs))));
     });
     const stop = element("button", {
       type: "button",

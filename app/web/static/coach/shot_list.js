@@ -65,11 +65,15 @@ export const nameCode = (words) => OUR_NAMES.find((key) => text(key) === words.t
 export const valuesOf = (shots, name) =>
   [...new Set(shots.map((shot) => /** @type {any} */ (shot)[name]).filter((value) => value !== null))].sort();
 
-/** What stands in the inputs of `nameInputs`. @param {any[]} inputs @returns {Record<string, string | null>} */
-export const namesIn = (inputs) =>
-  Object.fromEntries(
-    inputs.map((label) => label.querySelector("input")).map((input) => [input.name, nameCode(input.value)]),
-  );
+/** Takes what stands in the inputs of `nameInputs`, to be sent. @param {any[]} labels @returns {Record<string, string | null>} */
+export function takeNames(labels) {
+  const inputs = labels.map((label) => label.querySelector("input"));
+  for (const input of inputs) {
+    input.defaultValue = input.value;
+    input.blur();
+  }
+  return Object.fromEntries(inputs.map((input) => [input.name, nameCode(input.value)]));
+}
 
 /** Inputs of the four names, with those in use as suggestions. @param {Shots} shots @param {Record<string, string | null>} values */
 export function nameInputs(shots, values) {
@@ -79,7 +83,7 @@ export function nameInputs(shots, values) {
     const id = `names-${name}-${Math.random().toString(36).slice(2)}`;
     const input = element("input", {
       name,
-      value: nameWords(values[name] ?? null),
+      defaultValue: nameWords(values[name] ?? null),
       maxLength: 80,
       autocomplete: "off",
     });
@@ -368,7 +372,7 @@ export class ShotList {
     );
     form.addEventListener("submit", (/** @type {Event} */ event) => {
       event.preventDefault();
-      const given = Object.fromEntries(Object.entries(namesIn(inputs)).filter(([, value]) => value !== null));
+      const given = Object.fromEntries(Object.entries(takeNames(inputs)).filter(([, value]) => value !== null));
       attempt(() => this.shots.change(ids, given));
     });
     const remove = () =>

@@ -19,6 +19,8 @@ export class Shots extends EventTarget {
   /** @type {{ids: number[], values: Record<string, any>}[][]} */
   #undo = [];
   #revision = -1;
+  /** @type {Promise<void>} the newest question to the server */
+  #updated = Promise.resolve();
   /** @type {EventSource | null} */
   #stream = null;
   /** @type {Map<number, {revision: number, detail: Promise<ShotDetail>}>} */
@@ -80,15 +82,24 @@ export class Shots extends EventTarget {
     return [...this.#all.values()].find(meets) ?? null;
   }
 
-  async update() {
+  /** Asks for what has changed; one question after the other, so that no older answer replaces a newer one. */
+  update() {
+    return this.#updated = this.#updated.catch(() => {}).then(() => this.#ask());
+  }
+
+  async #ask() {
     const isFirst = this.#revision < 0;
+    const { session } = this;
     /** @type {CoachGets["shots"]["answered"]} */
     const answer = await answered(await fetch(this.path(`shots?since=${this.#revision}`)));
+    if (session !== this.session) return;
+    const before = JSON.stringify([this.analysis, this.now]);
     this.#revision = answer.revision;
     this.analysis = answer.analysis;
     this.now = answer.now;
     const fresh = answer.shots.filter((shot) => !this.#all.has(shot.id));
     for (const shot of answer.shots) this.#all.set(shot.id, shot);
+    if (!answer.shots.length && before === JSON.stringify([this.analysis, this.now])) return;
     this.dispatchEvent(new Event("change"));
     if (!isFirst) { for (const shot of fresh) this.dispatchEvent(new CustomEvent("new", { detail: shot })); }
   }
