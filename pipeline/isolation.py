@@ -1,14 +1,15 @@
 """Calls in a process of their own, for foreign libraries that a damaged or hostile file can hang, crash or blow up.
 
-The process has limits on memory and on time without progress; when one is reached it ends, and the call raises
-`IsolationError` while everything else goes on. It is started once and kept for the next call. It is no child of
-`multiprocessing`, which would run an unguarded script of the user a second time.
+The process has limits on memory and on computing and waiting without progress; when one is reached it ends, and the
+call raises `IsolationError` while everything else goes on. It is started once and kept for the next call. It is no
+child of `multiprocessing`, which would run an unguarded script of the user a second time.
 """
 
 from __future__ import annotations
 
 import atexit
 import faulthandler
+import math
 import os
 import pickle
 import signal
@@ -22,11 +23,19 @@ from typing import Any, BinaryIO, TypeVar
 
 from .errors import SpinscopeError
 
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None  # type: ignore[assignment]
+
 Value = TypeVar("Value")
 
-# Sound files give their next part within some hundredths of a second, and their disk has answered before: the caller
-# has looked at their first bytes. An error within 5 s is what a user is promised, start of the process included.
-MAX_SILENCE_S = 3.0
+# Sound files give their next part within some hundredths of a second of computing. What a library that loops needs is
+# counted in CPU time: a busy machine or a slow disk refuses no sound file. An error within 5 s is what a user is
+# promised, start of the process included.
+MAX_CPU_S = 3
+# Where a library waits without computing, for a network that is gone; and on Windows, which cannot limit CPU time.
+MAX_SILENCE_S = 20.0 if hasattr(signal, "SIGXCPU") else 3.0
 # What a process may take besides the libraries it loads (a part of a million events takes 13 MB, and some copies).
 MAX_MEMORY_BYTES = 512 << 20
 MAX_IDLE = 2  # processes kept for the next call: one for a reading thread and one beside it
@@ -54,7 +63,8 @@ def call(function: Callable[..., Value], *arguments: Any) -> Value:
     Raises
     ------
     IsolationError
-        The call crashed, made no progress for `MAX_SILENCE_S` or needed over `MAX_MEMORY_BYTES`.
+        The call crashed, made no progress in `MAX_CPU_S` of computing or within `MAX_SILENCE_S`, or needed over
+        `MAX_MEMORY_BYTES`.
     SpinscopeError
         As raised by the function. Other exceptions arrive as RuntimeError with their traceback.
     """
@@ -96,7 +106,8 @@ def without_time_limit() -> Iterator[None]:
 
     In a process without limits it does nothing.
     """
-    faulthandler.cancel_dump_traceback_later()
+    if _limited:
+        _lift_time_limit()
     yield
     if _limited:
         _limit_time()
@@ -175,6 +186,8 @@ class _Process:
         status = self._process.wait()
         if status == SILENT_EXIT:
             return f"reading it makes no progress for {MAX_SILENCE_S:g} s"
+        if hasattr(signal, "SIGXCPU") and status == -signal.SIGXCPU:
+            return f"reading it makes no progress in {MAX_CPU_S} s of computing"
         return f"reading it crashes the library (exit status {status})"
 
 
@@ -283,17 +296,32 @@ def _time_limit() -> Iterator[None]:
     try:
         yield
     finally:
-        faulthandler.cancel_dump_traceback_later()
+        _lift_time_limit()
 
 
 def _limit_time() -> None:
+    """Limit the CPU time and the time from now on; the signals of both end the process without asking Python."""
     faulthandler.dump_traceback_later(MAX_SILENCE_S, exit=True)
+    if resource is not None:
+        used = resource.getrusage(resource.RUSAGE_SELF)
+        _set_soft_limit(resource.RLIMIT_CPU, math.ceil(used.ru_utime + used.ru_stime) + MAX_CPU_S - 1)
+
+
+def _lift_time_limit() -> None:
+    faulthandler.cancel_dump_traceback_later()
+    if resource is not None:
+        _set_soft_limit(resource.RLIMIT_CPU, resource.RLIM_INFINITY)
+
+
+def _set_soft_limit(kind: int, value: int) -> None:
+    """Set a limit of this process as far as the hard limit that it was started with allows."""
+    hard = resource.getrlimit(kind)[1]
+    allowed = value if hard == resource.RLIM_INFINITY else hard if value == resource.RLIM_INFINITY else min(value, hard)
+    resource.setrlimit(kind, (allowed, hard))
 
 
 def _limit_memory() -> None:
-    """Limit the memory of this process, on systems that can."""
-    try:
-        import resource
-    except ImportError:  # Windows: sizes are checked before memory is taken, and that is all
-        return
-    resource.setrlimit(resource.RLIMIT_DATA, (MAX_MEMORY_BYTES, MAX_MEMORY_BYTES))
+    """Limit the memory of this process and the picture of it that a crash leaves, on systems that can."""
+    if resource is not None:  # on Windows sizes are checked before memory is taken, and that is all
+        resource.setrlimit(resource.RLIMIT_DATA, (MAX_MEMORY_BYTES, MAX_MEMORY_BYTES))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

@@ -16,6 +16,8 @@ from spinscope.pipeline import isolation
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.isolation import IsolationError, call, iterate, without_time_limit
 
+SHORT_S = 2.0  # of waiting, where a test would have to wait for the usual limit
+
 
 def blocks(count: int, size: int) -> Iterator[dict[str, np.ndarray]]:
     for k in range(count):
@@ -48,10 +50,37 @@ def fail() -> None:
     raise LookupError("a bug of ours")
 
 
+def limit() -> None:
+    """Allow the process less than usual from the next call on."""
+    isolation.MAX_SILENCE_S = SHORT_S
+
+
+@pytest.fixture
+def strict() -> Iterator[None]:
+    """The process of the next calls has shorter limits."""
+    isolation._end_idle()
+    call(limit)
+    yield
+    isolation._end_idle()
+
+
+def wait_for(duration_s: float) -> int:
+    time.sleep(duration_s)
+    return 7
+
+
 def print_and_work_long() -> int:
     print("to the answers, if it could")  # noqa: T201
     with without_time_limit():
-        time.sleep(isolation.MAX_SILENCE_S + 0.5)
+        time.sleep(SHORT_S + 0.5)
+        compute_for(isolation.MAX_CPU_S + 0.1)
+    return 7
+
+
+def compute_for(duration_s: float) -> int:
+    end = time.process_time() + duration_s
+    while time.process_time() < end:
+        pass
     return 7
 
 
@@ -80,14 +109,30 @@ def test_each_of_several_calls_at_a_time_has_a_process() -> None:
 
 @pytest.mark.parametrize(
     ("function", "arguments", "message"),
-    [(hang, (), "makes no progress"), (crash, (), "crashes the library"), (take, (2 << 30,), "over 512 MB of memory")],
+    [
+        (hang, (), "no progress in 3 s of computing"),
+        (crash, (), "crashes the library"),
+        (take, (2 << 30,), "over 512 MB of memory"),
+    ],
 )
 def test_hanging_crashing_and_greedy_calls_end(function: object, arguments: tuple[int, ...], message: str) -> None:
-    start = time.monotonic()
     with pytest.raises(IsolationError, match=message):
         call(function, *arguments)  # type: ignore[arg-type]
-    assert time.monotonic() - start < isolation.MAX_SILENCE_S + 2
     assert call(take, 10) == 10
+
+
+def test_the_limit_of_computing_counts_from_each_call_anew() -> None:
+    first = call(process_id)
+    for _ in range(3):
+        assert call(compute_for, isolation.MAX_CPU_S / 2 - 0.2) == 7
+    assert call(process_id) == first
+
+
+@pytest.mark.usefixtures("strict")
+def test_a_call_that_waits_forever_ends() -> None:
+    with pytest.raises(IsolationError, match="no progress for"):
+        call(wait_for, 1e6)
+    assert call(wait_for, SHORT_S + 0.3) == 7, "another process, with the usual limit"
 
 
 def test_values_before_a_hang_are_kept() -> None:
@@ -97,11 +142,12 @@ def test_values_before_a_hang_are_kept() -> None:
         list(parts)
 
 
+@pytest.mark.usefixtures("strict")
 def test_a_slow_caller_is_waited_for() -> None:
     parts = iterate(blocks, 2, 10)
-    next(parts)
-    time.sleep(isolation.MAX_SILENCE_S + 0.3)
-    assert len(list(parts)) == 1
+    process = next(parts)["process"]
+    time.sleep(SHORT_S + 0.5)
+    assert [part["process"] for part in parts] == [process]
 
 
 def test_errors_arrive_and_bugs_with_their_traceback() -> None:
@@ -118,6 +164,7 @@ def test_relative_paths_are_of_the_callers_folder(tmp_path: Path, monkeypatch: p
         assert call(os.getcwd) == os.getcwd()
 
 
+@pytest.mark.usefixtures("strict")
 def test_what_takes_long_in_sound_files_too_is_waited_for() -> None:
     assert call(print_and_work_long) == 7
 
