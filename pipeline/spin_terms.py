@@ -90,15 +90,6 @@ def km_h(speed_m_s: float) -> float:
     return 3.6 * speed_m_s
 
 
-def spin_words(estimate: SpinEstimate) -> str:
-    """`52.3 ± 0.4 rps (3138 rpm)`, or `refused: why`."""
-    magnitude, std = estimate.magnitude_rps, estimate.magnitude_std_rps
-    if magnitude is None:
-        return f"refused: {estimate.reason}"
-    margin = "" if std is None else f" ± {std_words(std)}"
-    return f"{magnitude:.1f}{margin} rps ({rpm(magnitude):.0f} rpm)"
-
-
 def vector_words(spin_rps: Vector | None) -> str:
     """Components of a spin (3,) in whole rps, "nothing" without one."""
     return "nothing" if spin_rps is None else f"({', '.join(f'{value:.0f}' for value in spin_rps)}) rps"

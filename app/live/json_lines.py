@@ -90,11 +90,6 @@ class JsonServer:
             for client in self._clients:
                 client.close()
 
-    @property
-    def has_clients(self) -> bool:
-        """Whether anybody listens."""
-        return bool(self._clients)
-
     def send(self, line: Mapping[str, Any]) -> None:
         """Send an object to all clients; those that went away or do not read are let go of."""
         if not self._clients:

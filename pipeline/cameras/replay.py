@@ -15,7 +15,6 @@ from .clock import now_s
 from .event_camera import CameraPacket, EventCamera
 
 PACKET_US = 1000  # of real time, as of USB packets at millions of events a second
-LONGEST_WAIT_S = 0.05
 FAULT_US = 1_000_000  # a fault comes so long after the start, and again after each such time
 STALL_S = 0.5
 BURST_RATE_HZ, BURST_US = 50e6, 20_000  # about what USB 3 carries: a lamp switched on
