@@ -207,7 +207,7 @@ class Page {
       (event.ctrlKey || event.metaKey) && event.key === "z" && !target.matches("input[type=text], input:not([type])")
     ) {
       event.preventDefault();
-      attempt(() => this.shots.canUndo && this.shots.undo());
+      attempt(() => this.shots.undo());
       return;
     }
     if (event.ctrlKey || event.metaKey || event.altKey || target.matches("input, select, textarea")) return;

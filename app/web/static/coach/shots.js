@@ -21,6 +21,8 @@ export class Shots extends EventTarget {
   #revision = -1;
   /** @type {Promise<void>} the newest question to the server */
   #updated = Promise.resolve();
+  /** @type {Promise<void>} the newest change of names, marks or deletion */
+  #changed = Promise.resolve();
   /** @type {EventSource | null} */
   #stream = null;
   /** @type {Map<number, {revision: number, detail: Promise<ShotDetail>}>} */
@@ -131,19 +133,29 @@ export class Shots extends EventTarget {
    * @param {number[]} ids
    * @param {Record<string, string | boolean | null>} values
    */
-  async change(ids, values) {
-    const before = ids.map((id) => {
-      const shot = /** @type {any} */ (this.#all.get(id));
-      return { ids: [id], values: Object.fromEntries(Object.keys(values).map((name) => [name, shot[name]])) };
+  change(ids, values) {
+    return this.#next(async () => {
+      const before = ids.map((id) => {
+        const shot = /** @type {any} */ (this.#all.get(id));
+        return { ids: [id], values: Object.fromEntries(Object.keys(values).map((name) => [name, shot[name]])) };
+      });
+      await this.post("names", { ids, values });
+      this.#undo.push(before);
+      await this.update();
     });
-    await this.post("names", { ids, values });
-    this.#undo.push(before);
-    await this.update();
   }
 
-  async undo() {
-    for (const { ids, values } of this.#undo.pop() ?? []) await this.post("names", { ids, values });
-    await this.update();
+  undo() {
+    return this.#next(async () => {
+      for (const { ids, values } of this.#undo.pop() ?? []) await this.post("names", { ids, values });
+      await this.update();
+    });
+  }
+
+  /** One change after the other: each begins with what the one before left. @param {() => Promise<void>} work */
+  #next(work) {
+    const { session } = this;
+    return this.#changed = this.#changed.catch(() => {}).then(() => session === this.session ? work() : undefined);
   }
 
   async playNow(/** @type {Names} */ now) {
