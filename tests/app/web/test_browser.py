@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ FLAGS = [
     "--disable-dev-shm-usage",
 ]
 SIZE = {"width": 1000, "height": 620}  # software drawing is slow: a small window
-PATIENCE_MS = 120_000
+PATIENCE_MS = 240_000  # a loaded machine draws a hundred times slower
 
 pytestmark = [
     pytest.mark.browser,
@@ -61,21 +61,16 @@ class Tab:
 
     def settled(self, what: str = "done") -> None:
         """Wait until the newest request is done: computed (done) or to be seen (shown)."""
-        end = time.monotonic() + PATIENCE_MS / 1000
-        while time.monotonic() < end:
-            self.page.wait_for_timeout(60)
-            if self.page.get_attribute("body", f"data-{what}") == str(self.serial):
-                return
-        raise AssertionError(f"not {what}: {self.page.inner_text('#bar')} {self.page.inner_text('#notices')}")
+        self.until(
+            f"document.body.dataset.{what} === String(window.spinscope.runner.serial)",
+            lambda: f"not {what}: {self.page.inner_text('#bar')} {self.page.inner_text('#notices')}",
+        )
 
     def after(self, act: Any, what: str = "done") -> None:
         """Do something that makes the page send a request, and wait until that is done."""
         before = self.serial
         act()
-        end = time.monotonic() + 30
-        while self.serial == before and time.monotonic() < end:
-            self.page.wait_for_timeout(30)
-        assert self.serial > before, "nothing was asked of the server"
+        self.until(f"window.spinscope.runner.serial > {before}", lambda: "nothing was asked of the server")
         self.settled(what)
 
     def slide(self, name: str, key: str = "ArrowUp", what: str = "done") -> None:
@@ -84,11 +79,11 @@ class Tab:
         slider.evaluate("(slider) => { slider.closest('details').open = true; }")
         self.after(lambda: slider.press(key), what)
 
-    def until(self, holds: str) -> None:
-        """Wait until an expression holds in the page."""
-        end = time.monotonic() + 30
+    def until(self, holds: str, says: Callable[[], str] | None = None) -> None:
+        """Wait until an expression holds in the page; what is said where it never does."""
+        end = time.monotonic() + PATIENCE_MS / 1000
         while not self.page.evaluate(holds):
-            assert time.monotonic() < end, holds
+            assert time.monotonic() < end, says() if says else holds
             self.page.wait_for_timeout(30)
 
     def value(self, name: str) -> Any:
@@ -239,7 +234,7 @@ def test_a_changed_playback_speed_survives_a_change(tab: Tab) -> None:
     )
     assert tab.page.evaluate(speed) == pytest.approx(0.01)
     tab.page.evaluate(change)
-    assert tab.page.evaluate(speed) == pytest.approx(0.05)
+    tab.until(f"{speed}.then((found) => Math.abs(found - 0.05) < 1e-6)")
     tab.slide("logo.pad_px", what="shown")
     assert tab.page.evaluate(speed) == pytest.approx(0.05)
 
@@ -302,10 +297,10 @@ def test_typing_reset_undo_and_redo(tab: Tab) -> None:
     tab.after(lambda: typed("4.75"))
     assert tab.value("logo.pad_px") == 4.75
     typed("900")
-    tab.page.wait_for_selector(".notice")
-    assert "0 to 100 px" in tab.page.inner_text("#notices")
+    notice = tab.page.locator(".notice", has_text="0 to 100 px")
+    notice.wait_for()
     assert tab.value("logo.pad_px") == 4.75
-    tab.page.locator(".notice").first.click()
+    notice.click()
     tab.after(lambda: tab.page.click("#undo"))
     assert tab.value("logo.pad_px") == start
     tab.after(lambda: tab.page.click("#redo"))
@@ -317,9 +312,10 @@ def test_typing_reset_undo_and_redo(tab: Tab) -> None:
 def test_values_that_do_not_go_together_are_taken_back(tab: Tab) -> None:
     low = tab.value("track.radius_min_px")
     tab.after(lambda: tab.page.evaluate("window.spinscope.settings.set('track.radius_min_px', 499)"))
-    assert "radius" in tab.page.inner_text("#notices")
+    notice = tab.page.locator(".notice", has_text="radius")
+    notice.wait_for()
     assert tab.value("track.radius_min_px") == low
-    tab.page.locator(".notice").first.click()
+    notice.click()
 
 
 def test_a_and_b_beside_each_other(tab: Tab) -> None:
@@ -366,18 +362,17 @@ def test_a_point_of_a_sweep_is_taken_by_a_click(tab: Tab) -> None:
     panel.locator("input[aria-label=to]").fill("5")
     panel.locator("input[aria-label=points]").fill("4")
     panel.locator("button.primary").click()
-    panel.locator(".chart .point").first.wait_for()
+    tab.until("document.querySelectorAll('#side .chart .trace:first-child .point').length >= 4")
     panel.locator("progress").wait_for(state="hidden")
     titles = panel.locator(".chart:visible").evaluate_all("all => all.map((one) => one.getAttribute('aria-label'))")
     assert {"Spin", "Logo events", "Track jitter", "Error against truth"} <= set(titles)
     assert "logo.pad_px [px]" in panel.locator(".chart >> nth=0").text_content()
-    tab.until("document.querySelectorAll('#side .chart .trace:first-child .point').length >= 4")
     chart = panel.locator(".chart[aria-label='Logo events']")
     point = chart.locator(".point").last
-    point.scroll_into_view_if_needed()
-    box = point.bounding_box()
 
     def click() -> None:
+        point.scroll_into_view_if_needed()
+        box = point.bounding_box()
         tab.page.mouse.move(box["x"] + 1, box["y"] + 1)
         tab.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
         chart.locator(".hovertext").first.wait_for(state="attached")
@@ -397,11 +392,7 @@ def test_an_optimization_shows_the_best_values_and_leads_back(tab: Tab) -> None:
     take.wait_for()
     panel.locator("progress").wait_for(state="hidden")
     take.click()
-    tab.page.wait_for_timeout(200)
-    tab.settled()
     panel.get_by_text("Restore the previous values").click()
-    tab.page.wait_for_timeout(200)
-    tab.settled()
     assert tab.page.evaluate("JSON.stringify(window.spinscope.settings.parameters)") == before
 
 
@@ -413,19 +404,14 @@ def test_the_coach_sees_the_shot_alone(tab: Tab) -> None:
         "window.spinscope.viewer.api.get_blueprint()"
         ".then((b) => Object.keys(b.blueprint).filter((p) => /^.view.[^/]+$/.test(p)).length)"
     )
-    end = time.monotonic() + 60
-    while tab.page.evaluate(views) > 3 and time.monotonic() < end:
-        tab.page.wait_for_timeout(200)
-    assert tab.page.evaluate(views) <= 3  # the ball and its flight; what was left out may be there, unseen
+    tab.until(f"{views}.then((count) => count <= 3)")  # ball and flight; what was left out may be there, unseen
     assert tab.page.locator("#controls").is_hidden()
     said = " ".join(tab.page.inner_text("#sentence").split())
     sentence = r"Topspin \d+ ±[\d.]+ rps \(\d+ rpm\) \d+ km/h, axis tilted \d+° from pure topspin"
     assert re.fullmatch(sentence, said), said
     tab.page.click("#leave")
     tab.page.wait_for_selector("#controls", state="visible")
-    end = time.monotonic() + 60
-    while tab.page.evaluate(views) <= 3 and time.monotonic() < end:
-        tab.page.wait_for_timeout(200)
+    tab.until(f"{views}.then((count) => count > 3)")
     assert tab.page.evaluate("window.spinscope.viewer.tab()") == "Tracker"
 
 
@@ -501,7 +487,6 @@ def test_two_tabs_and_a_reload(browser: Any, tab: Tab, server: Served) -> None:
     assert other.value("logo.pad_px") == changed
     other.page.goto("about:blank")
     other.open(f"{server.address}#set=logo.pad_px=-5&set=nothing.at=1&clip=7-3")
-    other.page.wait_for_timeout(300)
     other.settled()
     assert other.value("logo.pad_px") == mine  # a mangled link opens the recording all the same
     other.page.goto("about:blank")
