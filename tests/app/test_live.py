@@ -7,6 +7,7 @@ import json
 import os
 import socket
 import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -142,16 +143,15 @@ def test_clients_get_every_line_and_slow_ones_hold_nobody_up() -> None:
         quick = socket.create_connection(("127.0.0.1", server.port))
         slow = socket.create_connection(("127.0.0.1", server.port))
         while len(server._clients) < 2:
-            pass
-        got: list[bytes] = []
-        reading = threading.Thread(target=lambda: got.extend(quick.makefile("rb")))
-        reading.start()
-        line = {"text": "x" * 100_000}
+            time.sleep(0.001)
+        lines, line = quick.makefile("rb"), {"text": "x" * 100_000}
         for _ in range(200):  # more than the system keeps for the slow one
-            server.send(line)
+            sending = threading.Thread(target=server.send, args=(line,))
+            sending.start()
+            assert json.loads(lines.readline()) == line
+            sending.join()
         assert len(server._clients) == 1
-    reading.join()
-    assert len(got) == 200 and json.loads(got[-1]) == line
+    assert lines.read() == b""
     quick.close()
     slow.close()
 

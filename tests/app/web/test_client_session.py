@@ -111,9 +111,9 @@ def test_a_job_tells_how_it_ended_and_stops_when_asked() -> None:
     def fail(_: Job) -> Resimulation:
         raise ParameterError("the bias is out of range")
 
-    Job(BiasesMessage, queue, lambda _: content)._thread.join(5)
+    Job(BiasesMessage, queue, lambda _: content)._thread.join(60)
     assert queue._waiting["biases", False] == BiasesMessage(state="done", content=content)
-    Job(BiasesMessage, queue, fail)._thread.join(5)
+    Job(BiasesMessage, queue, fail)._thread.join(60)
     assert queue._waiting["biases", False] == BiasesMessage(state="failed", error="the bias is out of range")
     began = threading.Event()
 
@@ -124,8 +124,8 @@ def test_a_job_tells_how_it_ended_and_stops_when_asked() -> None:
             time.sleep(0.001)
 
     job = Job(BiasesMessage, queue, endless)
-    assert began.wait(5)
-    job.cancel(5)
+    assert began.wait(60)
+    job.cancel(60)
     assert queue._waiting["biases", False] == BiasesMessage(state="cancelled")
 
 

@@ -95,7 +95,6 @@ def test_a_full_disk_is_said_and_ends_the_recording_alone(tmp_path: Path, monkey
 def test_markers(tmp_path: Path) -> None:
     writing = recorder(tmp_path / "a.raw")
     writing(0, some(5000))
-    time.sleep(0.2)
     writing.mark("topspin by hand")
     writing.close()
     (line,) = map(json.loads, (tmp_path / "a.markers.jsonl").read_text().splitlines())
@@ -110,6 +109,8 @@ from spinscope.pipeline.cameras import Recorder
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.live import raw_file
 made = np.random.default_rng(0)
+warm = raw_file(Path(sys.argv[1]).with_name("warm"), 1280, 720, {})
+warm.write(EventBatch.checked([5], [1], [1], [True], width_px=1280, height_px=720))  # loads the encoder
 writing = Recorder(Path(sys.argv[1]), lambda path: raw_file(path, 1280, 720, {}), most_us=300_000)
 print("ready", flush=True)
 begin = time.monotonic()
