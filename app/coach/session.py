@@ -117,6 +117,13 @@ class ShotSession:
             raise ParameterError(f"there is no shot {shot_id} in this session: choose one of the list")
         return {**dict(row), "detail": json.loads(row["detail"])}
 
+    def picture(self, shot_id: int) -> Path | None:
+        """File of a shot's picture; None where there is none."""
+        with self._table() as table:
+            row = table.execute("SELECT picture_file FROM shots WHERE id = ?", (shot_id,)).fetchone()
+        path = None if row is None or row[0] is None else self.folder / row[0]
+        return path if path is not None and path.is_file() else None
+
     def recordings(self) -> dict[str, Row]:
         """All columns of the recordings, by path."""
         with self._table() as table:

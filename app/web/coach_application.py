@@ -161,10 +161,8 @@ def _add_shot_routes(app: FastAPI, state: CoachState) -> None:
 
     @app.get(SESSION + "pictures/{shot_id}", include_in_schema=False)
     def picture(session: str, shot_id: int) -> Response:
-        own = state.session(session)
-        name = own.shot(shot_id)["picture_file"]
-        path = own.folder / str(name)
-        if name is None or not path.is_file():
+        path = state.session(session).picture(shot_id)
+        if path is None:
             raise HTTPException(404, "this shot has no picture")
         return FileResponse(path, media_type="image/png", headers={"cache-control": "no-cache"})
 

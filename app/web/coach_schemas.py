@@ -33,7 +33,7 @@ class NamesRequest(Request):
 class StatisticsRequest(Request):
     """Statistics of series of shots by their names, each in order of time."""
 
-    series: dict[str, list[int]] = Field(max_length=100)
+    series: dict[str, list[int]] = Field(max_length=SHOTS_MOST)
 
 
 class PoseRequest(Request):

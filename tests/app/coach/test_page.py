@@ -112,9 +112,13 @@ class TestPage:
 
     def test_the_list_filters_sorts_marks_names_deletes_and_undoes(self, tab: Tab, session: ShotSession) -> None:
         page, rows = tab.page, "table.shots tbody tr"
-        assert page.locator(rows).count() == 30
+        assert page.locator(rows).count() == 24  # the rest as it is scrolled into view
+        page.keyboard.press("End")
+        tab.until(f"document.querySelectorAll('{rows}').length === 30")
         assert "46 rps right corkscrew and backspin, 21 km/h" in page.inner_text(".latest")
         page.get_by_role("button", name="Spin", exact=True).click()
+        page.keyboard.press("End")
+        tab.until(f"document.querySelectorAll('{rows}').length === 30")
         spins = [int(text.split()[0]) for text in tab.texts("td.spin")]
         assert spins == sorted(spins, reverse=True) and spins[0] == 87
         page.select_option("[name=filter-player]", "B")
@@ -212,6 +216,13 @@ class TestPage:
         tab.page.locator(".start form button").click()
         tab.page.wait_for_selector(".start:has-text('0 of 10 balls')")
         assert session.setting("now") == {"player": "A", "drill": "maximum topspin"}
+
+    def test_a_year_of_tests_is_shown(self, tab: Tab, session: ShotSession) -> None:
+        days = [shot(1, recorded_s=1.7e9 + 86_400 * day) for day in range(150)]
+        ids = [session.add(f"{day}.raw", KNOWN, analysis(one))[0] for day, one in enumerate(days)]
+        session.name_shots(ids, {"player": "C", "drill": "serves"})
+        tab.go("tests")
+        tab.until("document.querySelectorAll('.protocols tbody tr').length >= 150")
 
     def test_a_shot_that_comes_in_leaves_what_is_being_filled_in(self, tab: Tab, session: ShotSession) -> None:
         tab.go("tests")

@@ -38,8 +38,7 @@ class Page {
   }
 
   async begin() {
-    await loadTexts();
-    this.sessions = await Shots.sessions();
+    [this.sessions] = await Promise.all([Shots.sessions(), loadTexts()]);
     const kept = localStorage.getItem("spinscope.coach.session") ?? "";
     await this.shots.open(this.sessions.includes(kept) ? kept : this.sessions[0]);
     this.shots.addEventListener("change", () => this.#refresh());

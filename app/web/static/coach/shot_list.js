@@ -39,7 +39,8 @@ const OFFERED = {
   stroke: ["topspin", "push", "serve", "smash"],
   drill: ["maximum topspin", "backspin rally", "serves"],
 };
-const ROWS_AT_ONCE = 40; // a projector shows 20
+const ROWS_AT_ONCE = 24; // a projector shows 20
+const NEAR_PX = 800; // below what is seen, where the next rows are made
 const CONFIDENCE = ["rough", "good", "sure"];
 /** @type {Record<string, (shot: CoachShot) => string | number | null>} */
 const SORT_BY = {
@@ -165,8 +166,13 @@ export class ShotFilter extends EventTarget {
 export class ShotList {
   /** @type {Set<number>} */
   #selected = new Set();
-  #filled = 0;
+  /** @type {CoachShot[]} */
+  #shots = [];
+  #rowCount = ROWS_AT_ONCE;
   #sort = { column: "time", isFalling: true };
+  #nearEnd = new IntersectionObserver(([end]) => end.isIntersecting && this.#extend(), {
+    rootMargin: `${NEAR_PX}px`,
+  });
 
   /** @param {{shots: Shots, filter: ShotFilter, go: (place: string) => void}} page */
   constructor({ shots, filter, go }) {
@@ -176,7 +182,8 @@ export class ShotList {
     this.root = element("section.list");
     this.rows = element("tbody");
     this.actions = element("div.actions");
-    filter.addEventListener("change", () => this.#fill());
+    this.end = element("div");
+    filter.addEventListener("change", () => this.#begin());
   }
 
   show() {
@@ -207,15 +214,15 @@ export class ShotList {
         element(
           "tr",
           {},
-          element("th", {}, this.all),
-          element("th", { "aria-label": text("view") }),
+          element("th.check", {}, this.all),
+          element("th.picture", { "aria-label": text("view") }),
           COLUMNS.map(heading),
-          element("th", { "aria-label": text("mark") }),
+          element("th.mark", { "aria-label": text("mark") }),
         ),
       ),
       this.rows,
     );
-    this.root.replaceChildren(this.#latest(), this.filterBar, this.actions, table);
+    this.root.replaceChildren(this.#latest(), this.filterBar, this.actions, table, this.end);
     this.#fill();
     return this.root;
   }
@@ -236,19 +243,18 @@ export class ShotList {
     });
   }
 
+  // Other shots or another order: from the top.
+  #begin() {
+    this.#rowCount = ROWS_AT_ONCE;
+    this.#fill();
+  }
+
   #fill() {
-    const shown = this.#shown();
+    const shown = this.#shots = this.#shown();
     this.ids = shown.map((shot) => shot.id);
     for (const id of [...this.#selected]) if (!this.ids.includes(id)) this.#selected.delete(id);
-    // What is in view first: the rest of a long list is made while it is looked at.
-    const filled = ++this.#filled;
-    this.rows.replaceChildren(...shown.slice(0, ROWS_AT_ONCE).map((shot) => this.#row(shot)));
-    const more = (/** @type {number} */ first) => {
-      if (first >= shown.length || filled !== this.#filled) return;
-      this.rows.append(...shown.slice(first, first + ROWS_AT_ONCE).map((shot) => this.#row(shot)));
-      setTimeout(() => more(first + ROWS_AT_ONCE), 0);
-    };
-    setTimeout(() => more(ROWS_AT_ONCE), 0);
+    this.rows.replaceChildren(...shown.slice(0, this.#rowCount).map((shot) => this.#row(shot)));
+    this.#watchEnd();
     if (!shown.length) {
       const why = this.shots.list.length ? text("empty") : text("no_shots_yet");
       this.rows.append(element("tr", {}, element("td.empty", { colSpan: COLUMNS.length + 3 }, why)));
@@ -260,6 +266,21 @@ export class ShotList {
         : []),
     );
     this.#showActions();
+  }
+
+  // The rest of a long list is made as it is scrolled into view.
+  #extend() {
+    const first = this.#rowCount;
+    if (first >= this.#shots.length) return;
+    this.#rowCount += ROWS_AT_ONCE;
+    this.rows.append(...this.#shots.slice(first, this.#rowCount).map((shot) => this.#row(shot)));
+    this.#watchEnd();
+  }
+
+  // Begun anew, the observer tells once more whether the end is near.
+  #watchEnd() {
+    this.#nearEnd.disconnect();
+    this.#nearEnd.observe(this.end);
   }
 
   /** @param {CoachShot} shot */
@@ -337,6 +358,7 @@ export class ShotList {
   #sortBy(/** @type {string} */ column) {
     const isSame = this.#sort.column === column;
     this.#sort = { column, isFalling: isSame ? !this.#sort.isFalling : column !== "player" && column !== "kind" };
+    this.#rowCount = ROWS_AT_ONCE;
     this.show();
     this.root.querySelector(`th.${column} button`)?.focus();
   }
