@@ -1,7 +1,8 @@
-"""Live run: the chain over a running camera, its tracker ahead in one thread and the spin behind it in another.
+"""Live run: the chain over a running camera, its tracker ahead in one thread and the spins behind it in others.
 
 The same stages with the same packets as for a recording, so that the same events give the same results. What the
-machine cannot keep up with is left out in whole stretches and counted, and shots do not go on over such a gap.
+machine cannot keep up with is left out in whole stretches and counted, and shots do not go on over such a gap. The spin
+of a shot so far is told while the ball flies and as soon as its end is known; the shot's final one follows.
 """
 
 from __future__ import annotations
@@ -13,164 +14,38 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from itertools import chain as joined
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
-from .camera import Camera
 from .cameras import ArrivedTick, EventCamera, EventStream
 from .cameras.clock import now_s
 from .chain import Chain, EventsInMemory, Tick
 from .errors import CameraError, ParameterError
 from .events import EventBatch
+from .live_outputs import LiveBall, LiveNotice, LiveOutput, LiveShot, LiveSpin, LiveStatus
 from .recordings import RawWriter
 from .recordings.in_memory import RecordingInMemory
-from .registry import STAGES, Parameters
+from .registry import STAGES, Parameters, needed_stages, quick_stages
 from .results import Packet
 from .session import SAMPLES, Choices, Session, method_targets
-from .shots import Shot, ShotLog
-from .stages.track_result import BallTrack
+from .shots import ShotLog
+from .spin_so_far import ContrastInFlight, SpinsInFlight
+from .stages.track_result import EndedBy
 
 STATUS_S = 1.0
 # Ticks with a ball that wait for their spins, at the most; then the tracker waits, too: 3 s of flight at 200 Hz, which
 # at 5 Mev/s is some 600 MB. Ticks without a ball are next to nothing.
 MOST_FLYING = 600
 ARRIVALS_KEPT = 4000  # ticks whose arrival is remembered: 20 s at 200 Hz, longer than any shot's end takes to be known
-SPIN_NICENESS = 5  # a third of the tracker's share where both want one core
+# Shares of a core that several threads want: of the spin so far a half of the tracker's, of the final one a tenth.
+SO_FAR_NICENESS, FINAL_NICENESS = 3, 10
 # Results of the recording that stages of one ball need: a full frame a tick would fill the memory behind a slow spin.
 NEEDED_BY_BALLS = frozenset({"track"}).union(*(stage.inputs for stage in STAGES if stage.scope == "ball"))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LiveBall:
-    """A ball in view as soon as the tracker knows it, for robots.
-
-    Attributes
-    ----------
-    track : BallTrack
-        Its state.
-    latency_ms : float
-        From the arrival of the tick's first events to this.
-    """
-
-    track: BallTrack
-    latency_ms: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object of a line of JSON."""
-        x, y, vx, vy, radius = self.track.mean.tolist()
-        state = {"x_px": x, "y_px": y, "radius_px": radius, "vx_px_s": vx, "vy_px_s": vy}
-        about = {"shot": self.track.shot, "t_us": self.track.t_us, "measured": self.track.measured is not None}
-        return {"ball": {**about, **state, "latency_ms": self.latency_ms}}
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LiveSpin:
-    """Spin of a ball in flight, from its shot so far.
-
-    Attributes
-    ----------
-    shot, t_us : int
-        Number of the shot, and end of its tick.
-    vector_rps : (3,) float64
-        Of the method that is trusted.
-    best : str
-        That method.
-    latency_ms : float
-        From the arrival of the tick's first events to this.
-    """
-
-    shot: int
-    t_us: int
-    vector_rps: np.ndarray[Any, np.dtype[np.float64]]
-    best: str
-    latency_ms: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object of a line of JSON."""
-        spin = {"vector_rps": self.vector_rps.tolist(), "best": self.best, "latency_ms": self.latency_ms}
-        return {"spin": {"shot": self.shot, "t_us": self.t_us, **spin}}
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LiveShot:
-    """A shot that has ended.
-
-    Attributes
-    ----------
-    shot : Shot
-        As of a recording.
-    clock : int
-        Number of the camera's clock, from 0, that its times are of.
-    recorded_us : int
-        Time up to which events had been taken when the end was known.
-    latency_ms : float
-        From the arrival of the shot's last events to this; 0 where the camera ended with the shot.
-    """
-
-    shot: Shot
-    clock: int
-    recorded_us: int
-    latency_ms: float
-
-    def to_dict(self, camera: Camera, ball_radius_m: float) -> dict[str, Any]:
-        """The object of a line of JSON: as `analyze` writes a shot, with the attributes above."""
-        written = self.shot.to_dict(camera, ball_radius_m)
-        return {**written, "clock": self.clock, "recorded_us": self.recorded_us, "latency_ms": self.latency_ms}
-
-
-@dataclass(frozen=True, slots=True)
-class LiveStatus:
-    """State of the last second.
-
-    Attributes
-    ----------
-    events : int
-        Events since the start.
-    rate_mev_s : float
-        Millions of events a second.
-    dropped, outside, late, skipped : int
-        As of `StreamCounts`, since the start.
-    backlog_ms : float
-        Events that came and are not tracked yet.
-    spin_backlog_ms : float
-        Those that are tracked and have no spin yet.
-    p50_ms, p99_ms : float, optional
-        Latencies from the arrival of a tick's first events to its track; None without ticks.
-    """
-
-    events: int
-    rate_mev_s: float
-    dropped: int
-    outside: int
-    late: int
-    skipped: int
-    backlog_ms: float
-    spin_backlog_ms: float
-    p50_ms: float | None
-    p99_ms: float | None
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object of a line of JSON."""
-        return {"status": asdict(self)}
-
-
-@dataclass(frozen=True, slots=True)
-class LiveNotice:
-    """Sentence for people about the camera or the work."""
-
-    text: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object of a line of JSON."""
-        return {"notice": self.text}
-
-
-LiveOutput = LiveBall | LiveSpin | LiveShot | LiveStatus | LiveNotice
 
 
 def session_of(camera: EventCamera, choices: Choices) -> Session:
@@ -195,8 +70,23 @@ def load_kernels() -> None:
         Session.open(SAMPLES / "own" / sample).estimate()
 
 
+def _yield_to_others(niceness: int) -> None:
+    """Let threads that matter more go first on a busy machine, where that can be said of this thread alone."""
+    if sys.platform == "linux":
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), niceness)
+
+
 def _without_events(packet: Packet) -> Packet:
     return replace(packet, events=EventBatch.empty())
+
+
+class _Tracked(NamedTuple):
+    """A tick with its track, and what it was tracked with: another chain for each segment and set of parameters."""
+
+    arrived: ArrivedTick
+    chain: Chain
+    parameters: Parameters
+    tick: Tick
 
 
 class _Ticks:
@@ -206,12 +96,12 @@ class _Ticks:
         self._ticks, self._next = ticks, deque[ArrivedTick]()
         self.ended = False
 
-    def segment(self) -> Iterator[ArrivedTick]:
-        """Yield the ticks up to the next gap or the end."""
+    def segment(self, is_over: Callable[[], bool] = lambda: False) -> Iterator[ArrivedTick]:
+        """Yield the ticks up to the next gap or the end, or until `is_over`."""
         number = None
         for one in joined(tuple(self._next), self._ticks):
             self._next.clear()
-            if number is not None and one.segment != number:
+            if number is not None and (one.segment != number or is_over()):
                 self._next.append(one)
                 return
             number = one.segment
@@ -249,7 +139,12 @@ class LiveRun:
         self.stream = stream(parameters.track.tick_us, lambda text: self._outputs.put(LiveNotice(text)))
         self.parameters = parameters
         self._targets, self._with_balls, self._on_tick = method_targets(method), with_balls, on_tick
-        self._tracked: queue.SimpleQueue[tuple[ArrivedTick, Chain, Tick] | None] = queue.SimpleQueue()
+        needed = needed_stages(self._targets)
+        self._quick = tuple(stage.name for stage in needed if stage.name in quick_stages())
+        self._has_contrast = "contrast" in {stage.name for stage in needed}
+        self._tracked: queue.SimpleQueue[_Tracked | None] = queue.SimpleQueue()
+        self._flying: queue.SimpleQueue[_Tracked | None] = queue.SimpleQueue()
+        self._has_told_so_far = threading.Event()
         self._room = threading.Semaphore(MOST_FLYING)
         self._latencies_ms: deque[float] = deque()
         self._arrivals: deque[tuple[int, float]] = deque(maxlen=ARRIVALS_KEPT)  # (end of the tick, its arrival)
@@ -260,7 +155,7 @@ class LiveRun:
         """Run until the camera ends or `stop`, yielding what becomes known; raises CameraError at a camera's end."""
         threads = [
             threading.Thread(target=self._guarded, args=(work,), name=name, daemon=True)
-            for name, work in (("tracker", self._track), ("spin", self._spin))
+            for name, work in (("tracker", self._track), ("spin so far", self._spin_so_far), ("spin", self._spin))
         ]
         self.stream.start()
         for thread in threads:
@@ -293,6 +188,19 @@ class LiveRun:
         """Have the run end after what has come so far."""
         self.stream.stop()
 
+    def take_parameters(self, parameters: Parameters) -> None:
+        """Have the run go on with other parameters from its next tick on; a shot in flight ends there.
+
+        Raises ParameterError for values that do not go together, and for ticks of another length.
+        """
+        tick_us = self.parameters.track.tick_us
+        if parameters.track.tick_us != tick_us:
+            raise ParameterError(
+                f"track.tick_us = {parameters.track.tick_us} cannot be changed while the camera runs: it is {tick_us}"
+            )
+        self._new_chain().check(parameters)
+        self.parameters = parameters
+
     def _guarded(self, work: Callable[[], None]) -> None:
         """Body of a thread; its error ends the run."""
         try:
@@ -313,22 +221,26 @@ class LiveRun:
                 while not coming.ended:
                     for _ in coming.segment():
                         pass
+            self._flying.put(None)
             self._tracked.put(None)
+
+    def _new_chain(self) -> Chain:
+        """A chain for one segment."""
+        width_px, height_px = self.stream.width_px, self.stream.height_px
+        return Chain(EventsInMemory(("live",), EventBatch.empty(), width_px, height_px, 0, 0))
 
     def _track_segment(self, coming: _Ticks) -> None:
         """Track the ticks up to the next gap. The stages' memory is there before the first one comes."""
-        at_work = deque[ArrivedTick]()
-        width_px, height_px = self.stream.width_px, self.stream.height_px
-        chain = Chain(EventsInMemory(("live",), EventBatch.empty(), width_px, height_px, 0, 0))
+        at_work, chain, parameters = deque[ArrivedTick](), self._new_chain(), self.parameters
 
         def packets() -> Iterator[Packet]:
-            for one in coming.segment():
+            for one in coming.segment(lambda: self.parameters is not parameters):
                 if self._abandoned.is_set():
                     return
                 at_work.append(one)
                 yield one.packet
 
-        for tick in chain.follow(self.parameters, packets(), ("track",), forget=STAGES.names):
+        for tick in chain.follow(parameters, packets(), ("track",), forget=STAGES.names):
             one = at_work.popleft()
             latency_ms = (now_s() - one.first_s) * 1e3
             self._latencies_ms.append(latency_ms)
@@ -338,7 +250,10 @@ class LiveRun:
                     self._outputs.put(LiveBall(ball, latency_ms))
             if self._on_tick is not None:
                 self._on_tick(one, tick, latency_ms)
-            self._tracked.put((replace(one, packet=_without_events(one.packet)), chain, self._kept(tick)))
+            arrived = replace(one, packet=_without_events(one.packet))
+            row = _Tracked(arrived, chain, parameters, self._kept(tick))
+            self._flying.put(row)
+            self._tracked.put(row)
 
     def _kept(self, tick: Tick) -> Tick:
         """The part of a tick that the spins need, as soon as there is room for it."""
@@ -348,59 +263,109 @@ class LiveRun:
         needed = {name: tick.results[name] for name in tick.results if name in NEEDED_BY_BALLS}
         return Tick(needed, tick.packet, ())
 
-    def _taken(self) -> Iterator[tuple[ArrivedTick, Chain, Tick]]:
+    def _taken(self) -> Iterator[_Tracked]:
         """The tracked ticks, in order."""
         while (row := self._tracked.get()) is not None:
-            if row[2].track.balls:
+            if row.tick.track.balls:
                 self._room.release()
             yield row
 
+    def _spin_so_far(self) -> None:
+        """Tell the spins of shots in flight, and of those that end, segment by segment."""
+        _yield_to_others(SO_FAR_NICENESS)
+        try:
+            for _, rows in groupby(iter(self._flying.get, None), lambda row: row.chain):
+                self._follow_segment(rows)
+        finally:
+            self._has_told_so_far.set()
+
+    def _follow_segment(self, rows: Iterator[_Tracked]) -> None:
+        first = next(rows)
+        spins, chain = SpinsInFlight(), self._new_chain()
+        contrast = ContrastInFlight(first.parameters, chain, spins)
+        thread = threading.Thread(target=self._contrast_so_far, args=(contrast,), name="contrast so far", daemon=True)
+        if self._has_contrast:
+            thread.start()
+        log, one = ShotLog(), first.arrived
+        for one, tick in self._answered(first, rows, chain, self._quick):
+            for ball in tick.balls:
+                spins.add_tick(ball)
+                if self._with_balls:
+                    latency_ms = (now_s() - one.first_s) * 1e3
+                    self._put_spin(spins, ball.track.shot, tick.packet.end_us, None, latency_ms)
+            if self._has_contrast:
+                contrast.put(tick.balls)
+            log.add(tick)
+            self._announce(log, spins, one)
+            spins.keep_only(ball.track.shot for ball in tick.balls)
+        log.close()
+        self._announce(log, spins, one)
+        contrast.close()
+        if self._has_contrast:
+            thread.join()
+
+    def _contrast_so_far(self, contrast: ContrastInFlight) -> None:
+        _yield_to_others(SO_FAR_NICENESS)
+        self._guarded(contrast.work)
+
+    def _answered(
+        self, first: _Tracked, rows: Iterator[_Tracked], chain: Chain, targets: tuple[str, ...]
+    ) -> Iterator[tuple[ArrivedTick, Tick]]:
+        """Ticks of one segment with the results of the stages of one ball."""
+        at_work = deque[ArrivedTick]()
+
+        def tracked() -> Iterator[Tick]:
+            for row in joined([first], rows):
+                if self._abandoned.is_set():
+                    return
+                at_work.append(row.arrived)
+                yield row.tick
+
+        for tick in chain.answer(first.parameters, tracked(), targets, forget=STAGES.names):
+            yield at_work.popleft(), tick
+
+    def _announce(self, log: ShotLog, spins: SpinsInFlight, arrived: ArrivedTick) -> None:
+        for shot in log.take_ended():
+            self._put_spin(spins, shot.number, shot.end_us, shot.ended_by, self._since_end_ms(shot.end_us, arrived))
+
+    def _put_spin(
+        self, spins: SpinsInFlight, shot: int, end_us: int, ended_by: EndedBy | None, latency_ms: float
+    ) -> None:
+        spin = spins.newest(shot, end_us)
+        if spin is not None:
+            self._outputs.put(LiveSpin(shot, end_us, spin, ended_by, latency_ms))
+
     def _spin(self) -> None:
         """Answer the shots' spins, segment by segment; whatever comes, the tracker does not wait for ever."""
-        if sys.platform == "linux":  # where it is of this thread alone: on a busy machine the tracker goes first
-            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), SPIN_NICENESS)
+        _yield_to_others(FINAL_NICENESS)
         coming = self._taken()
         try:
-            for _, rows in groupby(coming, lambda row: row[0].segment):
+            for _, rows in groupby(coming, lambda row: row.chain):
                 self._spin_segment(rows)
         finally:
             for _ in coming:
                 pass
+            self._has_told_so_far.wait()
             self._outputs.put(None)
 
-    def _spin_segment(self, rows: Iterator[tuple[ArrivedTick, Chain, Tick]]) -> None:
-        log, at_work = ShotLog(), deque[ArrivedTick]()
+    def _spin_segment(self, rows: Iterator[_Tracked]) -> None:
         first = next(rows)
-        one, chain, _ = first
-
-        def tracked() -> Iterator[Tick]:
-            for arrived, _, tick in joined([first], rows):
-                if self._abandoned.is_set():
-                    return
-                at_work.append(arrived)
-                yield tick
-
-        for tick in chain.answer(self.parameters, tracked(), self._targets, forget=STAGES.names):
-            one = at_work.popleft()
+        log, one = ShotLog(), first.arrived
+        for one, tick in self._answered(first, rows, first.chain, self._targets):
             log.add(tick)
             self._put_shots(log, one)
-            if self._with_balls:
-                self._put_spins(tick, one)
         log.close()
         self._put_shots(log, one)
 
     def _put_shots(self, log: ShotLog, arrived: ArrivedTick) -> None:
         for shot in log.take_ended():
-            came_s = next((last_s for end_us, last_s in list(self._arrivals) if end_us >= shot.end_us), arrived.last_s)
-            latency_ms = (now_s() - came_s) * 1e3
+            latency_ms = self._since_end_ms(shot.end_us, arrived)
             self._outputs.put(LiveShot(shot, arrived.clock, arrived.packet.end_us, latency_ms))
 
-    def _put_spins(self, tick: Tick, arrived: ArrivedTick) -> None:
-        for ball in tick.balls:
-            vector_rps = None if ball.best is None else ball.estimates[ball.best].vector_rps
-            if ball.best is not None and vector_rps is not None:
-                latency_ms = (now_s() - arrived.first_s) * 1e3
-                self._outputs.put(LiveSpin(ball.track.shot, tick.packet.end_us, vector_rps, ball.best, latency_ms))
+    def _since_end_ms(self, end_us: int, arrived: ArrivedTick) -> float:
+        """Milliseconds since the last events of a shot came."""
+        came_s = next((last_s for upto_us, last_s in list(self._arrivals) if upto_us >= end_us), arrived.last_s)
+        return (now_s() - came_s) * 1e3
 
     def _status(self, seconds: float) -> LiveStatus:
         counts, tick_ms = self.stream.counts, self.parameters.track.tick_us / 1e3

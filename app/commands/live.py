@@ -39,19 +39,40 @@ def source_options(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--headless", is_flag=True, help="Without a page: lines of JSON.")
 @click.option("--jsonl", "lines", metavar="OUT", help="File or pipe of the lines; - for standard output.")
 @click.option("--page-port", type=click.IntRange(0, 65535), help="Port of the page; another free one if it is busy.")
+@click.option(
+    "--keep-s", type=click.FloatRange(1, 120), default=30.0, show_default=True, help="Last seconds that can be seen."
+)
 @click.option("--no-browser", is_flag=True, help="Only print the page's address.")
+@click.option("--sweep", metavar="BIAS", help="With --headless: step through a bias, measure, propose a value, end.")
+@click.option("--sweep-points", type=int, default=9, show_default=True, help="Values of the bias.")
+@click.option("--sweep-s", type=float, default=2.0, show_default=True, help="Time for each of them.")
+@click.option("--sweep-figure", type=click.Path(path_type=Path), metavar="OUT.png", help="Draw the event rates.")
 @source_options
 @session_options
-def live(headless: bool, lines: str | None, page_port: int | None, no_browser: bool, **options: Any) -> None:
-    """Show the shots of a running camera as they end: in the tuner's page, or as lines of JSON.
+def live(
+    headless: bool,
+    lines: str | None,
+    page_port: int | None,
+    keep_s: float,
+    no_browser: bool,
+    sweep: str | None,
+    sweep_points: int,
+    sweep_s: float,
+    sweep_figure: Path | None,
+    **options: Any,
+) -> None:
+    """Show a running camera: in the tuner's page, or as lines of JSON of its shots as they end.
 
-    The page opens with the first shot. It holds every shot so far, to be scrubbed, compared and tuned while the camera
-    runs on; loaded again it lists the new ones.
+    The page shows the camera's picture and state, changes parameters and biases while it runs, and opens its last
+    seconds and every shot so far, to be scrubbed, compared and tuned while the camera runs on.
     """
+    if sweep is not None and not headless:
+        raise click.UsageError("--sweep goes with --headless; the page has a sweep of its own")
     if headless:
-        _run(lines=lines or "-", **options)
+        swept = {"name": sweep, "points": sweep_points, "measured_s": sweep_s, "figure": sweep_figure}
+        _run(lines=lines or "-", sweep=None if sweep is None else swept, **options)
     else:
-        _run(lines=lines, page={"port": page_port, "open_browser": not no_browser}, **options)
+        _run(lines=lines, page={"port": page_port, "open_browser": not no_browser, "kept_s": keep_s}, **options)
 
 
 @click.command()
@@ -83,9 +104,10 @@ def _run(
     method: str,
     choices: Choices,
     table: Path | None = None,
+    sweep: dict[str, Any] | None = None,
     page: dict[str, Any] | None = None,
 ) -> None:
-    from ..live.headless import Outputs, run_headless
+    from ..live.headless import Outputs, SweepChoice, run_headless
     from ..live.opening import CameraChoice
     from ..live.recording import RecordChoice
 
@@ -93,7 +115,8 @@ def _run(
         raise click.UsageError("--split-mb and --split-s go with --record NAME.raw")
     chosen = CameraChoice(serial=serial, biases=biases, replay=replay, speed=speed, loops=loops, fault=fault)
     recording = None if record is None else RecordChoice(record, split_mb, split_s)
-    to = Outputs(lines=lines, port=port, table=table, record=recording)
+    swept = None if sweep is None else SweepChoice(**sweep)
+    to = Outputs(lines=lines, port=port, table=table, record=recording, sweep=swept)
     if page is None:
         run_headless(chosen, choices, check_method(method), to)
     else:

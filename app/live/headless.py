@@ -9,21 +9,49 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
-from spinscope.pipeline.cameras import EventStream, RecentEvents
+from spinscope.pipeline.cameras import ArrivedTick, EventCamera, EventStream, RecentEvents
 from spinscope.pipeline.cameras.event_stream import Sink
-from spinscope.pipeline.live import LiveBall, LiveNotice, LiveRun, LiveShot, LiveSpin, load_kernels
+from spinscope.pipeline.chain import Tick
+from spinscope.pipeline.live import LiveRun, load_kernels
+from spinscope.pipeline.live_outputs import LiveBall, LiveNotice, LiveOutput, LiveShot, LiveSpin
 from spinscope.pipeline.result_rows import ResultRow
-from spinscope.pipeline.session import Choices
+from spinscope.pipeline.session import Choices, Session
 
 from ..terminal import note
+from ..tuning.bias_sweep import BiasSweep
+from .camera_sweep import MEASURED_S, CameraSweep, proposal_words, proposed_value
 from .json_lines import JsonLines, JsonServer
 from .opening import CameraChoice, open_live
 from .recording import RecordChoice, recorder, take_markers
 from .shot_table import ShotTable
+from .sweep_figure import write_sweep_figure
 
 # Python lets a thread run for 5 ms while another waits; with the tick's work in three threads that is a whole tick.
 SWITCH_S = 0.0005
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepChoice:
+    """Options of a sweep of one of the camera's biases.
+
+    Attributes
+    ----------
+    name : str
+        The bias.
+    points : int
+        Number of its values.
+    measured_s : float
+        Time for each of them.
+    figure : Path, optional
+        Where the event rates are drawn.
+    """
+
+    name: str
+    points: int = 9
+    measured_s: float = MEASURED_S
+    figure: Path | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,26 +68,59 @@ class Outputs:
         Table to which shots are appended.
     record : RecordChoice, optional
         Recording of the camera.
+    sweep : SweepChoice, optional
+        Sweep of a bias, with which the run ends.
     """
 
     lines: str | None = None
     port: int | None = None
     table: Path | None = None
     record: RecordChoice | None = None
+    sweep: SweepChoice | None = None
 
 
-Begun = Callable[[Callable[[], None]], None]
+@dataclass(frozen=True, slots=True)
+class OpenLive:
+    """A live run that begins.
+
+    Attributes
+    ----------
+    camera, session, run
+        Camera, parameters and run.
+    recent : RecentEvents
+        Its last events.
+    """
+
+    camera: EventCamera
+    session: Session
+    run: LiveRun
+    recent: RecentEvents
+
+
+class LiveObserver(Protocol):
+    """What looks on at a live run."""
+
+    kept_us: int  # length of the events that it wants to see again
+
+    def begin(self, live: OpenLive) -> None:
+        """Take the run before it starts."""
+
+    def add_tick(self, arrived: ArrivedTick, tick: Tick) -> None:
+        """Take a tick, in the tracker's thread: it must not wait."""
+
+    def add_output(self, output: LiveOutput, row: ResultRow | None) -> None:
+        """Take a result, and its row of the table where it has one."""
 
 
 def run_headless(
-    chosen: CameraChoice, choices: Choices, method: str, to: Outputs, on_start: Begun | None = None
+    chosen: CameraChoice, choices: Choices, method: str, to: Outputs, observer: LiveObserver | None = None
 ) -> None:
     """Run until the camera ends or is told to, writing each shot as it ends and the state once a second.
 
     Parameters
     ----------
-    on_start : callable, optional
-        `on_start(stop)` gets what ends the run; Ctrl-C does by default, in the main thread alone.
+    observer : LiveObserver, optional
+        Gets all there is, and ends the run; without one Ctrl-C does, in the main thread alone.
 
     Raises
     ------
@@ -74,7 +135,7 @@ def run_headless(
         server = None if to.port is None else at_end.enter_context(JsonServer(to.port))
         if server is not None:
             note(f"lines of JSON at 127.0.0.1 port {server.port}")
-        recent = RecentEvents()
+        recent = RecentEvents() if observer is None else RecentEvents(observer.kept_us)
 
         def stream(tick_us: int, on_notice: Callable[[str], None]) -> EventStream:
             sinks: list[Sink] = [] if table is None else [recent]
@@ -85,13 +146,30 @@ def run_headless(
                 sinks.append(recording)
             return EventStream(camera, tick_us, reopen=reopen, sinks=tuple(sinks), on_notice=on_notice)
 
-        run = LiveRun(stream, session.parameters, method, with_balls=server is not None)
+        sweep: CameraSweep | None = None
+
+        def on_tick(arrived: ArrivedTick, tick: Tick, latency_ms: float) -> None:
+            if sweep is not None:
+                sweep.add(arrived.packet, tick.track.balls)
+            if observer is not None:
+                observer.add_tick(arrived, tick)
+
+        run = LiveRun(stream, session.parameters, method, with_balls=server is not None, on_tick=on_tick)
+        if to.sweep is not None:
+            sweep = CameraSweep(
+                to.sweep.name,
+                camera.bias_limits,
+                camera.biases,
+                run.stream.set_biases,
+                points=to.sweep.points,
+                measured_s=to.sweep.measured_s,
+            )
         note(f"live: {camera.name} {camera.serial}, {camera.width_px} x {camera.height_px} px; Ctrl-C ends it")
-        if on_start is not None:
-            on_start(run.stop)
+        if observer is not None:
+            observer.begin(OpenLive(camera, session, run, recent))
         if table is not None:
             at_end.callback(table.close)
-        with ends_on_signals(run.stop) if on_start is None else nullcontext():
+        with ends_on_signals(run.stop) if observer is None else nullcontext():
             for one in run.outputs():
                 of_shot = (session.camera, session.ball_radius_m) if isinstance(one, LiveShot) else ()
                 line = one.to_dict(*of_shot)
@@ -99,16 +177,43 @@ def run_headless(
                     note(one.text)
                 if server is not None:
                     server.send(line)
-                if lines is not None and not isinstance(one, LiveBall | LiveSpin):
+                if lines is not None and not _is_of_every_tick(one):
                     lines.write(line)
+                row: ResultRow | None = None
                 if table is not None and isinstance(one, LiveShot):
                     row = table.append(one, session, recent)
-                    note(_in_words(row))
+                    note(row_words(row))
+                if observer is not None:
+                    observer.add_output(one, row)
+                if sweep is not None and sweep.done.is_set():
+                    run.stop()
+        if sweep is not None and to.sweep is not None:
+            _write_sweep(sweep.sweep, lines, to.sweep.figure)
     if table is not None:
         note(f"{table.count} shots in {table.path}, {table.disk_bytes / 1e6:.1f} MB with their events")
 
 
-def _in_words(row: ResultRow) -> str:
+def _write_sweep(sweep: BiasSweep, lines: JsonLines | None, figure: Path | None) -> None:
+    """Write the event rates at each value, the value that they propose, and their figure."""
+    for point in sweep.points:
+        rates = {name: getattr(point, name) for name in ("noise_on_hz", "noise_off_hz", "ball_on_hz", "ball_off_hz")}
+        words = ", ".join(f"{name.removesuffix('_hz')} {hz:.0f}/s" for name, hz in rates.items() if hz is not None)
+        note(f"{sweep.name} = {point.value}: {words}")
+        if lines is not None:
+            lines.write({"bias": {"name": sweep.name, "value": point.value, **rates}})
+    note(proposal_words(sweep))
+    if lines is not None:
+        lines.write({"proposed": {"name": sweep.name, "value": proposed_value(sweep), "text": proposal_words(sweep)}})
+    if figure is not None:
+        write_sweep_figure(sweep, figure)
+
+
+def _is_of_every_tick(one: LiveOutput) -> bool:
+    """Whether a result is one for robots alone."""
+    return isinstance(one, LiveBall) or (isinstance(one, LiveSpin) and one.ended_by is None)
+
+
+def row_words(row: ResultRow) -> str:
     """A row of the table for people."""
     if row["best"] is None:
         return f"shot {row['number']}: no spin: {row['best_reason']}"

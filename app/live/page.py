@@ -1,9 +1,10 @@
-"""The tuner's page over the shots of a running camera: each one is there as soon as it has ended."""
+"""The tuner's page on a running camera: its picture and state, and its last seconds and shots as recordings."""
 
 from __future__ import annotations
 
+import os
+import sys
 import threading
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -13,29 +14,44 @@ from spinscope.pipeline.session import Choices
 
 from ..terminal import note
 from ..web import serve
+from .camera_view import CameraView
 from .headless import Outputs, run_headless
 from .opening import CameraChoice
 from .shot_table import events_folder
 
-LOOK_S = 0.1
+KEPT_S = 30.0
+PAGE_NICENESS = 5  # a third of the tracker's share where both want one core
 
 
 def run_with_page(
-    chosen: CameraChoice, choices: Choices, method: str, to: Outputs, *, port: int | None, open_browser: bool
+    chosen: CameraChoice,
+    choices: Choices,
+    method: str,
+    to: Outputs,
+    *,
+    port: int | None,
+    open_browser: bool,
+    kept_s: float = KEPT_S,
 ) -> None:
-    """Run a camera in a thread, and serve the page of its shots from the first one on until Ctrl-C.
+    """Run a camera in a thread, and serve the page on it from its first half second on until Ctrl-C.
 
-    The shots' events are in a folder that goes with the program, unless there is a table. Raises SpinscopeError.
+    The last `kept_s` seconds can be looked at. The recordings go with the program. Raises SpinscopeError.
     """
     with TemporaryDirectory(prefix="spinscope-live-") as scratch:
-        table = to.table or Path(scratch) / "live.csv"
-        work = _CameraThread(lambda on_start: run_headless(chosen, choices, method, replace(to, table=table), on_start))
+        table = Path(scratch) / "live.csv"
+        folder = events_folder(table)
+        folder.mkdir()
+        view = CameraView(folder, kept_s)
+        work = _CameraThread(lambda: run_headless(chosen, choices, method, replace(to, table=table), view), view)
         work.start()
         try:
-            first = work.first_of(events_folder(table))
-            if first is not None:
-                note("the page lists the shots so far when it is loaded")
-                serve(first, choices, port, open_browser=open_browser)
+            note("the page opens as soon as events have come")
+            view.has_events.wait()
+            if view.is_open and view.opened.recent.span_us is not None:
+                if sys.platform == "linux":
+                    os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), PAGE_NICENESS)
+                first = view.save_window(kept_s)
+                serve(first, choices.for_others, port, open_browser=open_browser, live=view)
         except KeyboardInterrupt:
             pass
         finally:
@@ -45,36 +61,24 @@ def run_with_page(
 class _CameraThread(threading.Thread):
     """A live run beside the page's server."""
 
-    def __init__(self, work: Callable[[Callable[[Callable[[], None]], None]], None]) -> None:
+    def __init__(self, work: Callable[[], None], view: CameraView) -> None:
         super().__init__(name="live", daemon=True)
-        self._work = work
-        self._stop_run: Callable[[], None] | None = None
+        self._work, self._view = work, view
         self._error: Exception | None = None
 
     def run(self) -> None:
         """Body of the thread."""
         try:
-            self._work(self._begun)
+            self._work()
         except Exception as error:  # noqa: BLE001  raised by `end`
             self._error = error
-
-    def _begun(self, stop: Callable[[], None]) -> None:
-        self._stop_run = stop
-
-    def first_of(self, folder: Path) -> Path | None:
-        """Wait for the first shot's recording; None when the camera has ended without one."""
-        note("the page opens with the first shot")
-        while True:
-            is_over = not self.is_alive()
-            found = sorted(folder.glob("*.h5"))
-            if found or is_over:
-                return found[0] if found else None
-            time.sleep(LOOK_S)
+        finally:
+            self._view.end()
 
     def end(self) -> None:
         """Stop the run and wait for it; raises what ended it."""
-        if self._stop_run is not None:
-            self._stop_run()
+        if self._view.is_open:
+            self._view.opened.run.stop()
             self.join()
         if self._error is not None:
             raise self._error

@@ -15,6 +15,7 @@ from spinscope.pipeline.biases import BiasParameters
 from spinscope.pipeline.cameras import EventCamera, Recorder
 from spinscope.pipeline.errors import ParameterError, SpinscopeError
 from spinscope.pipeline.live import raw_file
+from spinscope.pipeline.registry import Parameters
 from spinscope.pipeline.session import Session
 
 from ..terminal import note
@@ -42,7 +43,7 @@ def recorder(chosen: RecordChoice, camera: EventCamera, session: Session, on_not
     if chosen.path.suffix.lower() != ".raw":
         raise ParameterError(f"a camera is recorded as RAW: give a name that ends with .raw instead of {chosen.path}")
     parameters, known = session.parameters, BiasParameters.tunables()
-    tables = {"camera": parameters.camera.as_dict(), "ball": parameters.ball.as_dict()}
+    tables = sidecar_tables(parameters)
     if known.keys() <= camera.biases.keys():
         tables["biases"] = {name: camera.biases[name] for name in known}
     device: dict[str, dict[str, Any]] = {
@@ -52,14 +53,19 @@ def recorder(chosen: RecordChoice, camera: EventCamera, session: Session, on_not
     return Recorder(
         chosen.path,
         lambda path: raw_file(path, camera.width_px, camera.height_px, {"serial_number": camera.serial}),
-        beside={".toml": _toml(tables), ".settings.toml": _toml({**device, **parameters.as_dict()})},
+        beside={".toml": toml_text(tables), ".settings.toml": toml_text({**device, **parameters.as_dict()})},
         most_bytes=None if chosen.most_mb is None else round(chosen.most_mb * 1e6),
         most_us=None if chosen.most_s is None else round(chosen.most_s * 1e6),
         on_notice=on_notice,
     )
 
 
-def _toml(tables: dict[str, dict[str, Any]]) -> str:
+def sidecar_tables(parameters: Parameters) -> dict[str, dict[str, Any]]:
+    """Camera and ball as the file beside a recording states them."""
+    return {"camera": parameters.camera.as_dict(), "ball": parameters.ball.as_dict()}
+
+
+def toml_text(tables: dict[str, dict[str, Any]]) -> str:
     """Tables as TOML, which has no word for None."""
     stated = {name: {key: value for key, value in table.items() if value is not None} for name, table in tables.items()}
     return tomli_w.dumps(stated)

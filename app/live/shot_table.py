@@ -12,7 +12,7 @@ from pathlib import Path
 
 from spinscope.pipeline.cameras import RecentEvents
 from spinscope.pipeline.errors import RecordingError
-from spinscope.pipeline.live import LiveShot
+from spinscope.pipeline.live_outputs import LiveShot
 from spinscope.pipeline.recordings import write_recording
 from spinscope.pipeline.result_rows import ResultRow, shot_columns, shot_rows
 from spinscope.pipeline.session import Result, Session

@@ -71,6 +71,8 @@ class BiasState:
         Why they cannot be changed; None where they can.
     calibrated : bool
         Whether their meaning in physical units is calibrated.
+    of_camera : bool
+        Whether they are those of a running camera, which a change acts on.
     """
 
     values: dict[str, int]
@@ -79,6 +81,7 @@ class BiasState:
     calibrated: bool
     ranges: dict[str, BiasRange]
     swept: list[SweptBias]
+    of_camera: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,11 +100,15 @@ class BiasSweepPoint:
 
 @dataclass(frozen=True, slots=True)
 class BiasSweep:
-    """The points of a sweep so far: simulated over one bias (`name`), or of recordings whose biases are known."""
+    """The points of a sweep so far: over one bias (`name`), or of recordings whose biases are known.
+
+    `proposal` says in words what the sweep of a camera proposes.
+    """
 
     name: str | None
     total: int
     points: list[BiasSweepPoint]
+    proposal: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

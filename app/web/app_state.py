@@ -14,6 +14,7 @@ from spinscope.pipeline.recordings import is_recording
 from spinscope.pipeline.session import Choices, Progress
 
 from .client_session import ClientSession
+from .live_schemas import LiveSource
 from .open_recording import VIEW_FRAMES_BYTES, OpenRecording
 from .shot_detection_job import ShotDetectionJob
 
@@ -37,6 +38,8 @@ class AppState:
         Layout of the viewer in front.
     followed : int, optional
         Number of the shot, from 1, whose ball the detail views follow.
+    live : LiveSource, optional
+        Running camera that the recordings of the folder come from.
 
     Attributes
     ----------
@@ -45,11 +48,18 @@ class AppState:
     """
 
     def __init__(
-        self, path: Path, choices: Choices, *, tools: bool = True, layout: str = "all", followed: int | None = None
+        self,
+        path: Path,
+        choices: Choices,
+        *,
+        tools: bool = True,
+        layout: str = "all",
+        followed: int | None = None,
+        live: LiveSource | None = None,
     ) -> None:
         self.path = path.absolute()
         self.folder = self.path.parent
-        self.tools, self.layout, self.followed = tools, layout, followed
+        self.tools, self.layout, self.followed, self.live = tools, layout, followed, live
         self.drawings = DrawingCache()
         self._choices = choices
         self._recordings: OrderedDict[Path, OpenRecording] = OrderedDict()

@@ -20,6 +20,7 @@ from .app_state import AppState
 from .assets import STATIC, chart_script, viewer_script, viewer_version, viewer_wasm
 from .client_session import ClientSession
 from .error_answers import add_error_handlers
+from .live_routes import add_live_routes
 from .opening import opening, recording_description
 from .schemas import Done, Opening, OpenRequest, Reopened, RunRequest
 from .security import SecurityMiddleware
@@ -68,6 +69,7 @@ def application(state: AppState, token: str | None = None, hosts: Collection[str
 
     _add_session_routes(app, session_of)
     add_tool_routes(app, state, session_of)
+    add_live_routes(app, state.live)
     return app
 
 

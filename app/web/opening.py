@@ -54,7 +54,8 @@ def opening(state: AppState, session: ClientSession) -> Opening:
         colours={"on": _css(entities.ON), "off": _css(entities.OFF), "plain": _css(entities.KALMAN_COLOUR)},
         presets=presets.built_in(opened),
         renamed=opened.renamed(),
-        biases=bias_state(recording.session.recording),
+        biases=bias_state(recording.session.recording) if state.live is None else state.live.bias_state(),
+        is_live=state.live is not None,
     )
 
 

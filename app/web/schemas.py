@@ -191,7 +191,7 @@ class SectionInfo(Response):
 class Opening(Response):
     """Everything that the page needs to know at first; without `tools` it shows the viewer alone, `tab` in front.
 
-    The detail views follow the ball of shot number `followed`, if given.
+    The detail views follow the ball of shot number `followed`, if given. `is_live` where a camera runs behind it.
     """
 
     session: str
@@ -215,6 +215,7 @@ class Opening(Response):
     presets: dict[str, Values]
     renamed: dict[str, str]
     biases: BiasState
+    is_live: bool
 
 
 class Reopened(Response):

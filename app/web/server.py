@@ -23,6 +23,7 @@ from spinscope.pipeline.session import Choices
 from .app_state import AppState
 from .application import application
 from .coach_application import CoachState, coach_application
+from .live_schemas import LiveSource
 from .open_recording import OpenRecording
 
 HOST = "127.0.0.1"
@@ -55,6 +56,7 @@ def serve(
     tools: bool = True,
     layout: str = "all",
     followed: int | None = None,
+    live: LiveSource | None = None,
 ) -> None:
     """Open a recording and serve its page until Ctrl-C.
 
@@ -66,7 +68,7 @@ def serve(
         Whether to open the page where there is a browser; the address is printed in any case.
     hosts : collection of str
         Names besides 127.0.0.1 and localhost by which the page may be reached.
-    tools, layout, followed
+    tools, layout, followed, live
         See AppState.
 
     Raises
@@ -74,7 +76,7 @@ def serve(
     SpinscopeError
         For a recording or choices that cannot be used, or when no port can be opened.
     """
-    state = AppState(path, choices, tools=tools, layout=layout, followed=followed)
+    state = AppState(path, choices, tools=tools, layout=layout, followed=followed, live=live)
     with ProgressBar() as bar:
         recording = state.recording(on_progress=bar)
     # While the browser loads the page and the viewer, which takes longer.

@@ -142,7 +142,11 @@ def _add_exports(app: FastAPI, session_of: SessionOf) -> None:
 def _add_biases(app: FastAPI, state: AppState, session_of: SessionOf) -> None:
     @app.post("/api/sessions/{session_id}/biases", status_code=202)
     async def resimulate(session_id: str, request: schemas.BiasRequest) -> schemas.Done:
-        session = session_of(session_id)
+        session, live = session_of(session_id), state.live
+        if live is not None:
+            live.set_biases(request.biases)
+            session.start(schemas.BiasesMessage, lambda job: bias_sweep.Resimulation(1.0, request.biases))
+            return schemas.Done()
         recording, biases = session.runner.recording, BiasParameters().with_values(request.biases)
         locked = bias_sweep.bias_state(recording.session.recording).locked
         if locked:
@@ -158,7 +162,11 @@ def _add_biases(app: FastAPI, state: AppState, session_of: SessionOf) -> None:
 
     @app.post("/api/sessions/{session_id}/bias_sweep", status_code=202)
     async def start_bias_sweep(session_id: str, request: schemas.BiasSweepRequest) -> schemas.Done:
-        session = session_of(session_id)
+        session, live = session_of(session_id), state.live
+        if live is not None:
+            name, points = request.name, request.points
+            session.start(schemas.BiasSweepMessage, lambda job: live.sweep_bias(name, points, job.report, job.check))
+            return schemas.Done()
         recording, biases = session.runner.recording, BiasParameters().with_values(request.biases)
         original = recording.original
 

@@ -119,9 +119,13 @@ class EventStream:
         """Have it stop reading; the ticks so far can still be taken."""
         self._stop.set()
 
-    def set_biases(self, biases: Mapping[str, int]) -> None:
-        """Have the reading thread change biases before its next read; what goes wrong becomes a notice."""
+    def set_biases(self, biases: Mapping[str, int]) -> int:
+        """Have the reading thread change biases before its next read; what goes wrong becomes a notice.
+
+        Returns the camera's time up to which events had come, us.
+        """
         self._commands.put(biases)
+        return self.counts.end_us
 
     @property
     def waiting(self) -> int:

@@ -9,20 +9,27 @@ import socket
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import cv2
+import numpy as np
 import pyarrow.parquet
 import pytest
 from click.testing import CliRunner
 
 from spinscope.app.cli import cli
-from spinscope.app.live import headless, page
+from spinscope.app.live import camera_view, headless, page
+from spinscope.app.live.camera_view import WINDOWS_KEPT, CameraView
+from spinscope.app.live.headless import OpenLive
 from spinscope.app.live.json_lines import JsonServer
 from spinscope.app.live.shot_table import ShotTable
 from spinscope.pipeline.cameras import RecentEvents
+from spinscope.pipeline.errors import CameraError, RecordingError
 from spinscope.pipeline.events import EventBatch
-from spinscope.pipeline.live import LiveShot
+from spinscope.pipeline.live_outputs import LiveShot
 from spinscope.pipeline.recordings import open_recording
+from spinscope.pipeline.registry import Parameters
 from spinscope.pipeline.session import Session
 
 QUICK = ("--speed", "inf", "--method", "triplet")
@@ -111,24 +118,66 @@ def test_watch_writes_a_table(bounce: Session, tmp_path: Path) -> None:
     assert len(list((tmp_path / "day_shots").iterdir())) == 2
 
 
-def test_the_page_opens_with_the_first_shot(bounce: Session, monkeypatch: pytest.MonkeyPatch) -> None:
-    served: list[tuple[Path, int]] = []
+def test_the_page_opens_on_the_running_camera(bounce: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(camera_view, "FIRST_WINDOW_US", 50_000)
+    served: list[Path] = []
 
-    def serve(path: Path, choices: object, port: int | None, *, open_browser: bool) -> None:
+    def serve(path: Path, choices: object, port: int | None, *, open_browser: bool, live: CameraView) -> None:
         assert not open_browser and port == 0
-        served.append((path, len(open_recording(path).read())))
+        served.append(path)
+        while live.view().is_running:
+            time.sleep(0.01)
+        _check_view(live, bounce)
 
     monkeypatch.setattr(page, "serve", serve)
     result = run("live", "--replay", bounce.recording.path, *QUICK, "--no-browser", "--page-port", 0)
     assert result.exit_code == 0, result.output
-    ((path, events),) = served
-    assert path.name == "shot_00001.h5" and events > 10_000
-    assert not path.exists()  # goes with the program
+    (path,) = served
+    assert path.suffix == ".raw" and not path.exists()  # goes with the program
 
 
-def test_a_camera_without_a_shot_opens_no_page(samples: Path) -> None:
-    result = run("live", "--replay", samples / "own/spinner_top.h5", *QUICK, "--no-browser")
-    assert result.exit_code == 0 and "0 shots in" in result.stderr
+def _check_view(live: CameraView, bounce: Session) -> None:
+    """The state, picture and last seconds of a run of the bounce."""
+    state, shots = live.view(), bounce.estimate("triplet").shots
+    assert any(one.noise_on_hz is not None for one in state.seconds)
+    assert [row.is_final for row in state.shots] == [True] * len(shots)
+    picture = cv2.imdecode(np.frombuffer(live.picture(), np.uint8), cv2.IMREAD_COLOR)
+    assert picture is not None and picture.shape == (360, 640, 3) and picture.any()
+    window = open_recording(live.save_window(0.02))
+    end_us = int(bounce.source.between(0, 10**9).t_us[-1])
+    times = window.read().t_us
+    assert (times[0] >= end_us - 20_000, times[-1]) == (True, end_us)
+    assert "focal_length_mm" in window.path.with_suffix(".toml").read_text()
+    paths = [live.save_window(seconds) for seconds in (0.01, 0.03)]
+    assert paths[0] == paths[1] == window.path  # of the same moment
+    with pytest.raises(CameraError, match="out of range"):
+        live.set_biases({"fo": 1000})
+    live.set_biases({"fo": 10})
+    assert live.bias_state().values["fo"] == 10 and live.bias_state().of_camera
+    other = bounce.parameters.with_assignments(["logo.pad_px=6"])
+    live.take_parameters(other)
+    assert live.opened.run.parameters is other and live.opened.session.parameters is other
+
+
+def test_old_recordings_of_the_last_seconds_are_removed(tmp_path: Path) -> None:
+    recent, live = RecentEvents(), CameraView(tmp_path, 30.0)
+    opened: Any = SimpleNamespace(width_px=4, height_px=4, biases={}, parameters=Parameters())
+    live.begin(OpenLive(opened, opened, opened, recent))
+    with pytest.raises(RecordingError, match="no event"):
+        live.save_window(1.0)
+    for number in range(WINDOWS_KEPT + 2):
+        recent(0, EventBatch.checked([1000 * number + 999], [1], [1], [True], width_px=4, height_px=4))
+        live.save_window(1.0)
+    assert len(list(tmp_path.glob("*.raw"))) == len(list(tmp_path.glob("*.toml"))) == WINDOWS_KEPT
+
+
+def test_a_camera_that_cannot_be_opened_opens_no_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    def open_live(*_: object) -> None:
+        raise CameraError("no camera is plugged in")
+
+    monkeypatch.setattr(headless, "open_live", open_live)
+    result = run("live", "--no-browser")
+    assert "no camera is plugged in" in str(result.exception)
 
 
 def test_a_table_of_others_is_refused(bounce: Session, tmp_path: Path) -> None:

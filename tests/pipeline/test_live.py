@@ -9,18 +9,13 @@ from typing import Any
 
 import pytest
 
-from spinscope.pipeline.cameras import EventStream, ReplayCamera
-from spinscope.pipeline.errors import CameraError
-from spinscope.pipeline.live import (
-    LiveBall,
-    LiveNotice,
-    LiveOutput,
-    LiveRun,
-    LiveShot,
-    LiveSpin,
-    LiveStatus,
-)
+from spinscope.pipeline.cameras import ArrivedTick, EventStream, ReplayCamera
+from spinscope.pipeline.chain import Tick
+from spinscope.pipeline.errors import CameraError, ParameterError
+from spinscope.pipeline.live import LiveRun
+from spinscope.pipeline.live_outputs import LiveBall, LiveNotice, LiveOutput, LiveShot, LiveSpin, LiveStatus
 from spinscope.pipeline.session import Session
+from spinscope.pipeline.spin_so_far import ROLLING_METHODS
 
 QUICK = "triplet"  # contrast has the same code behind it and takes ten times as long
 
@@ -63,11 +58,19 @@ def test_all_methods_balls_and_spins_for_robots(samples: Path) -> None:
     balls = [one for one in outputs if isinstance(one, LiveBall)]
     spins = [one for one in outputs if isinstance(one, LiveSpin)]
     assert [one.track.t_us for one in balls] == [ball.t_us for tick in result.ticks for ball in tick.track.balls]
-    trusted = [ball for tick in result.ticks for ball in tick.balls if ball.best is not None]
-    assert [(one.shot, one.t_us, one.best) for one in spins] == [
-        (ball.track.shot, ball.packet.end_us, ball.best) for ball in trusted
+    flying, announced = ([one for one in spins if (one.ended_by is None) == is_flying] for is_flying in (True, False))
+    assert [(one.shot, one.t_us) for one in flying] == [
+        (ball.track.shot, ball.packet.end_us) for tick in result.ticks for ball in tick.balls
     ]
-    for one in (*balls, *spins, *(one for one in outputs if isinstance(one, LiveStatus))):
+    assert [(one.shot, one.t_us, one.ended_by) for one in announced] == [
+        (shot.number, shot.end_us, shot.ended_by) for shot in result.shots
+    ]
+    assert all(one.spin.t_us <= one.t_us for one in spins)
+    answered = [one.spin.estimate for one in announced if one.spin.estimate.vector_rps is not None]
+    assert answered and {one.method for one in answered} <= set(ROLLING_METHODS)
+    states = [one for one in outputs if isinstance(one, LiveStatus)]
+    lines: list[LiveBall | LiveSpin | LiveStatus] = [*balls, *spins, *states]
+    for one in lines:
         assert json.loads(json.dumps(one.to_dict(), allow_nan=False))
 
 
@@ -101,13 +104,32 @@ def test_a_camera_s_error_comes_out(samples: Path, monkeypatch: pytest.MonkeyPat
     session = Session.open(samples / "own/bounce.h5")
     recording = session.recording
     camera = ReplayCamera(
-        recording.chunks,
+        recording.chunks,  # type: ignore[union-attr]
         recording.width_px,
         recording.height_px,
         speed=float("inf"),
         loops=True,
-        fault="disconnect",  # type: ignore[union-attr]
+        fault="disconnect",
     )
     run = LiveRun(lambda tick_us, on_notice: EventStream(camera, tick_us), session.parameters, QUICK)
     with pytest.raises(CameraError, match="unplugged"):
         list(run.outputs())
+
+
+def test_other_parameters_act_from_now_on(samples: Path) -> None:
+    session = Session.open(samples / "own/bounce.h5")
+    recording, ticks = session.recording, list[int]()
+    other = session.parameters.with_assignments(["logo.pad_px=6"])
+
+    def on_tick(arrived: ArrivedTick, tick: Tick, latency_ms: float) -> None:
+        ticks.append(arrived.packet.end_us)
+        if arrived.packet.end_us == 30_000:
+            run.take_parameters(other)
+
+    camera = ReplayCamera(recording.chunks, recording.width_px, recording.height_px, speed=float("inf"))  # type: ignore[union-attr]
+    run = LiveRun(lambda tick_us, on_notice: EventStream(camera, tick_us), session.parameters, QUICK, on_tick=on_tick)
+    shots = [one.shot for one in run.outputs() if isinstance(one, LiveShot)]
+    assert ticks == sorted(set(ticks)) and run.stream.counts.skipped == 0
+    assert shots[0].ended_by == "end" and shots[0].end_us == 30_000 and shots[1].start_us >= 30_000
+    with pytest.raises(ParameterError, match="while the camera runs"):
+        run.take_parameters(session.parameters.with_assignments(["track.tick_us=1000"]))

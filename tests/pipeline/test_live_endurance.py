@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from spinscope.pipeline.cameras import EventStream, RecentEvents, ReplayCamera
-from spinscope.pipeline.live import LiveRun, LiveStatus
+from spinscope.pipeline.live import LiveRun
+from spinscope.pipeline.live_outputs import LiveStatus
 from spinscope.pipeline.session import Session
 
 SPEED, HOURS, SETTLED_S = 20.0, 2.0, 600.0  # of the recording

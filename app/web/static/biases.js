@@ -78,7 +78,7 @@ export class Biases extends EventTarget {
   }
 
   #refresh() {
-    const { locked, known, calibrated } = this.state;
+    const { locked, known, calibrated, of_camera: ofCamera } = this.state;
     for (const [name, { row, slider, box, reset, start }] of this.#rows) {
       const value = this.values[name];
       slider.value = value;
@@ -89,11 +89,15 @@ export class Biases extends EventTarget {
       row.classList.toggle("locked", Boolean(locked));
     }
     const model = calibrated ? "" : " What a bias means in physical units is a model, not calibrated.";
-    this.note.textContent = locked ?? `A moved slider simulates the scene again with the new setting.${model}`;
+    this.note.textContent = locked ??
+      (ofCamera
+        ? "A moved slider sets the running camera."
+        : `A moved slider simulates the scene again with the new setting.${model}`);
     this.draw.textContent = locked ? "Measure the folder's recordings" : "Sweep this bias";
     this.draw.title = locked
       ? "Event rates of those whose biases are known: stated in the recording, or in a .bias file of its name beside it"
-      : "Simulates the scene over the whole range of this bias: event rates of ball and noise";
+      : `${ofCamera ? "Steps the camera" : "Simulates the scene"} over the whole range of this bias: ` +
+        "event rates of ball and noise";
   }
 
   /**
@@ -173,9 +177,10 @@ export class Biases extends EventTarget {
     if (content) this.#show(content);
   }
 
-  #show(/** @type {BiasSweep} */ { name, points }) {
+  #show(/** @type {BiasSweep} */ { name, points, proposal }) {
     const good = points.filter((point) => !point.error);
     const notes = points.filter((point) => point.error).map((point) => `${point.recording}: ${point.error}`);
+    if (proposal) notes.push(proposal);
     const isRecorded = name === null;
     const varies = Object.keys(this.state.ranges)
       .filter((bias) => new Set(good.map(({ biases }) => biases[bias])).size > 1);

@@ -10,6 +10,7 @@ import { Coach } from "./coach.js";
 import { Controls } from "./controls.js";
 import { byId, element, notice } from "./elements.js";
 import { linked, linkOf } from "./link.js";
+import { Live } from "./live.js";
 import { Optimization } from "./optimization.js";
 import { Overview } from "./overview.js";
 import { Results } from "./results.js";
@@ -172,6 +173,7 @@ function addTools(/** @type {Opening} */ opening) {
   const options = builtIn.map((name) => element("option", { value: name }, name === "opened" ? "as opened" : name));
   byId("preset").replaceChildren(...options);
   byId("preset").onchange = (/** @type {any} */ { target }) => settings.takePreset(target.value, presets[target.value]);
+  if (opening.is_live) app.live = new Live(panel("Live camera", true), app);
   app.results = new Results(panel("Result", true), opening);
   app.sweep = new Sweep(panel("Parameter sweep"), app);
   app.optimization = new Optimization(panel("Optimization"), app);

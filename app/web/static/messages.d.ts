@@ -6,9 +6,9 @@ export type BiasRange = { low: number; high: number; default: number; help: stri
 /** Biases to simulate the scene with, or to write to a file. */
 export type BiasRequest = { biases: Record<string, number> };
 /** Biases of a recording. */
-export type BiasState = { values: Record<string, number>; known: boolean; locked: string | null; calibrated: boolean; ranges: Record<string, BiasRange>; swept: SweptBias[] };
-/** The points of a sweep so far: simulated over one bias (`name`), or of recordings whose biases are known. */
-export type BiasSweep = { name: string | null; total: number; points: BiasSweepPoint[] };
+export type BiasState = { values: Record<string, number>; known: boolean; locked: string | null; calibrated: boolean; ranges: Record<string, BiasRange>; swept: SweptBias[]; of_camera: boolean };
+/** The points of a sweep so far: over one bias (`name`), or of recordings whose biases are known. */
+export type BiasSweep = { name: string | null; total: number; points: BiasSweepPoint[]; proposal: string | null };
 /** Progress of a bias sweep. */
 export type BiasSweepMessage = { kind: "bias_sweep"; state: "running" | "done" | "cancelled" | "failed"; error: string | null; content: BiasSweep | null };
 /** Event rates with one setting, of the whole sensor; only `error` where a recording could not be used. */
@@ -39,6 +39,18 @@ export type EventRate = { counts: number[]; edges_us: number[] };
 export type FlightPath = { frame: "table" | "hitter"; t_us: number[]; points_m: [number, number, number][]; net_clearance_m: number | null; height_std_m: number | null; landing_m: [number, number] | null };
 /** Revision after a change. */
 export type Kept = { revision: number };
+/** Have the running camera's stages go on with these parameters. */
+export type LiveParametersRequest = { parameters: Record<string, Record<string, any>> };
+/** State of one second, `t_s` after the start; latencies and rates are None where there is nothing to measure. */
+export type LiveSecond = { t_s: number; rate_mev_s: number; p50_ms: number | null; p99_ms: number | null; announced_ms: number | null; final_ms: number | null; dropped: number; skipped: number; backlog_ms: number; spin_backlog_ms: number; noise_on_hz: number | null; noise_off_hz: number | null; ball_on_hz: number | null; ball_off_hz: number | null };
+/** A shot that has ended, in words; `recording` has its events as soon as its spin is final. */
+export type LiveShotRow = { number: number; text: string; is_final: boolean; recording: string | null };
+/** Running camera as the page shows it. */
+export type LiveView = { camera: string; is_running: boolean; kept_s: number; seconds: LiveSecond[]; shots: LiveShotRow[]; notices: string[] };
+/** Recording of the last seconds: its name in the folder. */
+export type LiveWindow = { recording: string };
+/** Save the last seconds as a recording of its own. */
+export type LiveWindowRequest = { seconds: number };
 /** A spin method with its colour, as CSS. */
 export type MethodInfo = { name: string; label: string; help: string; colour: string };
 /** A metric of a run, shot or estimate: field name, label, unit (% for a share of 0 to 1) and explanation. */
@@ -50,7 +62,7 @@ export type NamesRequest = { ids: number[]; values: Record<string, string | bool
 /** Open a session on a recording of the folder; None for the one the program was started with. */
 export type OpenRequest = { recording?: string | null };
 /** Everything that the page needs to know at first; without `tools` it shows the viewer alone, `tab` in front. */
-export type Opening = { session: string; viewer_version: string; tools: boolean; tab: string; followed: number | null; recording: RecordingDescription; recordings: string[]; sections: SectionInfo[]; stages: Choice[]; methods: MethodInfo[]; run_metrics: MetricInfo[]; shot_metrics: MetricInfo[]; estimate_metrics: MetricInfo[]; tabs: Choice[]; exports: Choice[]; objectives: Choice[]; suggested: string[]; colours: Record<string, string>; presets: Record<string, Record<string, Record<string, any>>>; renamed: Record<string, string>; biases: BiasState };
+export type Opening = { session: string; viewer_version: string; tools: boolean; tab: string; followed: number | null; recording: RecordingDescription; recordings: string[]; sections: SectionInfo[]; stages: Choice[]; methods: MethodInfo[]; run_metrics: MetricInfo[]; shot_metrics: MetricInfo[]; estimate_metrics: MetricInfo[]; tabs: Choice[]; exports: Choice[]; objectives: Choice[]; suggested: string[]; colours: Record<string, string>; presets: Record<string, Record<string, Record<string, any>>>; renamed: Record<string, string>; biases: BiasState; is_live: boolean };
 /** The trials of an optimization so far. */
 export type Optimization = { objective: string; total: number; trials: number[]; best: number | null; values: Record<string, boolean | number | string | null> };
 /** Progress of an optimization. */
@@ -140,6 +152,8 @@ export interface SessionGets {
 export interface Posts {
   "/api/biases/read": { sent: TextRequest; answered: BiasValues };
   "/api/biases/write": { sent: BiasRequest; answered: BiasText };
+  "/api/live/parameters": { sent: LiveParametersRequest; answered: Done };
+  "/api/live/window": { sent: LiveWindowRequest; answered: LiveWindow };
   "/api/sessions": { sent: OpenRequest; answered: Opening };
 }
 /** POST requests of a session: what is sent and answered. */

@@ -9,7 +9,9 @@ import numpy as np
 from ...cameras import EventStream, ReplayCamera
 from ...chain import EventsInMemory
 from ...events import EventBatch
-from ...live import LiveRun, LiveShot, LiveStatus, load_kernels
+from ...live import LiveRun, load_kernels
+from ...live_outputs import LiveShot, LiveSpin, LiveStatus
+from ...results import spin_errors
 from ...session import DEFAULT_SAMPLE, Session
 from .. import paper
 from ..plots import Figures, label_axes, panels
@@ -65,10 +67,12 @@ def measure(context: TaskContext, rate_mev_s: float, seconds: float) -> list[Row
         context.parameters,
         on_tick=lambda arrived, tick, latency_ms: rows.append({"what": "track", "latency_ms": latency_ms}),
     )
-    shots, skipped = list[LiveShot](), 0
+    shots, announced, skipped = list[LiveShot](), list[LiveSpin](), 0
     for one in run.outputs():
         if isinstance(one, LiveShot):
             shots.append(one)
+        elif isinstance(one, LiveSpin):
+            announced.append(one)
         elif isinstance(one, LiveStatus):
             skipped = one.skipped
     start_us, end_us = int(events.t_us[0]), int(events.t_us[-1]) + 1
@@ -80,22 +84,33 @@ def measure(context: TaskContext, rate_mev_s: float, seconds: float) -> list[Row
         b.to_dict(once.session.camera, 0.02) for b in sorted(first, key=lambda shot: shot.start_us)
     ]
     rows += [{"what": "shot", "latency_ms": one.latency_ms} for one in shots]
+    rows += [{"what": "announced", "latency_ms": one.latency_ms, **_apart(one, shots)} for one in announced]
     about: Row = {"rate_mev_s": rate_mev_s, "skipped": skipped, "identical": identical}
     return [{**about, **row} for row in rows]
 
 
+def _apart(announced: LiveSpin, shots: Sequence[LiveShot]) -> Row:
+    """How far an announced spin is from the final one, rps and degrees; None where either is missing."""
+    row: Row = {"apart_rps": None, "apart_deg": None}
+    for shot in (one.shot for one in shots):
+        vector_rps = None if shot.best is None else shot.estimates[shot.best].vector_rps
+        if (shot.number, shot.end_us) != (announced.shot, announced.t_us) or vector_rps is None:
+            continue
+        estimate_rps = announced.spin.estimate.vector_rps
+        if estimate_rps is not None:
+            row["apart_rps"], row["apart_deg"] = spin_errors(estimate_rps, vector_rps)
+    return row
+
+
 def tables(rows: Sequence[Row]) -> list[ResultTable]:
     """Percentiles of both latencies by event rate, beside the paper's."""
-    lines: list[tuple[Cell, ...]] = [("paper, tracking alone", None, paper.LATENCY_MS, None, None, None, None, None)]
+    lines: list[tuple[Cell, ...]] = [("paper, tracking alone", None, paper.LATENCY_MS, *[None] * 9)]
     for rate in distinct(rows, "rate_mev_s"):
         part = where(rows, rate_mev_s=rate)
-        tracks, shots = (_latencies_ms(where(part, what=what)) for what in ("track", "shot"))
-        shares = [
-            None if not one.size else round(float(np.percentile(one, q)), 1)
-            for one in (tracks, shots)
-            for q in (50, 99)
-        ]
-        lines.append((f"{rate:g} Mev/s", tracks.size, *shares, part[0]["skipped"], part[0]["identical"]))
+        tracks, announced, shots = (_column(where(part, what=what)) for what in ("track", "announced", "shot"))
+        shares = [_percentile(one, q) for one in (tracks, announced, shots) for q in (50, 99)]
+        apart = [_percentile(_column(where(part, what="announced"), name), 50) for name in ("apart_rps", "apart_deg")]
+        lines.append((f"{rate:g} Mev/s", tracks.size, *shares, *apart, part[0]["skipped"], part[0]["identical"]))
     return [
         ResultTable(
             "Live, replayed in real time",
@@ -104,15 +119,20 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
                 "ticks",
                 "track p50 [ms]",
                 "p99 [ms]",
-                "spin p50 [ms]",
+                "announced p50 [ms]",
                 "p99 [ms]",
+                "final p50 [ms]",
+                "p99 [ms]",
+                "apart [rps]",
+                "apart [deg]",
                 "ticks left out",
                 "identical",
             ),
             lines,
-            "Track: from the arrival of a tick's first events to its track, the tick of 5 ms included. Spin: from the "
-            "arrival of a shot's last events to its announcement with all methods. Identical: the first round's shots "
-            "are those of the same events read at once. The paper computes spins afterwards.",
+            "Track: from the arrival of a tick's first events to its track, the tick of 5 ms included. Announced: from "
+            "the arrival of a shot's last events to the newest spin in flight; final: to that of the whole shot by all "
+            "methods. Apart: the median difference of the two. Identical: the first round's shots are those of the "
+            "same events read at once. The paper computes spins afterwards.",
         )
     ]
 
@@ -121,12 +141,16 @@ def figures(rows: Sequence[Row]) -> Figures:
     """Distribution of the track's latency by event rate."""
     figure, axes = panels(1, 1)
     for rate in distinct(rows, "rate_mev_s"):
-        latencies = np.sort(_latencies_ms(where(rows, rate_mev_s=rate, what="track")))
+        latencies = np.sort(_column(where(rows, rate_mev_s=rate, what="track")))
         axes[0, 0].plot(latencies, np.linspace(0.0, 1.0, latencies.size), label=f"{rate:g} Mev/s")
     axes[0, 0].set_xscale("log")
     label_axes(axes[0, 0], "arrival to track", "latency [ms]", "share of ticks below")
     return {"latency": figure}
 
 
-def _latencies_ms(rows: Sequence[Row]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    return np.array([row["latency_ms"] for row in rows], np.float64)
+def _column(rows: Sequence[Row], name: str = "latency_ms") -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    return np.array([row[name] for row in rows if row[name] is not None], np.float64)
+
+
+def _percentile(values: np.ndarray[tuple[int], np.dtype[np.float64]], share: float) -> float | None:
+    return round(float(np.percentile(values, share)), 1) if values.size else None

@@ -100,15 +100,13 @@ def step(
     normal_flow: MethodResult,
 ) -> ContrastResult:
     """The estimate from the shot up to the end of this tick."""
-    if state.start_us is None:
-        state.start_us = packet.start_us
-    _take(parameters, state, packet, ball, logo)
+    age_us = take(parameters, state, packet, ball, logo)
     count = sum(len(part) for _, part in state.parts)
     if count < parameters.fewest_events:
         state.answer = None
         reason = f"the logo was not seen: {count} logo events, {parameters.fewest_events} are needed"
         return ContrastResult.nothing(SpinEstimate.refused(METHOD, reason, count))
-    full = _due(state, packet.end_us - state.start_us, count)
+    full = _due(state, age_us, count)
     settings = ContrastSettings(
         fastest_rps=state.context["spin.max_spin_rps"],
         sigma_rad=parameters.kernel_rad,
@@ -130,10 +128,15 @@ def step(
     return _result(parameters, state, count, full, rate, normal_flow.estimate)
 
 
-def _take(
+def take(
     parameters: ContrastParameters, state: ContrastState, packet: Packet, ball: BallTrack, logo: LogoResult
-) -> None:
-    """Keep the tick's events that turn with the ball, and what is known of the ball's place."""
+) -> int:
+    """Keep the tick's events that turn with the ball, and what is known of the ball's place; `step` begins with it.
+
+    Returns the age of the shot, us.
+    """
+    if state.start_us is None:
+        state.start_us = packet.start_us
     turning = logo.turning
     rays = state.context.camera.rays(turning.centre_x_px, turning.centre_y_px)
     part = SphereEvents(
@@ -148,6 +151,7 @@ def _take(
     state.ball_stds.append((logo.position_std_px, logo.radius_std_px, logo.velocity_std_px_s, speed_px_s))
     while state.parts[0][0] <= packet.end_us - parameters.window_us:
         del state.parts[0], state.ball_stds[0]
+    return packet.end_us - state.start_us
 
 
 def _joined(state: ContrastState) -> SphereEvents:

@@ -1,0 +1,89 @@
+"""Routes of a running camera, with a stand-in behind them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+import httpx
+import pytest
+
+from spinscope.app.tuning.bias_sweep import BiasRange, BiasState, BiasSweep, BiasSweepPoint, SweptBias
+from spinscope.app.web.live_schemas import LiveView
+from spinscope.pipeline.errors import CameraError
+from spinscope.pipeline.registry import Parameters
+
+from .conftest import Served, served
+
+
+class StandIn:
+    """A camera with one bias, which says what was asked of it."""
+
+    def __init__(self, window: Path) -> None:
+        self.window, self.asked = window, list[object]()
+
+    def view(self) -> LiveView:
+        return LiveView(camera="stand-in 1", is_running=True, kept_s=3.0, seconds=[], shots=[], notices=[])
+
+    def picture(self) -> bytes:
+        return b"\x89PNG"
+
+    def save_window(self, seconds: float) -> Path:
+        self.asked.append(seconds)
+        return self.window
+
+    def take_parameters(self, parameters: Parameters) -> None:
+        self.asked.append(parameters.logo.pad_px)
+
+    def bias_state(self) -> BiasState:
+        ranges, swept = {"gain": BiasRange(0, 9, 3, "gain")}, [SweptBias("gain", "gain", ["gain"])]
+        return BiasState({"gain": 3}, True, None, True, ranges, swept, of_camera=True)
+
+    def set_biases(self, biases: Mapping[str, int]) -> None:
+        if biases["gain"] > 9:
+            raise CameraError("bias gain is out of range")
+        self.asked.append(dict(biases))
+
+    def sweep_bias(
+        self, name: str, points: int, report: Callable[[BiasSweep], None], check: Callable[[], None]
+    ) -> BiasSweep:
+        return BiasSweep(name, points, [BiasSweepPoint(value=4, noise_on_hz=1.0)], "proposed: gain = 4")
+
+
+@pytest.fixture
+def running(flight: Path) -> Iterator[tuple[Served, StandIn]]:
+    live = StandIn(flight)
+    made = served(flight, live=live)
+    yield made, live
+    made.stop()
+
+
+def test_state_picture_parameters_and_the_last_seconds(running: tuple[Served, StandIn]) -> None:
+    made, live = running
+    with httpx.Client(base_url=made.address) as http:
+        assert http.get("api/live/view").json()["camera"] == "stand-in 1"
+        assert http.get("api/live/picture").content == b"\x89PNG"
+        assert http.post("api/live/window", json={"seconds": 2.5}).json() == {"recording": live.window.name}
+        assert http.post("api/live/window", json={"seconds": 0.0}).status_code == 422
+        assert http.post("api/live/parameters", json={"parameters": {"logo": {"pad_px": 6.0}}}).status_code == 200
+        assert http.post("api/live/parameters", json={"parameters": {"logo": {"pad_px": -6.0}}}).status_code == 400
+    assert live.asked == [2.5, 6.0]
+
+
+def test_biases_act_on_the_camera(running: tuple[Served, StandIn]) -> None:
+    made, live = running
+    client = made.open()
+    assert client.opening["is_live"] and client.opening["biases"]["of_camera"]
+    assert client.post("biases", biases={"gain": 5}).status_code == 202
+    client.wait("biases", lambda message: message["state"] == "done")
+    refused = client.post("biases", biases={"gain": 10})
+    assert refused.status_code == 400 and "out of range" in refused.json()["error"]
+    assert live.asked == [{"gain": 5}]
+    assert client.post("bias_sweep", biases={"gain": 5}, name="gain").status_code == 202
+    done = client.wait("bias_sweep", lambda message: message["state"] == "done")
+    assert done["content"]["proposal"] == "proposed: gain = 4" and done["content"]["points"][0]["value"] == 4
+
+
+def test_without_a_camera_the_routes_say_so(tuner: Served) -> None:
+    answer = httpx.get(f"{tuner.address}api/live/view")
+    assert answer.status_code == 404 and "spinscope live" in answer.json()["error"]
