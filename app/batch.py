@@ -64,6 +64,7 @@ class BatchWork:
         """Hash of all options that the results depend on."""
         choices = self.choices
         settings = [choices.parameters().as_dict(), choices.window_us, choices.fixed_ball, astuple(choices.reading)]
+        settings += choices.rivals  # none leaves the settings of older tables as they were
         return digest([*settings, self.method])
 
 

@@ -25,6 +25,7 @@ def estimate(
     *,
     preset: str | Path | None = None,
     method: str = "all",
+    rivals: Sequence[str] = (),
     window_us: tuple[int, int] | None = None,
     fixed_ball: tuple[float, float, float] | str | None = None,
     sensor_px: tuple[int, int] | None = None,
@@ -47,6 +48,8 @@ def estimate(
     method : str
         Name of one spin method (`triplet`, `normal_flow`, `contrast`, `trajectory`), or `all`; only what it needs is
         computed.
+    rivals : sequence of str
+        Methods of other publications to run besides, for comparison.
     window_us : (int, int), optional
         [start, end) in us of the file's own time: only these events are used.
     fixed_ball : (float, float, float) or "auto", optional
@@ -75,7 +78,7 @@ def estimate(
     >>> result.shots[0].estimates["contrast"].vector_rps  # doctest: +SKIP
     """
     check_method(method)
-    session = _session(recording, parameters, preset, window_us, fixed_ball, sensor_px, on_progress)
+    session = _session(recording, parameters, preset, window_us, fixed_ball, sensor_px, on_progress, rivals)
     return estimate_with_measured_up(session, method, on_progress)
 
 
@@ -87,6 +90,7 @@ def _session(
     fixed_ball: tuple[float, float, float] | str | None = None,
     sensor_px: tuple[int, int] | None = None,
     on_progress: Progress | None = None,
+    rivals: Sequence[str] = (),
 ) -> Session:
     """An open session, see `estimate`."""
     if isinstance(parameters, Parameters) and preset is not None:
@@ -101,7 +105,8 @@ def _session(
             f"a {type(recording).__name__} is no recording: give a path, a Recording, or an EventBatch "
             "(EventBatch.checked makes one of columns t_us, x_px, y_px, on)"
         )
-    choices = Choices(preset, assignments, window_us, None, ReadingOptions(sensor=sensor_px))
+    reading = ReadingOptions(sensor=sensor_px)
+    choices = Choices(preset, assignments, window_us, None, reading, rivals=rivals)
     session = Session.open(recording, choices, on_progress)
     if isinstance(parameters, Parameters):
         session.parameters, session.states_up = parameters, True

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from .camera import Camera
 from .errors import ParameterError
 from .events import EventBatch
-from .registry import STAGES, Parameters, distrust_reason, methods, needed_stages, trusted_method
+from .registry import STAGES, Parameters, default_stages, distrust_reason, methods, needed_stages, trusted_method
 from .results import MethodResult, Packet, SpinEstimate, nbytes
 from .stage import Context, Stage
 from .track_evidence import NO_EVIDENCE, TrackEvidence
@@ -251,6 +251,8 @@ class Chain:
     ----------
     source : EventSource
         The events.
+    rivals : collection of str
+        Methods of other publications that belong to all stages of a run; raises ParameterError for an unknown one.
     budget_bytes, max_columns : int
         The columns that were not used for longest are dropped when all together hold more bytes than this, or are
         more.
@@ -262,11 +264,14 @@ class Chain:
         self,
         source: EventSource,
         *,
+        rivals: Collection[str] = (),
         budget_bytes: int = CACHE_BYTES,
         max_columns: int = MAX_COLUMNS,
         clock: Callable[[], float] | None = None,
     ) -> None:
         self.source = source
+        self.rivals = tuple(rivals)
+        self.stages = default_stages(rivals)
         self.seconds = dict.fromkeys(STAGES.names, 0.0)
         self._budget_bytes, self._max_columns = budget_bytes, max_columns
         self._clock = clock
@@ -333,7 +338,8 @@ class Chain:
         parameters : Parameters
             Values of all stages.
         targets : collection of str, optional
-            Names of the stages whose results are wanted; what they need runs, nothing else. All by default.
+            Names of the stages whose results are wanted; what they need runs, nothing else. By default
+            `Chain.stages`: all but the rivals that the chain was not given.
         ticks : int, optional
             Number of ticks; all there are so far by default.
         forget : collection of str
@@ -377,7 +383,7 @@ class Chain:
         parameters, targets, forget, together, seconds
             As of `run`.
         """
-        stages = needed_stages(STAGES.names if targets is None else targets)
+        stages = needed_stages(self.stages if targets is None else targets)
         run = _Run(self, parameters, self.keys(parameters), set(forget), self.seconds if seconds is None else seconds)
         of_recording = [(stage, run.column(stage)) for stage in stages if stage.scope == "recording"]
         coming = enumerate(packets)
@@ -405,7 +411,7 @@ class Chain:
         parameters, targets, forget
             As of `run`.
         """
-        stages = needed_stages(STAGES.names if targets is None else targets)
+        stages = needed_stages(self.stages if targets is None else targets)
         of_ball = [stage for stage in stages if stage.scope == "ball"]
         run = _Run(self, parameters, self.keys(parameters), set(forget), self.seconds)
         for index, tick in enumerate(tracked):

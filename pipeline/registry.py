@@ -10,10 +10,11 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from .camera import BallParameters, CameraParameters
-from .extensions import Registry
+from .errors import ParameterError
+from .extensions import Registry, did_you_mean
 from .parameters import ParameterGroup, ParameterSet
 from .results import SpinEstimate
-from .spin import combined, contrast, normal_flow, trajectory, triplet
+from .spin import combined, contrast, normal_flow, rivals, trajectory, triplet
 from .stage import SpinMethod, Stage
 from .stages import filter, flow, logo, rate, surface, track
 
@@ -35,6 +36,7 @@ for _stage in (
     contrast.STAGE,
     trajectory.STAGE,
     combined.STAGE,
+    *rivals.STAGES,
 ):
     STAGES.register(_stage)
 
@@ -67,6 +69,21 @@ class Parameters(ParameterSet):
 def methods() -> tuple[SpinMethod, ...]:
     """The spin methods, in the order of registration."""
     return tuple(stage for stage in STAGES if isinstance(stage, SpinMethod))
+
+
+def rival_methods() -> tuple[SpinMethod, ...]:
+    """The methods of other publications among them."""
+    return tuple(method for method in methods() if method.is_rival)
+
+
+def default_stages(rivals: Iterable[str] = ()) -> tuple[str, ...]:
+    """Names of all stages but the rivals, and of these rivals; raises ParameterError for an unknown rival."""
+    known = [method.name for method in rival_methods()]
+    asked = tuple(dict.fromkeys(rivals))
+    for name in asked:
+        if name not in known:
+            raise ParameterError(f"there is no rival {name!r}{did_you_mean(name, known)}")
+    return tuple(name for name in STAGES.names if name not in known or name in asked)
 
 
 def needed_stages(targets: Iterable[str]) -> tuple[Stage, ...]:
@@ -118,11 +135,11 @@ def distrust_reason(estimates: Mapping[str, SpinEstimate], doubt: str | None = N
 
 
 def _asked(estimates: Mapping[str, SpinEstimate]) -> list[SpinMethod]:
-    """The methods that were run, in the order in which they are asked."""
-    run = [method for method in reversed(methods()) if method.name in estimates]
+    """The methods that were run and may be trusted, in the order in which they are asked."""
+    run = [method for method in reversed(methods()) if method.name in estimates and not method.is_rival]
     return sorted(run, key=lambda method: method.is_last_resort)
 
 
 def quick_stages() -> tuple[str, ...]:
     """Names of the stages that are neither slow nor need a slow one: what an interactive run shows first."""
-    return tuple(stage.name for stage in STAGES if not any(needed.is_slow for needed in needed_stages([stage.name])))
+    return tuple(name for name in default_stages() if not any(needed.is_slow for needed in needed_stages([name])))

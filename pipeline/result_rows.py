@@ -105,7 +105,7 @@ def tick_rows(result: Result) -> list[ResultRow]:
             row |= zip(("x_m", "y_m", "z_m"), map(float, place_m), strict=True)
             row |= {"logo_rate_hz": tick.logo_rate_hz, "rate_rps": tick.rate_rps}
             for method, estimate in tick.estimates.items():
-                if result.method in ("all", method):
+                if result.method in ("all", method) or method in session.chain.rivals:
                     row |= {f"{method}_{name}": value for name, value in _numbers(estimate).items()}
             rows.append(row)
     return rows

@@ -18,7 +18,7 @@ from .presets import preset
 from .recordings import ReadingOptions, Recording, open_recording
 from .recordings.in_memory import RecordingInMemory
 from .recordings.streamed import RecordingPieces, StreamedEvents, events_of
-from .registry import STAGES, Parameters, methods
+from .registry import STAGES, Parameters, default_stages, methods
 from .results import Truth
 from .shots import Shot, ShotLog
 from .sidecar import GROUPS, Sidecar
@@ -56,6 +56,8 @@ class Choices:
         Statements about the recording: size of the sensor, dataset, unit of time.
     flight_calibration : str or Path, optional
         TOML file with the calibration of the set-up's flights; it goes before the preset.
+    rivals : sequence of str
+        Methods of other publications to run besides.
     """
 
     preset: str | Path | None = None
@@ -64,6 +66,7 @@ class Choices:
     fixed_ball: tuple[float, float, float] | str | None = None
     reading: ReadingOptions = ReadingOptions()
     flight_calibration: str | Path | None = None
+    rivals: Sequence[str] = ()
 
     @property
     def for_others(self) -> Choices:
@@ -124,7 +127,7 @@ class Session:
             recording=recording,
             source=source,
             parameters=parameters,
-            chain=_timed(source),
+            chain=_timed(source, rivals=choices.rivals),
             warnings=warnings,
             read_seconds=read_seconds,
             sidecar=sidecar,
@@ -165,7 +168,7 @@ class Session:
 
     def load_kernels(self, method: str = "all") -> float:
         """Run a throw-away chain until every stage has had work, so that compiled kernels are in memory; seconds."""
-        begin, worked, targets = time.perf_counter(), 0, method_targets(method)
+        begin, worked, targets = time.perf_counter(), 0, method_targets(method, self.chain.rivals)
         has_contrasted = "contrast" not in targets
         ticks = Chain(self.source).run(self.parameters, targets, forget=("surface",), together=TICKS_TOGETHER)
         for index, tick in enumerate(ticks):
@@ -188,7 +191,8 @@ class Session:
         on_progress : callable, optional
             Told the share done and what is being done.
         """
-        log = ShotLog.of(self.ticks(method_targets(method), on_progress, forget=STAGES.names))
+        targets = method_targets(method, self.chain.rivals)
+        log = ShotLog.of(self.ticks(targets, on_progress, forget=STAGES.names))
         return Result(self, tuple(log.shots), log.no_shot_reason, method=method)
 
     def estimate_keeping_ticks(self, on_progress: Progress | None = None) -> Result:
@@ -222,7 +226,8 @@ class Session:
         source = self.source
         if (start_us, end_us) != (source.start_us, source.end_us):
             source = source.part((self.recording.identity(), (start_us, end_us)), start_us, end_us)
-        return dataclasses.replace(self, source=source, chain=_timed(source, **chain_options))
+        chain = _timed(source, rivals=self.chain.rivals, **chain_options)
+        return dataclasses.replace(self, source=source, chain=chain)
 
     def place_fixed_ball(self, fixed_ball: tuple[float, float, float] | str | None) -> None:
         """Keep the ball in a circle (x, y, radius in px), in the one found ("auto"), or let it fly (None)."""
@@ -311,7 +316,11 @@ class Result:
         tracking = (*of_recording, "logo")
         shots = [shot.to_dict(session.camera, session.ball_radius_m) for shot in self.shots]
         for shot in shots:
-            shot["spin"] = {name: estimate for name, estimate in shot["spin"].items() if self.method in ("all", name)}
+            shot["spin"] = {
+                name: estimate
+                for name, estimate in shot["spin"].items()
+                if self.method in ("all", name) or name in session.chain.rivals
+            }
             if shot["best"] is not None and shot["best"] not in shot["spin"]:
                 shot["best_reason"] = f"trusted is {shot['best']}, which was not asked for"
                 shot["best"] = None
@@ -337,12 +346,12 @@ class Result:
         }
 
 
-def method_targets(method: str) -> tuple[str, ...]:
-    """The stages that give the estimates of a method (a name, or "all"), and the logo's events."""
+def method_targets(method: str, rivals: Sequence[str] = ()) -> tuple[str, ...]:
+    """The stages that give the estimates of a method (a name, or "all") and of rivals, and the logo's events."""
     if method == "all":
-        return STAGES.names
+        return default_stages(rivals)
     STAGES[method]
-    return ("logo", method)
+    return ("logo", method, *rivals)
 
 
 def check_method(method: str) -> str:

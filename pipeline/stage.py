@@ -105,8 +105,11 @@ class SpinMethod(Stage):
         `is_trusted(estimates) -> bool`: whether the program itself trusts this method's estimate, given all methods'.
     is_last_resort : bool
         Whether its estimate is taken only where that of no other method is trusted.
+    is_rival : bool
+        Whether it is another publication's method, run for comparison: only when it is named, and never trusted.
     """
 
     colour: tuple[int, int, int]
     is_trusted: Callable[[Mapping[str, SpinEstimate]], bool] = never_trusted
     is_last_resort: bool = False
+    is_rival: bool = False

@@ -24,7 +24,7 @@ from spinscope.pipeline.shots import BEGAN_WORDS, ENDED_WORDS
 from ..analysis import report_on
 from ..batch import BatchWork, absolute_choices, analyze_to_table
 from ..terminal import ProgressBar, note
-from .options import RECORDING, ListingCommand, RegisteredName, session_options, write_text
+from .options import RECORDING, ListingCommand, RegisteredName, rival_option, session_options, write_text
 
 
 def _methods() -> dict[str, str]:
@@ -100,6 +100,7 @@ class PrintedRecording:
     "well, write them, and answer all shots with them.",
 )
 @session_options
+@rival_option
 def analyze(
     recordings: tuple[Path, ...],
     output: str | None,

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from ..terminal import ProgressBar, note
+from .options import rivals_given
 
 
 def _list_suites(context: click.Context, _: click.Parameter, wanted: bool) -> None:
@@ -40,6 +41,7 @@ def _list_suites(context: click.Context, _: click.Parameter, wanted: bool) -> No
 )
 @click.option("--ball", type=click.IntRange(1, 7), help="Only this ball of the paper's, 1 to 7.")
 @click.option("--lens-mm", type=click.FloatRange(1.0, 200.0), help="Focal length of the lens, in mm.")
+@rivals_given
 @click.option("--quick", is_flag=True, help="A thinned suite, about ten seconds.")
 @click.option("--json", "output", type=click.Path(path_type=Path), metavar="OUT", help="Write JSON, one suite a line.")
 @click.option("--figures", type=click.Path(path_type=Path), metavar="DIR", help="Write figures (PNG) and rows (CSV).")
@@ -54,6 +56,7 @@ def evaluate(
     assignments: tuple[str, ...],
     ball: int | None,
     lens_mm: float | None,
+    rivals: tuple[str, ...],
     quick: bool,
     output: Path | None,
     figures: Path | None,
@@ -71,7 +74,7 @@ def evaluate(
 
     from .. import evaluate as running
 
-    choices, scene = Choices(preset, assignments), SceneChoices(ball, lens_mm)
+    choices, scene = Choices(preset, assignments, rivals=rivals), SceneChoices(ball, lens_mm)
     if check is not None:
         raise click.exceptions.Exit(running.check_folder(check, choices))
     if not suites:

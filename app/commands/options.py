@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import click
 
 from spinscope.pipeline.files import atomic_file
 from spinscope.pipeline.recordings import TIME_UNITS, ReadingOptions
+from spinscope.pipeline.registry import rival_methods
 from spinscope.pipeline.session import Choices
 
 RECORDING = click.Path(path_type=Path)
@@ -107,6 +109,15 @@ window_option = click.option(
 )
 
 
+rivals_given = click.option(
+    "--rival",
+    "rivals",
+    type=RegisteredName(lambda: tuple(method.name for method in rival_methods())),
+    multiple=True,
+    help="Run a method of another publication besides, for comparison; repeatable.",
+)
+
+
 def reading_options(command: Callable[..., None]) -> Callable[..., None]:
     """Add the statements about a recording to a command, which gets them as one `reading`."""
 
@@ -174,6 +185,15 @@ def session_options(command: Callable[..., None]) -> Callable[..., None]:
         command(choices=Choices(preset, assignments, window, fixed_ball, reading, flight_calibration), **rest)
 
     return reading_options(_decorated(with_choices, command, *options))
+
+
+def rival_option(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the choice of other publications' methods to a command with the options of a session."""
+
+    def with_rivals(rivals: tuple[str, ...], choices: Choices, **rest: Any) -> None:
+        command(choices=replace(choices, rivals=rivals), **rest)
+
+    return _decorated(with_rivals, command, rivals_given)
 
 
 def page_options(command: Callable[..., None]) -> Callable[..., None]:

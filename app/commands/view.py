@@ -13,7 +13,7 @@ from spinscope.pipeline.flight_calibration import with_measured_up
 from spinscope.pipeline.session import Choices, Session
 
 from ..terminal import ProgressBar, note
-from .options import RECORDING, ListingCommand, RegisteredName, page_options, session_options
+from .options import RECORDING, ListingCommand, RegisteredName, page_options, rival_option, session_options
 
 
 def _layouts() -> dict[str, str]:
@@ -48,6 +48,7 @@ def _layouts() -> dict[str, str]:
 )
 @page_options
 @session_options
+@rival_option
 def view(
     recording: Path,
     save: Path | None,

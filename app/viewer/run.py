@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from spinscope.pipeline.camera import Camera
 from spinscope.pipeline.chain import Tick
 from spinscope.pipeline.recordings import CameraFrame, Recording
-from spinscope.pipeline.registry import STAGES, methods
+from spinscope.pipeline.registry import STAGES, methods, rival_methods
 from spinscope.pipeline.results import SpinEstimate, Truth
 from spinscope.pipeline.shots import Shot
 from spinscope.pipeline.stage import SpinMethod
@@ -237,7 +237,8 @@ def shown_estimate(tick: Tick) -> tuple[SpinEstimate | None, bool]:
     """
     if tick.best is not None:
         return tick.estimates[tick.best], True
-    answers = [estimate for estimate in tick.estimates.values() if estimate.vector_rps is not None]
+    rivals = [method.name for method in rival_methods()]
+    answers = [one for name, one in tick.estimates.items() if one.vector_rps is not None and name not in rivals]
     return (answers[-1] if answers else None), False
 
 

@@ -25,7 +25,7 @@ from .schemas import Choice, EventRate, MethodInfo, MetricInfo, Opening, Recordi
 def opening(state: AppState, session: ClientSession) -> Opening:
     """Everything that the page of a new session needs to know."""
     recording = session.runner.recording
-    opened = recording.session.parameters
+    opened, run = recording.session.parameters, recording.session.chain.stages
     objectives = {name: label for name, label in OBJECTIVES.items() if name != "truth" or recording.session.truth}
     return Opening(
         session=session.id,
@@ -37,12 +37,13 @@ def opening(state: AppState, session: ClientSession) -> Opening:
         recordings=state.recording_names(),
         sections=sections(),
         stages=[
-            *(Choice(name=stage.name, label=stage.label, help=stage.help) for stage in STAGES),
+            *(Choice(name=stage.name, label=stage.label, help=stage.help) for stage in STAGES if stage.name in run),
             Choice(name=DRAWING, label="Drawing", help="Pictures of the viewer."),
         ],
         methods=[
             MethodInfo(name=method.name, label=method.label, help=method.help, colour=_css(method.colour))
             for method in methods()
+            if method.name in run
         ],
         run_metrics=_metrics(RunMetrics),
         shot_metrics=_metrics(ShotMetrics),

@@ -91,7 +91,7 @@ class Runner:
         """
         parameters, chain, session = request.parameters, clip.chain, _with(clip, request.parameters)
         count, began_s, playhead_us = chain.tick_count(parameters), time.perf_counter(), request.playhead_us
-        is_fast_first = request.interactive and not all(chain.knows(parameters, stage) for stage in STAGES.names)
+        is_fast_first = request.interactive and not all(chain.knows(parameters, stage) for stage in chain.stages)
         whole = None if is_fast_first else self._slow.submit(self._whole, clip, request, report)
         ticks: list[Tick] = []
         for tick in self._ticks(clip, parameters, request, report, quick_stages()):

@@ -32,11 +32,14 @@ PRESET_NOTE = (
 
 
 def estimated(
-    recording: SimulatedRecording, parameters: Parameters, window_us: tuple[int, int] | None = None
+    recording: SimulatedRecording,
+    parameters: Parameters,
+    window_us: tuple[int, int] | None = None,
+    rivals: Sequence[str] = (),
 ) -> Result:
-    """The shots that the pipeline finds in the recording, or in a window of it, and their spins."""
+    """The shots that the pipeline finds in the recording, or in a window of it, and their spins, also by rivals."""
     in_memory = RecordingInMemory(recording.events, recording.width_px, recording.height_px)
-    return estimate(in_memory, parameters, window_us=window_us or (0, recording.duration_us))
+    return estimate(in_memory, parameters, window_us=window_us or (0, recording.duration_us), rivals=rivals)
 
 
 def chain_over(recording: SimulatedRecording, end_us: int | None = None, **options: Any) -> Chain:
@@ -61,7 +64,8 @@ def estimate_rows(result: Result, truth: Truth | StatedTruth, about: Row) -> lis
     """One row a method and one for `best`: its errors against the truth, or why there is no answer."""
     shot = longest(result)
     rows: list[Row] = []
-    for name in (*([method.name for method in methods()] if shot is None else shot.estimates), BEST):
+    run = result.session.chain.stages
+    for name in (*(method.name for method in methods() if method.name in run), BEST):
         method = name if name != BEST or shot is None else shot.best
         rows.append(_estimate_row(result, method, truth, {**about, "method": name}))
     return rows

@@ -191,7 +191,7 @@ def _path(context: TaskContext, task: Task) -> Path | None:
     if "" in task.needs:
         everything.append(context.parameters.as_dict())
     if (context.choices, context.scene) != (Choices(), SceneChoices()):
-        everything += [list(context.choices.assignments), asdict(context.scene)]
+        everything += [list(context.choices.assignments), asdict(context.scene), *context.choices.rivals]
     return context.cache / "results" / f"{digest(everything)}.json"
 
 

@@ -29,7 +29,7 @@ LEAST_SEEN = 1e-3
 
 
 class TripletSpin:
-    """Triplet Matching's spin of one shot, slice by slice.
+    """The paper's spin of one shot from flow, slice by slice; the flow is Triplet Matching's but for rivals.
 
     For v = omega x r the paper's omega = e_r x v / |r| is omega - (e_r . omega) e_r: each event gives the part of the
     spin perpendicular to its e_r only, and their mean loses what the logo's places have in common. A logo that stays
@@ -46,7 +46,8 @@ class TripletSpin:
     alone.
     """
 
-    def __init__(self, parameters: SpinParameters, context: Context) -> None:
+    def __init__(self, parameters: SpinParameters, context: Context, name: str = "triplet") -> None:
+        self.name = name
         self.parameters = parameters
         self.context = context
         self.end_us: list[int] = []
@@ -59,18 +60,18 @@ class TripletSpin:
         self._add(flow)
         self._forget(end_us - self.parameters.window_us)
         if not self.counts:
-            return SpinEstimate.refused("triplet", "no flow")
+            return SpinEstimate.refused(self.name, "no flow")
         counts = np.array(self.counts, np.float64)
         moments, squares = np.array(self.moments), np.array(self.squares)
         solved = _SOLVERS[self.parameters.triplet_solve](counts, moments, squares)
         if solved is None:
-            return SpinEstimate.refused("triplet", "the logo is seen from one side only", int(counts.sum()))
+            return SpinEstimate.refused(self.name, "the logo is seen from one side only", int(counts.sum()))
         spin, covariance = solved
         covariance = covariance + FLOW_BIAS**2 * float(spin @ spin) * np.eye(3) + SHORTER**2 * np.outer(spin, spin)
         vector_rps, covariance_rps2 = spin / (2 * math.pi), covariance / (2 * math.pi) ** 2
         if TAKES_RATE[self.parameters.magnitude_from] and rate.spin_rps is not None:
             vector_rps, covariance_rps2 = _with_magnitude(vector_rps, covariance_rps2, rate)
-        estimate = SpinEstimate("triplet", vector_rps, covariance_rps2, None, int(counts.sum()))
+        estimate = SpinEstimate(self.name, vector_rps, covariance_rps2, None, int(counts.sum()))
         return estimate.up_to(self.parameters.max_spin_rps)
 
     def _add(self, flow: FlowResult) -> None:

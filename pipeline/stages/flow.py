@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -112,6 +113,10 @@ class FlowResult(ReadOnlyArrays):
     normal_in_image: NDArray[np.bool_]
 
 
+# Rows (m,) of a slice's events that have flow, and its two components (m,), px/s.
+SliceFlow = Callable[[FlowEvents], tuple[NDArray[np.int64], Floats, Floats]]
+
+
 @dataclass(slots=True)
 class FlowState:
     """Events of the shot that are still to be worked on; times are None before the first tick."""
@@ -149,16 +154,18 @@ def step(
     if state.slice_start_us is None:
         state.slice_start_us, state.planes_until_us = packet.start_us, packet.start_us
     state.events = FlowEvents.concatenate([state.events, FlowEvents.of(logo)])
-    t_acc_us = _t_acc_us(parameters, rate)
+    t_acc_us = slice_us(parameters, rate)
     bound_px_s = 2 * math.pi * state.max_spin_rps * logo.radius_px
-    triplets = _ended_slices(parameters, state, packet.end_us, t_acc_us, bound_px_s)
+    triplets = ended_slices(
+        state, packet.end_us, t_acc_us, lambda piece: _triplets(piece, parameters.reach_px, t_acc_us, bound_px_s)
+    )
     planes = _planes(parameters, state, ball, packet.end_us, t_acc_us, bound_px_s)
     keep_us = min(state.slice_start_us, state.planes_until_us - PLANE_REACH * t_acc_us)
     state.events = state.events.between(keep_us, packet.end_us)
     return FlowResult(t_acc_us, bound_px_s, logo.radius_px, *triplets, *planes)
 
 
-def _t_acc_us(parameters: FlowParameters, rate: RateResult) -> int:
+def slice_us(parameters: FlowParameters, rate: RateResult) -> int:
     """Length of a slice begun now."""
     from_spin, from_rate = T_ACC_SPINS[parameters.t_acc_from]
     if not from_spin:
@@ -169,29 +176,37 @@ def _t_acc_us(parameters: FlowParameters, rate: RateResult) -> int:
     return max(round(1e6 / (SLICES_A_ROTATION * spin_rps)), 1)
 
 
-def _ended_slices(
-    parameters: FlowParameters, state: FlowState, end_us: int, t_acc_us: int, bound_px_s: float
+def ended_slices(
+    state: FlowState, end_us: int, t_acc_us: int, flow_of: SliceFlow
 ) -> tuple[FlowEvents, Floats, Floats, NDArray[np.int64]]:
-    """Events with flow of the slices that end by end_us, their flow and their slice."""
+    """Events with flow of the slices that end by end_us, their flow and their slice; the state moves on to the next."""
     assert state.slice_start_us is not None
     events, vx, vy, index = [FlowEvents.empty()], [np.empty(0)], [np.empty(0)], [np.empty(0, np.int64)]
     while state.slice_start_us + t_acc_us <= end_us:
         piece = state.events.between(state.slice_start_us, state.slice_start_us + t_acc_us)
-        neighbours = earlier_neighbours(
-            (piece.t_us, piece.x_px, piece.y_px, piece.on), TRIPLET_NEAR_PX, parameters.reach_px, 0.5 * t_acc_us,
-            bound_px_s, TRIPLET_NEIGHBOURS,
-        )  # fmt: skip
-        flow_x, flow_y, triplets = triplet_flow(
-            piece.t_us, piece.x_px, piece.y_px, neighbours, TRIPLET_MISMATCH_PX, TRIPLET_MISMATCH_SHARE
-        )
-        has = triplets > 0
-        events.append(piece[has])
-        vx.append(flow_x[has])
-        vy.append(flow_y[has])
-        index.append(np.full(int(has.sum()), state.slice_index, np.int64))
+        rows, flow_x, flow_y = flow_of(piece)
+        events.append(piece[rows])
+        vx.append(flow_x)
+        vy.append(flow_y)
+        index.append(np.full(rows.size, state.slice_index, np.int64))
         state.slice_start_us += t_acc_us
         state.slice_index += 1
     return FlowEvents.concatenate(events), np.concatenate(vx), np.concatenate(vy), np.concatenate(index)
+
+
+def _triplets(
+    piece: FlowEvents, reach_px: float, t_acc_us: int, bound_px_s: float
+) -> tuple[NDArray[np.int64], Floats, Floats]:
+    """Rows of a slice's events that end a triplet, and their flow."""
+    neighbours = earlier_neighbours(
+        (piece.t_us, piece.x_px, piece.y_px, piece.on), TRIPLET_NEAR_PX, reach_px, 0.5 * t_acc_us,
+        bound_px_s, TRIPLET_NEIGHBOURS,
+    )  # fmt: skip
+    flow_x, flow_y, triplets = triplet_flow(
+        piece.t_us, piece.x_px, piece.y_px, neighbours, TRIPLET_MISMATCH_PX, TRIPLET_MISMATCH_SHARE
+    )
+    rows = np.flatnonzero(triplets > 0)
+    return rows, flow_x[rows], flow_y[rows]
 
 
 def _planes(

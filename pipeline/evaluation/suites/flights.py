@@ -70,7 +70,7 @@ def measure(context: TaskContext, name: str, seed: int) -> list[Row]:
     scene, sensor = flight_of(name, seed)
     recording = render(context, scene, seed=seed, sensor=sensor)
     about: Row = {"class": name, "seed": seed, "speed_m_s": float(np.linalg.norm(recording.truth.velocity_m_s[0]))}
-    rows = segment_rows(recording, estimated(recording, context.parameters), about)
+    rows = segment_rows(recording, estimated(recording, context.parameters, rivals=context.choices.rivals), about)
     return [row | {"visible": int(row["logo_events"] or 0) >= VISIBLE} for row in rows]
 
 

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...chain import Chain
-from ...registry import STAGES as REGISTERED
-from ...registry import Parameters
+from ...registry import Parameters, default_stages
 from .. import paper
 from ..estimation import chain_over
 from ..lab_recordings import FLIGHT, SPINNER, LabRecording
@@ -26,7 +25,7 @@ REAL_KINDS = (FLIGHT, SPINNER)
 TIMED = True  # its tasks measure run times
 
 # The paper's "from the moment the events are received": up to the logo's events; the rest is spin estimation.
-STAGES = REGISTERED.names
+STAGES = default_stages()
 LATENCY_STAGES = ("filter", "surface", "track", "logo")
 SPIN_STAGES = ("rate", "flow", "triplet", "normal_flow")  # the paper's method, and normal flow beside it
 TICKS_US = (5000, 1000)  # the paper's 200 Hz, and the shortest useful

@@ -56,7 +56,7 @@ def measure(context: TaskContext, kind: str, seed: int) -> list[Row]:
     """Every method's answers to the free flights of one scene."""
     made = real_scene(kind, seed)
     recording = render(context, made.scene, seed=seed, sensor=made.sensor, camera=made.camera, lens=made.lens)
-    result = estimated(recording, parameters_of(made, context.parameters))
+    result = estimated(recording, parameters_of(made, context.parameters), rivals=context.choices.rivals)
     return segment_rows(recording, result, {"group": made.group, "kind": kind, "seed": seed})
 
 

@@ -61,7 +61,9 @@ def measure(context: TaskContext, ball: int, kind: str, rps: float, seed: int) -
         seen = logo_events(recording, window_us)
         about: Row = {"ball": ball, "kind": kind, "rps": rps, "seed": seed, "window_ms": end_ms - start_ms}
         about |= {"start_ms": start_ms, "logo_events": seen, "visible": seen >= VISIBLE[end_ms - start_ms]}
-        rows += rows_of_both_presets(estimated(recording, parameters, window_us), recording.truth, about)
+        rows += rows_of_both_presets(
+            estimated(recording, parameters, window_us, context.choices.rivals), recording.truth, about
+        )
     return rows
 
 

@@ -88,7 +88,7 @@ def real(context: TaskContext, recording: LabRecording) -> list[Row]:
 
 
 def _measured(context: TaskContext, recording: SimulatedRecording, about: Row) -> list[Row]:
-    result = estimated(recording, context.parameters)
+    result = estimated(recording, context.parameters, rivals=context.choices.rivals)
     return rows_of_both_presets(result, recording.truth, about | _tracked(result))
 
 
