@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...calibration.ball_labels import BallLabels
 from ...camera import BallParameters
@@ -22,6 +21,7 @@ from ..plots import Figures, curve, label_axes, panels
 from ..rendering import camera_of, render
 from ..tables import Cell, ResultTable, Row, Summary, distinct, share, summary, where
 from ..tasks import Task, TaskContext
+from ..tracking_rivals import BallState, ConvolutionPeak, MeanShift, ball_state
 
 LABEL = "Ball detector: error against speed"
 HELP = "Errors of the ball's place, size and velocity against its speed (section 4.2)."
@@ -34,14 +34,14 @@ SPEEDS_M_S = tuple(float(speed) for speed in range(4, 21, 2))
 SCENES = ("one ball", "two balls", "arm")
 REAL = "real recordings"
 FLIGHTS = 3  # of each speed and scene
-STAGES = ("hough", "hough + kalman", "refined", "refined + kalman")
+PEAK, MEAN_SHIFT = "rival: convolution peak", "rival: mean shift"
+STAGES = ("hough", "hough + kalman", "refined", "refined + kalman", PEAK, MEAN_SHIFT)
+FINAL = "refined + kalman"  # what the other stages of the chain get
 
 # The paper's filter, fed with the Hough circle: its error is about a pixel, its start knows nothing of the velocity.
 HOUGH_STD_PX, FASTEST_M_S, ACCELERATION_M_S2, APPROACH_M_S, MOST_SURPRISE = 1.0, 25.0, 15.0, 3.0, 25.0
 MOST_MISSES = 2  # circles in a row that do not fit: the filter follows something else and starts anew
 ASIDE_US = 500  # the truth's velocity is the difference of places so far before and after
-
-BallState = NDArray[np.float64]  # (5,) x, y, vx, vy, radius in px and px/s; NaN where a stage gives none
 
 
 def tasks(quick: bool) -> list[Task]:
@@ -94,11 +94,15 @@ def real(context: TaskContext, recording: LabRecording) -> list[Row]:
 def _rows(chain: Chain, parameters: Parameters, ball: Truth | BallLabels, about: Row) -> list[Row]:
     """Every stage's errors in every tick in which the true ball is known and all of it in view."""
     camera = chain.camera(parameters)
-    follower = HoughKalman(parameters.ball, camera.focal_px)
+    followers: dict[str, HoughKalman | ConvolutionPeak | MeanShift] = {
+        "hough + kalman": HoughKalman(parameters.ball, camera.focal_px),
+        PEAK: ConvolutionPeak(),
+        MEAN_SHIFT: MeanShift(),
+    }
     rows: list[Row] = []
     for tick in chain.run(parameters, ("track",), forget=("surface",)):
         truth = _truth_at(ball, (camera.width_px, camera.height_px), tick.track.t_us)
-        found = _found(tick, follower, truth)
+        found = _found(tick, truth) | {stage: follower.step(tick) for stage, follower in followers.items()}
         if truth is not None:
             rows += [_row({**about, "t_us": tick.track.t_us}, stage, found[stage], truth) for stage in STAGES]
     return rows
@@ -117,9 +121,10 @@ class HoughKalman:
         self.last_us = 0
         self.misses = 0
 
-    def step(self, end_us: int, tracked: bool, circle: Circle | None) -> BallState | None:
+    def step(self, tick: Tick) -> BallState | None:
         """The filter's state at the end of a tick; None while there is no track."""
-        if not tracked:
+        end_us, circle = tick.packet.end_us, tick.track.hough
+        if not tick.track.has_ball:
             self.filter = None
         elif self.filter is None or self.misses >= MOST_MISSES:
             self.filter = None if circle is None else self._begun(circle)
@@ -141,8 +146,8 @@ class HoughKalman:
         return BallFilter(mean, np.diag(std**2), ACCELERATION_M_S2 * per_m, approach_px_s)
 
 
-def _found(tick: Tick, follower: HoughKalman, truth: BallState | None) -> dict[str, BallState | None]:
-    """State of the ball after every stage at the end of a tick, None where a stage has none.
+def _found(tick: Tick, truth: BallState | None) -> dict[str, BallState | None]:
+    """State of the ball after every stage of the tracker at the end of a tick, None where a stage has none.
 
     Hough circles are those of the ball that is followed, refined ones of the ball nearest the true one.
     """
@@ -150,15 +155,10 @@ def _found(tick: Tick, follower: HoughKalman, truth: BallState | None) -> dict[s
     place = track.mean if truth is None else truth
     nearest = min(track.balls, key=lambda ball: float(np.hypot(*(ball.mean[:2] - place[:2]))), default=None)
     return {
-        "hough": _ball_state(track.hough),
-        "hough + kalman": follower.step(tick.packet.end_us, track.has_ball, track.hough),
-        "refined": None if nearest is None else _ball_state(nearest.measured),
+        "hough": ball_state(track.hough),
+        "refined": None if nearest is None else ball_state(nearest.measured),
         "refined + kalman": None if nearest is None else nearest.mean,
     }
-
-
-def _ball_state(circle: Circle | None) -> BallState | None:
-    return None if circle is None else np.array([circle.x_px, circle.y_px, np.nan, np.nan, circle.radius_px])
 
 
 def _truth_at(truth: Truth | BallLabels, size_px: tuple[int, int], t_us: float) -> BallState | None:
@@ -203,7 +203,7 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
         (scene, speed, *_line(part, stage))
         for scene in scenes
         for speed in sorted(speeds)
-        for stage in (STAGES if scene in (SCENES[0], REAL) else STAGES[-1:])
+        for stage in (STAGES if scene in (SCENES[0], REAL) else (FINAL,))
         if (part := where(rows, scene=scene, speed_m_s=speed, stage=stage))
     ]
     return [
@@ -214,7 +214,8 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
 
 NOTE = (
     "Absolute errors over all ticks with the whole ball in view, at the end of the tick, as a robot would have them; "
-    "along the motion signed (negative = behind). Found: a circle whose centre lies on the ball."
+    "along the motion signed (negative = behind). Found: a circle whose centre lies on the ball. The rivals (PUCK's "
+    "convolution peak, mean shift of events) begin with the first circle of each track and are run once a tick."
 )
 NOTE_OF_TWO = (
     "Two balls: the second one crosses at 2 to 6 m/s. The Hough circles are those of the ball that is followed, which "
