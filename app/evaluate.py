@@ -27,12 +27,14 @@ from rich.table import Table as ScreenTable
 from spinscope.pipeline.evaluation import (
     LabFolder,
     Report,
+    ResultTable,
     SceneChoices,
     TaskContext,
     evaluate,
     evaluate_real,
     executor,
 )
+from spinscope.pipeline.evaluation.best_methods import best_methods
 from spinscope.pipeline.evaluation.plots import draw
 from spinscope.pipeline.evaluation.protocol import protocol_findings
 from spinscope.pipeline.evaluation.suites import SUITES
@@ -209,6 +211,8 @@ def write_page(evaluations: Sequence[Evaluation], path: Path, pictures: Sequence
     Raises RecordingError.
     """
     lines = [ABOUT if any(one.report.folder is None for one in evaluations) else ABOUT_REAL]
+    overview = best_methods([one.report for one in evaluations])
+    lines += [] if overview is None else _table_lines(overview, "##")
     for one in evaluations:
         lines += [f"## {one.report.title} (`{one.report.suite.name}`)", "", _how_made(one), ""]
         for picture in pictures:
@@ -216,11 +220,15 @@ def write_page(evaluations: Sequence[Evaluation], path: Path, pictures: Sequence
                 place = Path(os.path.relpath(picture, path.parent)).as_posix()
                 lines += [f"![{picture.stem.replace('_', ': ')}]({place})", ""]
         for table in one.report.tables:
-            lines += [f"### {table.title}", ""]
-            lines += ["| " + " | ".join(table.columns) + " |", "|" + "---|" * len(table.columns)]
-            lines += ["| " + " | ".join(row) + " |" for row in table.as_text()]
-            lines += ["", *([table.note, ""] if table.note else [])]
+            lines += _table_lines(table, "###")
     write_whole(path, "\n".join(lines).rstrip() + "\n")
+
+
+def _table_lines(table: ResultTable, heading: str) -> list[str]:
+    """A table as lines of Markdown, with a heading of this level."""
+    lines = [f"{heading} {table.title}", "", "| " + " | ".join(table.columns) + " |", "|" + "---|" * len(table.columns)]
+    lines += ["| " + " | ".join(row) + " |" for row in table.as_text()]
+    return [*lines, "", *([table.note, ""] if table.note else [])]
 
 
 def _how_made(one: Evaluation) -> str:
