@@ -39,6 +39,7 @@ from spinscope.pipeline.evaluation.plots import draw
 from spinscope.pipeline.evaluation.protocol import protocol_findings
 from spinscope.pipeline.evaluation.suites import SUITES
 from spinscope.pipeline.evaluation.tasks import Progress, write_whole
+from spinscope.pipeline.evaluation.training_set import write_training_set
 from spinscope.pipeline.session import Choices
 
 from .terminal import console as terminal_console
@@ -120,6 +121,25 @@ def evaluate_suite(
     seconds = time.perf_counter() - begin
     today = datetime.datetime.now(datetime.UTC).date().isoformat()
     return Evaluation(report, today, _machine(), version("spinscope"), seconds)
+
+
+def make_training_set(
+    folder: Path,
+    *,
+    shards: int,
+    seed: int,
+    workers: int | None = None,
+    cluster: str | None = None,
+    choices: Choices | None = None,
+    on_progress: Progress | None = None,
+) -> str:
+    """Write a training set for learned estimators; see `write_training_set`. Returns what it holds, in words."""
+    choices = choices or Choices()
+    context = TaskContext(None, choices.parameters(), choices)
+    with executor(cpu_count() if workers is None else workers, cluster) as parallel:
+        rows = write_training_set(folder, context, shards=shards, seed=seed, parallel=parallel, on_progress=on_progress)
+    samples, events = (sum(int(row[name] or 0) for row in rows) for name in ("samples", "events"))
+    return f"wrote {samples} windows with {events} events in {len(rows)} files: {folder}"
 
 
 def suite_list() -> str:

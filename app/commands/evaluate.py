@@ -18,6 +18,9 @@ def _list_suites(context: click.Context, _: click.Parameter, wanted: bool) -> No
         context.exit()
 
 
+DATASET = "dataset"  # in place of a suite: a training set
+
+
 @click.command()
 @click.argument("suites", nargs=-1, metavar="SUITE...")
 @click.option(
@@ -46,6 +49,11 @@ def _list_suites(context: click.Context, _: click.Parameter, wanted: bool) -> No
 @click.option("--json", "output", type=click.Path(path_type=Path), metavar="OUT", help="Write JSON, one suite a line.")
 @click.option("--figures", type=click.Path(path_type=Path), metavar="DIR", help="Write figures (PNG) and rows (CSV).")
 @click.option("--page", type=click.Path(path_type=Path), metavar="FILE.md", help="Write tables and figures as a page.")
+@click.option("--out", type=click.Path(path_type=Path), metavar="FOLDER", help="With dataset: folder to write it to.")
+@click.option("--shards", type=click.IntRange(1), default=16, show_default=True, help="With dataset: number of files.")
+@click.option(
+    "--seed", type=click.IntRange(0), default=0, show_default=True, help="With dataset: another set for each."
+)
 @click.option("--cluster", metavar="ADDRESS", help="Scheduler of a running Dask cluster that does the work.")
 @click.option("--workers", type=click.IntRange(0), help="Processes on this machine; one a core by default.")
 def evaluate(
@@ -61,6 +69,9 @@ def evaluate(
     output: Path | None,
     figures: Path | None,
     page: Path | None,
+    out: Path | None,
+    shards: int,
+    seed: int,
     cluster: str | None,
     workers: int | None,
 ) -> None:
@@ -68,6 +79,9 @@ def evaluate(
 
     `spinscope evaluate --list` lists the suites. Recordings and results are kept, so that an interrupted run resumes
     where it stopped.
+
+    `spinscope evaluate dataset --out FOLDER` writes a training set for learned estimators instead: windows of logo
+    events on simulated balls with their true spin.
     """
     from spinscope.pipeline.evaluation import SceneChoices
     from spinscope.pipeline.session import Choices
@@ -77,6 +91,17 @@ def evaluate(
     choices, scene = Choices(preset, assignments, rivals=rivals), SceneChoices(ball, lens_mm)
     if check is not None:
         raise click.exceptions.Exit(running.check_folder(check, choices))
+    if (suites == (DATASET,)) != (out is not None):
+        raise click.UsageError(
+            f"`spinscope evaluate {DATASET} --out FOLDER` writes a training set: give both, or neither"
+        )
+    if out is not None:
+        with ProgressBar() as bar:
+            said = running.make_training_set(
+                out, shards=shards, seed=seed, workers=workers, cluster=cluster, choices=choices, on_progress=bar
+            )
+        note(said)
+        return
     if not suites:
         raise click.UsageError("name a suite: `spinscope evaluate --list` lists them")
     if real is not None and quick:
