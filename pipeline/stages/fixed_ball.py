@@ -39,6 +39,9 @@ LEAST_SPAN = 1 / 3
 # Share of the directions in which the path must reach the circle: it does in 0.4 to 1 of them on spinners, in 0.11
 # to 0.14 where a bend of a swinging arm was taken for a limb (simulated, seeds 901 and 902, and the samples).
 LEAST_SCORE = 0.25
+# Points of a hull that decide on its circle, evenly spaced: all of a ball of 40 px. All circles through three corners
+# of a disc as large as the image would take 30 GB.
+MOST_CORNERS, MOST_BORDER = 40, 400
 # Smallest path that could be told from a hot spot.
 LEAST_RADIUS_PX = 3.0
 REMEDY = "give the circle instead: --fixed-ball X_PX Y_PX RADIUS_PX"
@@ -132,9 +135,10 @@ def _limb(x_px: Floats, y_px: Floats, radius_min_px: float, radius_max_px: float
 
     Every circle through three corners of the convex hull is tried; the best is fitted to what lies on it.
     """
-    corners, border = _hull(x_px, y_px)
-    if len(corners) < 3:
+    every_corner, every_border = _hull(x_px, y_px)
+    if len(every_corner) < 3:
         return None
+    corners, border = _evenly(every_corner, MOST_CORNERS), _evenly(every_border, MOST_BORDER)
     threes = np.array(list(combinations(range(len(corners)), 3)))
     centre, radius = _through(*(corners[threes[:, k]] for k in range(3)))
     sane = (radius >= radius_min_px) & (radius <= radius_max_px)
@@ -151,7 +155,7 @@ def _limb(x_px: Floats, y_px: Floats, radius_min_px: float, radius_max_px: float
     best = int(np.argmax(lying - pull**2 / np.maximum(lying, 1)))
     answer = np.append(centre[best], radius[best])
     for _ in range(5):
-        ray = border - answer[:2]
+        ray = every_border - answer[:2]
         distance = np.hypot(*ray.T)
         near = np.abs(distance - answer[2]) < ON_LIMB_PX
         if np.count_nonzero(near) < 5:
@@ -160,7 +164,7 @@ def _limb(x_px: Floats, y_px: Floats, radius_min_px: float, radius_max_px: float
         answer = answer + np.linalg.lstsq(design, distance[near] - answer[2], rcond=None)[0]
     if not radius_min_px <= answer[2] <= radius_max_px:
         return None
-    angle = np.arctan2(*(border[near] - answer[:2]).T[::-1]) % (2 * math.pi)
+    angle = np.arctan2(*(every_border[near] - answer[:2]).T[::-1]) % (2 * math.pi)
     score = np.unique((angle * 18 / math.pi).astype(np.int64)).size / 36
     # Points of a border are not independent: the logo's own shape bends it over about sixteen pixels.
     spread = 4 * PIXEL_STD_PX * np.sqrt(np.diag(np.linalg.pinv(design.T @ design)))
@@ -187,6 +191,11 @@ def _hull(x_px: Floats, y_px: Floats) -> tuple[Floats, Floats]:
         steps = max(1, round(float(np.hypot(*(end - start)))))
         pieces.append(start + (end - start) * (np.arange(steps) / steps)[:, None])
     return corners, np.concatenate(pieces)
+
+
+def _evenly(points: Floats, most: int) -> Floats:
+    """As many of these points (n, 2) at the most, evenly spaced."""
+    return points[np.linspace(0, len(points), min(most, len(points)), endpoint=False).astype(np.int64)]
 
 
 def _left(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:

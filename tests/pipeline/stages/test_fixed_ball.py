@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +50,19 @@ def test_a_dot_on_a_turning_disc_is_a_ball(path_px: float, dot_px: float, rps: f
     (shot,) = result.shots
     assert shot.best == "contrast"
     assert shot.estimates["contrast"].vector_rps == pytest.approx([0, 0, rps], abs=0.4)
+
+
+def test_a_disc_as_large_as_the_image_is_found_in_bounded_memory() -> None:
+    angle = np.linspace(0, 2 * math.pi, 20_000)
+    x, y = np.round(640.3 + 350 * np.cos(angle)), np.round(360.6 + 350 * np.sin(angle))
+    tracemalloc.start()
+    found = _limb(x, y, 3.0, 360.0)
+    peak_bytes = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert found is not None and peak_bytes < 400e6
+    circle, _ = found
+    assert (circle.x_px, circle.y_px) == (pytest.approx(640.3, abs=0.3), pytest.approx(360.6, abs=0.3))
+    assert circle.radius_px == pytest.approx(350 * (1 + CLOSED_SHORT[0]), abs=1)
 
 
 @pytest.mark.parametrize("name", ["flight_back", "flight_slow_top", "flight_two_balls", "flight_side"])
