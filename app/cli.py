@@ -55,19 +55,24 @@ for _command in COMMANDS:
 
 
 def main() -> None:
-    """Run the command line; our errors and click's become one line on standard error and exit status 2."""
+    """Run the command line of this process."""
     prepare_streams()
     exit_on_signals()
     announce_compilation()
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: list[str]) -> int:
+    """Run a command and return its exit status; our errors and click's become one line on standard error and 2."""
     try:
-        cli.main(join_fixed_ball(sys.argv[1:]), prog_name="spinscope", standalone_mode=False)
+        cli.main(join_fixed_ball(arguments), prog_name="spinscope", standalone_mode=False)
         sys.stdout.flush()
     except SpinscopeError as error:
         message = str(error)
     except click.exceptions.Exit as error:
-        sys.exit(error.exit_code)
+        return error.exit_code
     except click.Abort:
-        sys.exit(130)
+        return 130
     except click.ClickException as error:
         message = " ".join(error.format_message().split())
         context = getattr(error, "ctx", None)
@@ -75,13 +80,13 @@ def main() -> None:
             message += f" (`{context.command_path} --help` explains)"
     except BrokenPipeError:
         sys.stderr.close()
-        sys.exit(0)
+        return 0
     except OSError as error:
         if error.errno not in FULL_DISK:
             raise
         drop_output()
         message = f"the output cannot be written ({error.strerror}): check free space"
     else:
-        return
+        return 0
     note(f"spinscope: {message}")
-    sys.exit(2)
+    return 2

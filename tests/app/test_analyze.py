@@ -1,4 +1,4 @@
-"""`analyze` against the contract's schema and the simulator's truth, through the real command line."""
+"""`analyze` against the contract's schema and the simulator's truth, as a process and in this one."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from spinscope.pipeline.recordings import open_recording, write_recording
 from spinscope.pipeline.result_rows import shot_rows
 from spinscope.pipeline.session import Choices, Session
 from spinscope.pipeline.stages.logo import LogoParameters
+from tests.command_line import spinscope
 
 SCHEMA = json.loads((Path(__file__).parent / "analyze.schema.json").read_text(encoding="utf-8"))
 FLIGHTS = (
@@ -37,14 +38,10 @@ FLIGHTS = (
 )
 
 
-def spinscope(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "spinscope", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
-
-
 @pytest.fixture(scope="module")
 def reports(samples: Path) -> dict[str, dict[str, Any]]:
-    done = spinscope("analyze", *(samples / f"{name}.h5" for name in FLIGHTS), "--json", "-")
+    command = [sys.executable, "-m", "spinscope", "analyze", *(str(samples / f"{name}.h5") for name in FLIGHTS)]
+    done = subprocess.run([*command, "--json", "-"], capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 0, done.stderr
     return dict(zip(FLIGHTS, map(json.loads, done.stdout.splitlines()), strict=True))
 

@@ -1,21 +1,15 @@
-"""`spinscope info` through the real command line."""
+"""`spinscope info` from the command line."""
 
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 
 from spinscope.pipeline.recordings import write_recording
+from tests.command_line import spinscope
 from tests.pipeline.recordings.test_recordings_raw import moving_edge
-
-
-def spinscope(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "spinscope", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
 
 
 def test_the_users_sensor_beats_the_guess(tmp_path: Path) -> None:
