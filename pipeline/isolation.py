@@ -106,11 +106,9 @@ def without_time_limit() -> Iterator[None]:
 
     In a process without limits it does nothing.
     """
-    if _limited:
-        _lift_time_limit()
+    _lift_time_limit()
     yield
-    if _limited:
-        _limit_time()
+    _limit_time()
 
 
 def _single(function: Callable[..., Value], *arguments: Any) -> Iterator[Value]:
@@ -121,11 +119,12 @@ class _Process:
     """The caller's side of one process."""
 
     def __init__(self) -> None:
+        self._silence_s = MAX_SILENCE_S
         path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
         try:
             self._process = subprocess.Popen(
                 # -P: what lies in the working folder is not imported.
-                [sys.executable, "-P", "-c", f"from {__name__} import serve; serve()"],
+                [sys.executable, "-P", "-c", f"from {__name__} import serve; serve({MAX_CPU_S}, {MAX_SILENCE_S})"],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
@@ -185,7 +184,7 @@ class _Process:
     def _end_in_words(self) -> str:
         status = self._process.wait()
         if status == SILENT_EXIT:
-            return f"reading it makes no progress for {MAX_SILENCE_S:g} s"
+            return f"reading it makes no progress for {self._silence_s:g} s"
         if hasattr(signal, "SIGXCPU") and status == -signal.SIGXCPU:
             return f"reading it makes no progress in {MAX_CPU_S} s of computing"
         return f"reading it crashes the library (exit status {status})"
@@ -225,13 +224,19 @@ if hasattr(os, "register_at_fork"):  # a copy of this process must not talk to t
     os.register_at_fork(after_in_child=_idle.clear)
 
 
-_limited = False  # whether this process is one with limits
+_limits: tuple[int, float] | None = None  # CPU time and time in seconds; None where this process has no limits
 
 
-def serve() -> None:
-    """Answer calls on standard input until it ends; the main program of the process."""
-    global _limited
-    _limited = True
+def serve(cpu_s: int, silence_s: float) -> None:
+    """Answer calls on standard input until it ends; the main program of the process.
+
+    Parameters
+    ----------
+    cpu_s, silence_s : int, float
+        CPU time and time in seconds without progress after which the process ends.
+    """
+    global _limits
+    _limits = (cpu_s, silence_s)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the caller's, who then closes the pipe
     requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     with open(os.devnull, "r+b") as nothing:  # a library that prints must not disturb the answers
@@ -300,14 +305,19 @@ def _time_limit() -> Iterator[None]:
 
 
 def _limit_time() -> None:
-    """Limit the CPU time and the time from now on; the signals of both end the process without asking Python."""
-    faulthandler.dump_traceback_later(MAX_SILENCE_S, exit=True)
+    """Limit the CPU time and the time from now on; both end the process without asking Python."""
+    if _limits is None:
+        return
+    cpu_s, silence_s = _limits
+    faulthandler.dump_traceback_later(silence_s, exit=True)
     if resource is not None:
         used = resource.getrusage(resource.RUSAGE_SELF)
-        _set_soft_limit(resource.RLIMIT_CPU, math.ceil(used.ru_utime + used.ru_stime) + MAX_CPU_S - 1)
+        _set_soft_limit(resource.RLIMIT_CPU, math.ceil(used.ru_utime + used.ru_stime) + cpu_s - 1)
 
 
 def _lift_time_limit() -> None:
+    if _limits is None:
+        return
     faulthandler.cancel_dump_traceback_later()
     if resource is not None:
         _set_soft_limit(resource.RLIMIT_CPU, resource.RLIM_INFINITY)

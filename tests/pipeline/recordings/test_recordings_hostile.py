@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 import pytest
 
+from spinscope.pipeline import isolation
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.recordings import open_recording, write_recording
 from spinscope.pipeline.simulated_recordings import DESCRIPTION, description_in
@@ -117,9 +118,15 @@ def test_harm_is_refused_in_bounded_time_and_memory(tmp_path: Path, harm: str) -
     assert "\n" not in str(refused.value) and str(tmp_path) in str(refused.value)
 
 
-def test_others_are_served_while_a_library_loops(samples: Path) -> None:
+def test_others_are_served_while_a_library_loops(samples: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As in the page's server, where each request is a thread."""
+    processes: list[isolation._Process] = []
     failed: list[RecordingError] = []
+
+    class KnownProcess(isolation._Process):
+        def __init__(self) -> None:
+            super().__init__()
+            processes.append(self)
 
     def open_hanging() -> None:
         try:
@@ -127,9 +134,18 @@ def test_others_are_served_while_a_library_loops(samples: Path) -> None:
         except RecordingError as error:
             failed.append(error)
 
+    isolation._end_idle()
+    monkeypatch.setattr(isolation, "_Process", KnownProcess)
+    monkeypatch.setattr(isolation, "MAX_CPU_S", 600)  # until it is ended here
+    monkeypatch.setattr(isolation, "MAX_SILENCE_S", 600.0)
     thread = threading.Thread(target=open_hanging)
     thread.start()
-    assert len(open_recording(samples / "spinner_ball2_side.h5").read()) > 1000 and not failed
+    while not processes:
+        time.sleep(0.001)
+    assert len(open_recording(samples / "spinner_ball2_side.h5").read()) > 1000
+    assert thread.is_alive()
+    for process in processes:
+        process.end()
     thread.join()
     assert failed
 
