@@ -25,6 +25,7 @@ EVENT_PACKET = (
     "std_msgs/Header header\nuint32 height\nuint32 width\nuint64 seq\nuint64 time_base\nstring encoding\n"
     "bool is_bigendian\nuint8[] events"
 )
+EPOCH_US = 1_790_000_000_000_000  # a ROS clock's time in 2026
 PARTS = ((0, 1), (1, 1), (1, 4), (4, 150), (150, 300))  # events of each message
 
 
@@ -110,7 +111,8 @@ def mono(events: EventBatch) -> list[tuple[int, bytes]]:
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("package", ["dvs_msgs", "prophesee_event_msgs"])
 def test_messages_of_one_structure_an_event_are_read(tmp_path: Path, kind: str, package: str) -> None:
-    events = moving_edge(300)
+    edge = moving_edge(300)
+    events = EventBatch(edge.t_us + EPOCH_US, *edge.columns[1:])
     path = write_bag(tmp_path, kind, {"/camera": arrays(store(kind), kind, events, package)})
     recording = open_recording(path)
     assert_same_events(recording.read(), events)
