@@ -207,6 +207,7 @@ def test_two_processes_make_the_same_table(folder: Path) -> None:
     assert Path("one.ticks.csv").read_bytes() == Path("two.ticks.csv").read_bytes()
 
 
+@pytest.mark.slow  # test_tasks.py has a cluster, and the test above other processes
 @pytest.mark.filterwarnings("ignore")  # Dask's own
 @pytest.mark.filterwarnings("default")  # Dask warns of slow machines
 def test_two_workers_of_a_dask_cluster_make_the_same_table(folder: Path) -> None:

@@ -214,6 +214,14 @@ def test_recent_events_are_bounded() -> None:
     assert not len(recent.between(1, 0, 20_000_000))
 
 
+def test_recent_events_are_bounded_in_number(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("spinscope.pipeline.cameras.recent_events.KEPT_EVENTS", 10)
+    recent = RecentEvents()
+    for t_us in range(25):
+        recent(0, EventBatch.checked([t_us], [1], [1], [True], width_px=4, height_px=4))
+    assert recent.between(0, 0, 100).t_us.tolist() == list(range(15, 25))
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

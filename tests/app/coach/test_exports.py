@@ -142,6 +142,24 @@ def test_the_flight_is_where_it_was(sample: ShotSession) -> None:
         assert np.ptp(np.array(free.points_m)[:, 0]) == pytest.approx(np.ptp(points[:, 0]), rel=0.02)
 
 
+def test_a_flight_from_the_far_end_is_turned_with_the_table() -> None:
+    share = np.linspace(0, 1, 11)
+    places = {"x_m": 1 - 2 * share, "y_m": 0.3 + 0.2 * share, "z_m": 0.3 + 0.4 * share * (1 - share)}
+    path = {"t_us": (100_000 * share).tolist(), **{name: column.tolist() for name, column in places.items()}}
+    detail = {"path": path, "hitter": np.eye(3).tolist(), "depth_std_m": 0.01, "line_of_sight": [0, 0, 1]}
+    pose = {"axes": np.eye(3).tolist(), "camera_m": [0, 0, 0]}
+    found = flight_path({"start_us": 0, "end_us": 100_000, "ended_by": "bounce"}, detail, pose)
+    assert found is not None
+    assert found.points_m[0] == pytest.approx((-1, -0.3, 0.3)) and found.points_m[-1] == pytest.approx((1, -0.5, 0.3))
+    assert found.landing_m == pytest.approx((1, -0.5))
+    assert found.net_clearance_m == pytest.approx(0.4 - 0.02 - 0.1525)
+
+
+def test_words_have_the_chosen_units() -> None:
+    assert ShotWords("en", "rpm").spin(50.0) == "3000 rpm" and ShotWords().spin(50.0) == "50 rps"
+    assert ShotWords("de", speed_unit="m_s").speed(14.04) == "14,0 m/s" and ShotWords().speed(10.0) == "36 km/h"
+
+
 @pytest.mark.parametrize("pose", [None, {}, {"axes": [[1, 0, 0]] * 3, "camera_m": [0, 0, 2]}, {"axes": 3}])
 def test_a_pose_that_is_none_is_refused(pose: Any) -> None:
     with pytest.raises(ParameterError, match="pose"):

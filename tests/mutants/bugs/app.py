@@ -204,7 +204,12 @@ COACH = [
         "points[:, :1] *= -1",
         "tests/app/coach/test_exports.py -k flight",
     ),
-    Mutant("app/coach/shot_words.py", "rpm(spin_rps):.0f} {self.text", "spin_rps:.0f} {self.text", "tests/app/coach"),
+    Mutant(
+        "app/coach/shot_words.py",
+        "rpm(spin_rps):.0f} {self.text",
+        "spin_rps:.0f} {self.text",
+        "tests/app/coach/test_exports.py -k words",
+    ),
     Mutant(
         "app/coach/logo_texture.py",
         "folded_y = np.where(under, (1 - np.abs(x)) * np.where(y < 0, -1, 1), y)",

@@ -129,6 +129,21 @@ def test_work_that_cannot_keep_up_misses_ticks_but_sinks_do_not() -> None:
     assert len(notices) == 1 and "cannot keep up" in notices[0]
 
 
+def test_when_the_work_has_caught_up_another_segment_begins() -> None:
+    stream = EventStream(ListedPackets([]), TICK_US)
+    packets = [CameraPacket(at(n * TICK_US), n * TICK_US) for n in range(5003)]
+    for packet in packets[:5000]:
+        stream._take(packet)
+    before = [stream._ticks.get() for _ in range(stream.waiting - 1)]
+    stream._take(packets[5000])
+    assert stream.waiting == 1, "one is still to be worked on"
+    before.append(stream._ticks.get())
+    for packet in packets[5001:]:
+        stream._take(packet)
+    after = [stream._ticks.get() for _ in range(stream.waiting)]
+    assert {tick.segment for tick in before if tick} == {0} and [tick.segment for tick in after if tick] == [1, 1]
+
+
 def test_biases_are_set_by_the_reading_thread() -> None:
     notices: list[str] = []
     camera = ListedPackets([CameraPacket(at(100), 100)])

@@ -148,7 +148,7 @@ def test_packets_time_outs_and_counts(library: Any) -> None:
             (status(1000), packet((990, 5, 6, True), (1000, 1279, 719, False))),
             (SimpleNamespace(ring=None), None),
             (status(3000, dropped=3), SimpleNamespace(polarity_events=None)),
-            (status(2500, dropped=4), packet((3100, 1280, 0, True), (3200, 0, 0, True))),
+            (status(2500, dropped=4), packet((3100, 1280, 0, True), (3150, 0, 720, True), (3200, 0, 0, True))),
         ]
     )
     camera = open_camera()
@@ -158,7 +158,7 @@ def test_packets_time_outs_and_counts(library: Any) -> None:
     assert [column.dtype.str for column in first.events.columns] == ["<i8", "<u2", "<u2", "|b1"]
     assert [one.end_us for one in (first, nothing, empty, last)] == [1000, 1000, 3000, 3200]
     assert [one.dropped for one in (first, nothing, empty, last)] == [0, 0, 3, 1]
-    assert last.outside == 1 and last.events.t_us.tolist() == [3200]
+    assert last.outside == 2 and last.events.t_us.tolist() == [3200]
     assert camera.read() is None
 
 

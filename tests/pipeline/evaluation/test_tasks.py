@@ -102,6 +102,7 @@ def test_local_processes_do_the_work(tmp_path: Path) -> None:
     assert not CALLS  # not in this process
 
 
+@pytest.mark.slow  # tests/app/test_batch.py kills a command with its workers
 def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
     """Also when it is killed and cannot stop them."""
     script = (
