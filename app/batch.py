@@ -60,6 +60,11 @@ class BatchWork:
     overwrite: bool = False
 
     @property
+    def methods(self) -> tuple[str, ...]:
+        """Names of the methods asked for, "all" among them."""
+        return (self.method, *self.choices.rivals)
+
+    @property
     def settings_hash(self) -> str:
         """Hash of all options that the results depend on."""
         choices = self.choices
@@ -137,9 +142,9 @@ def write_tables(journal: ResultJournal, work: BatchWork) -> None:
             }
             yield from (about | row for row in entry.rows(kind))
 
-    write_table(work.table, shot_columns(), rows("shots"))
+    write_table(work.table, shot_columns(work.methods), rows("shots"))
     if work.series is not None:
-        write_table(work.series, tick_columns(), rows("ticks"))
+        write_table(work.series, tick_columns(work.methods), rows("ticks"))
 
 
 def recording_rows(context: TaskContext, path: Path, line: dict[str, Any], work: BatchWork) -> list[Row]:

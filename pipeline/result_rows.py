@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -57,20 +58,27 @@ _TICK: dict[str, type] = {
 }
 
 
-def shot_columns() -> dict[str, type]:
-    """Name and type of each column of `shot_rows`, with the provenance before and what went wrong behind."""
+def shot_columns(run: Collection[str] = ()) -> dict[str, type]:
+    """Name and type of each column of `shot_rows`, with the provenance before and what went wrong behind.
+
+    `run` names the methods that were asked for: rivals have columns only where they are among them.
+    """
     columns = {**PROVENANCE, **_SHOT, **dict.fromkeys((*_SPIN, *_STATED, *_PARTS, *_TRUE, *_ERRORS), float)}
     columns["truth_from"] = str
-    for method in methods():
-        columns |= {f"{method.name}_{name}": float for name in (*_SPIN, *_STATED, *_ERRORS)}
-        columns[f"{method.name}_reason"] = str
+    for method in _method_names(run):
+        columns |= {f"{method}_{name}": float for name in (*_SPIN, *_STATED, *_ERRORS)}
+        columns[f"{method}_reason"] = str
     return {**columns, "no_shot_reason": str, "warnings": str, "error": str}
 
 
-def tick_columns() -> dict[str, type]:
-    """Name and type of each column of `tick_rows`, with the recording before."""
-    estimates = {f"{method.name}_{name}": float for method in methods() for name in (*_SPIN, *_STATED)}
+def tick_columns(run: Collection[str] = ()) -> dict[str, type]:
+    """Name and type of each column of `tick_rows`, with the recording before; `run` as of `shot_columns`."""
+    estimates = {f"{method}_{name}": float for method in _method_names(run) for name in (*_SPIN, *_STATED)}
     return {"recording": str, **_TICK, **estimates}
+
+
+def _method_names(run: Collection[str]) -> list[str]:
+    return [method.name for method in methods() if not method.is_rival or method.name in run]
 
 
 def shot_rows(result: Result) -> list[ResultRow]:

@@ -127,7 +127,7 @@ def run_headless(
     SpinscopeError
         For what cannot be opened or written.
     """
-    table = None if to.table is None else ShotTable(to.table)
+    table = None if to.table is None else ShotTable(to.table, method)
     camera, session, reopen = open_live(chosen, choices)
     warm_up()
     with ExitStack() as at_end:

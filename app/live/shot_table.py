@@ -38,6 +38,8 @@ class ShotTable:
     ----------
     path : Path
         The table. Events are saved in the folder NAME_shots beside it.
+    method : str
+        Name of the spin method that is run, or "all".
 
     Raises
     ------
@@ -47,9 +49,9 @@ class ShotTable:
         For a table that cannot be written or was not written by this program.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, method: str = "all") -> None:
         check_table_name(path)
-        self.path, self.columns = path, {**LIVE_COLUMNS, **shot_columns()}
+        self.path, self.columns = path, {**LIVE_COLUMNS, **shot_columns([method])}
         self.folder = events_folder(path)
         is_parquet = path.suffix.lower() == ".parquet"
         self._rows = path.with_name(f"{path.name}.rows.jsonl") if is_parquet else path

@@ -77,7 +77,8 @@ def rows_of_both_presets(result: Result, truth: Truth | StatedTruth, about: Row)
     of_paper = preset("paper").with_groups(camera=session.parameters.camera, ball=session.parameters.ball)
     track = session.parameters.track
     circle = {name: getattr(track, name) for name in track.tunables() if name == "ball" or name.startswith("fixed_")}
-    paper = replace(session, parameters=of_paper.with_values({"track": circle})).estimate(PAPER_METHOD)
+    chain = Chain(session.source)  # without rivals
+    paper = replace(session, parameters=of_paper.with_values({"track": circle}), chain=chain).estimate(PAPER_METHOD)
     about_paper = {**about, "method": PAPER_PRESET}
     return [*estimate_rows(result, truth, about), _estimate_row(paper, PAPER_METHOD, truth, about_paper)]
 

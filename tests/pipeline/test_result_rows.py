@@ -57,6 +57,14 @@ def test_every_column_is_declared_with_its_type(two_balls: Result) -> None:
                 assert name in columns and (value is None or type(value) is columns[name]), name
 
 
+def test_rivals_have_columns_where_they_were_named() -> None:
+    for columns in (shot_columns, tick_columns):
+        assert not [name for name in columns() if name.startswith("eeppr_")]
+        named = columns(["all", "eeppr"])
+        assert set(named) > set(columns()) and named["eeppr_magnitude_rps"] is float
+        assert not [name for name in named if name.startswith("s_cmax_")]
+
+
 def test_ticks_of_a_shot_end_with_its_result(two_balls: Result) -> None:
     rows = tick_rows(two_balls)
     for number, (shot, row) in enumerate(zip(two_balls.shots, shot_rows(two_balls), strict=True), start=1):

@@ -20,7 +20,7 @@ def rival(
     state: Callable[[str, SpinParameters, Context], Any],
     reads: tuple[str, ...] = (),
 ) -> SpinMethod:
-    """A method that is run only when it is named and never trusted.
+    """Declare a method of another publication, run only when named and never trusted.
 
     Parameters
     ----------
