@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice
@@ -407,7 +407,8 @@ class Chain:
         Parameters
         ----------
         tracked : iterable of Tick
-            With the results of the recording that stages of one ball need; from the first tick on, without gaps.
+            With the results of the recording that stages of one ball need; from the first tick on, without gaps. Where
+            their balls have results already, those are taken.
         parameters, targets, forget
             As of `run`.
         """
@@ -415,7 +416,8 @@ class Chain:
         of_ball = [stage for stage in stages if stage.scope == "ball"]
         run = _Run(self, parameters, self.keys(parameters), set(forget), self.seconds)
         for index, tick in enumerate(tracked):
-            yield from run.answered(of_ball, [(index, {**tick.results, "packet": tick.packet})])
+            of_recording = {name: made for name, made in tick.results.items() if STAGES[name].scope == "recording"}
+            yield from run.answered(of_ball, [(index, {**of_recording, "packet": tick.packet})], [tick.balls])
 
     def _packet(self, tick_us: int, index: int) -> Packet:
         number = self.source.start_us // tick_us + index
@@ -550,13 +552,23 @@ class _Run:
         self._evidence = {ball.shot: rows[-1].evidence for ball, rows in zip(track.balls, balls, strict=True)}
         return balls
 
-    def answered(self, of_ball: list[Stage], rows: list[tuple[int, dict[str, Any]]]) -> Iterator[Tick]:
-        """Ticks of rows (index, results of the recording), each with the results of its balls."""
+    def answered(
+        self,
+        of_ball: list[Stage],
+        rows: list[tuple[int, dict[str, Any]]],
+        known: Sequence[tuple[BallTick, ...]] = (),
+    ) -> Iterator[Tick]:
+        """Ticks of rows (index, results of the recording), each with the results of its balls, `known` among them."""
         balls = [self.balls_of(index, results) for index, results in rows]
+        for flying, made in zip(balls, known, strict=False):
+            for ticks_of_ball, ball in zip(flying, made, strict=False):
+                for one, done in zip(ticks_of_ball, (*ball.earlier, ball), strict=True):
+                    one.values.update(done.results)
         for stage in of_ball:
             for one in (one for flying in balls for ticks_of_ball in flying for one in ticks_of_ball):
-                column = self.column(stage, one.values["ball"].shot, one.index)
-                one.values[stage.name] = self.result(stage, column, one.index, one.values)
+                if stage.name not in one.values:
+                    column = self.column(stage, one.values["ball"].shot, one.index)
+                    one.values[stage.name] = self.result(stage, column, one.index, one.values)
         for (_, results), flying in zip(rows, balls, strict=True):
             yield self.tick(of_ball, results, flying)
         self.let_go_of_ended_shots()

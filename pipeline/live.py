@@ -41,9 +41,13 @@ STATUS_S = 1.0
 # Ticks with a ball that wait for their spins, at the most; then the tracker waits, too: 3 s of flight at 200 Hz, which
 # at 5 Mev/s is some 600 MB. Ticks without a ball are next to nothing.
 MOST_FLYING = 600
+MOST_HELD = 100  # ticks held back from the final spins while a ball is in flight: longer than most shots
+ROOM_S = 0.1  # between two looks whether the run is over while the tracker waits for room
 ARRIVALS_KEPT = 4000  # ticks whose arrival is remembered: 20 s at 200 Hz, longer than any shot's end takes to be known
-# Shares of a core that several threads want: of the spin so far a half of the tracker's, of the final one a tenth.
-SO_FAR_NICENESS, FINAL_NICENESS = 3, 10
+# Python lets a thread run for 5 ms while another waits; with the tick's work in five threads that is many ticks.
+SWITCH_S = 0.0005
+# A half and a third of the tracker's share where they want one core.
+SO_FAR_NICENESS, FINAL_NICENESS = 3, 5
 # Results of the recording that stages of one ball need: a full frame a tick would fill the memory behind a slow spin.
 NEEDED_BY_BALLS = frozenset({"track"}).union(*(stage.inputs for stage in STAGES if stage.scope == "ball"))
 
@@ -139,12 +143,13 @@ class LiveRun:
         self.stream = stream(parameters.track.tick_us, lambda text: self._outputs.put(LiveNotice(text)))
         self.parameters = parameters
         self._targets, self._with_balls, self._on_tick = method_targets(method), with_balls, on_tick
-        needed = needed_stages(self._targets)
-        self._quick = tuple(stage.name for stage in needed if stage.name in quick_stages())
-        self._has_contrast = "contrast" in {stage.name for stage in needed}
+        needed = {stage.name for stage in needed_stages(self._targets)}
+        self._has_contrast = "contrast" in needed
+        # Beside contrast maximisation only what it asks for: each further stage has it come later.
+        so_far = STAGES["contrast"].inputs if self._has_contrast else needed
+        self._quick = tuple(stage.name for stage in needed_stages(so_far) if stage.name in quick_stages())
         self._tracked: queue.SimpleQueue[_Tracked | None] = queue.SimpleQueue()
-        self._flying: queue.SimpleQueue[_Tracked | None] = queue.SimpleQueue()
-        self._has_told_so_far = threading.Event()
+        self._told: queue.SimpleQueue[_Tracked | None] = queue.SimpleQueue()
         self._room = threading.Semaphore(MOST_FLYING)
         self._latencies_ms: deque[float] = deque()
         self._arrivals: deque[tuple[int, float]] = deque(maxlen=ARRIVALS_KEPT)  # (end of the tick, its arrival)
@@ -157,6 +162,8 @@ class LiveRun:
             threading.Thread(target=self._guarded, args=(work,), name=name, daemon=True)
             for name, work in (("tracker", self._track), ("spin so far", self._spin_so_far), ("spin", self._spin))
         ]
+        switch_s = sys.getswitchinterval()
+        sys.setswitchinterval(SWITCH_S)
         self.stream.start()
         for thread in threads:
             thread.start()
@@ -182,6 +189,7 @@ class LiveRun:
             for thread in threads:
                 thread.join()
             self.stream.join()
+            sys.setswitchinterval(switch_s)
         yield self._status(STATUS_S - max(next_status_s - now_s(), 0.0))
 
     def stop(self) -> None:
@@ -221,7 +229,6 @@ class LiveRun:
                 while not coming.ended:
                     for _ in coming.segment():
                         pass
-            self._flying.put(None)
             self._tracked.put(None)
 
     def _new_chain(self) -> Chain:
@@ -251,58 +258,69 @@ class LiveRun:
             if self._on_tick is not None:
                 self._on_tick(one, tick, latency_ms)
             arrived = replace(one, packet=_without_events(one.packet))
-            row = _Tracked(arrived, chain, parameters, self._kept(tick))
-            self._flying.put(row)
-            self._tracked.put(row)
+            self._tracked.put(_Tracked(arrived, chain, parameters, self._kept(tick)))
 
     def _kept(self, tick: Tick) -> Tick:
         """The part of a tick that the spins need, as soon as there is room for it."""
         if not tick.track.balls:
             return Tick({"track": tick.track}, _without_events(tick.packet), ())
-        self._room.acquire()
+        while not self._room.acquire(timeout=ROOM_S) and not self._abandoned.is_set():
+            pass
         needed = {name: tick.results[name] for name in tick.results if name in NEEDED_BY_BALLS}
         return Tick(needed, tick.packet, ())
 
-    def _taken(self) -> Iterator[_Tracked]:
-        """The tracked ticks, in order."""
-        while (row := self._tracked.get()) is not None:
-            if row.tick.track.balls:
-                self._room.release()
-            yield row
-
     def _spin_so_far(self) -> None:
-        """Tell the spins of shots in flight, and of those that end, segment by segment."""
+        """Tell the spins of shots in flight, and of those that end; hands its ticks on, whatever comes."""
         _yield_to_others(SO_FAR_NICENESS)
+        coming = iter(self._tracked.get, None)
         try:
-            for _, rows in groupby(iter(self._flying.get, None), lambda row: row.chain):
+            for _, rows in groupby(coming, lambda row: row.chain):
                 self._follow_segment(rows)
         finally:
-            self._has_told_so_far.set()
+            for row in coming:
+                self._told.put(row)
+            self._told.put(None)
 
     def _follow_segment(self, rows: Iterator[_Tracked]) -> None:
         first = next(rows)
-        spins, chain = SpinsInFlight(), self._new_chain()
-        contrast = ContrastInFlight(first.parameters, chain, spins)
+        spins = SpinsInFlight()
+        contrast = ContrastInFlight(first.parameters, first.chain, spins)
         thread = threading.Thread(target=self._contrast_so_far, args=(contrast,), name="contrast so far", daemon=True)
-        if self._has_contrast:
-            thread.start()
-        log, one = ShotLog(), first.arrived
-        for one, tick in self._answered(first, rows, chain, self._quick):
-            for ball in tick.balls:
+        thread.start()
+        try:
+            self._tell(first, rows, spins, contrast)
+        finally:
+            contrast.close()
+            thread.join()
+
+    def _tell(
+        self, first: _Tracked, rows: Iterator[_Tracked], spins: SpinsInFlight, contrast: ContrastInFlight
+    ) -> None:
+        """Tell the spins so far of one segment, and hand its ticks on."""
+        log, row, held = ShotLog(), first, list[_Tracked]()
+        for row in self._answered(first, rows, first.chain, self._quick):
+            for ball in row.tick.balls:
                 spins.add_tick(ball)
                 if self._with_balls:
-                    latency_ms = (now_s() - one.first_s) * 1e3
-                    self._put_spin(spins, ball.track.shot, tick.packet.end_us, None, latency_ms)
+                    latency_ms = (now_s() - row.arrived.first_s) * 1e3
+                    self._put_spin(spins, ball.track.shot, ball.packet.end_us, None, latency_ms)
             if self._has_contrast:
-                contrast.put(tick.balls)
-            log.add(tick)
-            self._announce(log, spins, one)
-            spins.keep_only(ball.track.shot for ball in tick.balls)
+                contrast.put(row.tick.balls)
+            log.add(row.tick)
+            self._announce(log, spins, row.arrived)
+            spins.keep_only(ball.track.shot for ball in row.tick.balls)
+            held.append(row)
+            if not row.tick.balls or len(held) == MOST_HELD:
+                self._hand_on(held)
         log.close()
-        self._announce(log, spins, one)
-        contrast.close()
-        if self._has_contrast:
-            thread.join()
+        self._announce(log, spins, row.arrived)
+        self._hand_on(held)
+
+    def _hand_on(self, held: list[_Tracked]) -> None:
+        """Let the final spins be worked on, which share Python's lock, when no ball is in flight."""
+        for row in held:
+            self._told.put(row)
+        held.clear()
 
     def _contrast_so_far(self, contrast: ContrastInFlight) -> None:
         _yield_to_others(SO_FAR_NICENESS)
@@ -310,19 +328,19 @@ class LiveRun:
 
     def _answered(
         self, first: _Tracked, rows: Iterator[_Tracked], chain: Chain, targets: tuple[str, ...]
-    ) -> Iterator[tuple[ArrivedTick, Tick]]:
-        """Ticks of one segment with the results of the stages of one ball."""
-        at_work = deque[ArrivedTick]()
+    ) -> Iterator[_Tracked]:
+        """The rows of one segment with the results of stages of one ball."""
+        at_work = deque[_Tracked]()
 
         def tracked() -> Iterator[Tick]:
             for row in joined([first], rows):
                 if self._abandoned.is_set():
                     return
-                at_work.append(row.arrived)
+                at_work.append(row)
                 yield row.tick
 
         for tick in chain.answer(first.parameters, tracked(), targets, forget=STAGES.names):
-            yield at_work.popleft(), tick
+            yield at_work.popleft()._replace(tick=tick)
 
     def _announce(self, log: ShotLog, spins: SpinsInFlight, arrived: ArrivedTick) -> None:
         for shot in log.take_ended():
@@ -345,17 +363,23 @@ class LiveRun:
         finally:
             for _ in coming:
                 pass
-            self._has_told_so_far.wait()
             self._outputs.put(None)
+
+    def _taken(self) -> Iterator[_Tracked]:
+        """The ticks whose spins so far are told, in order."""
+        while (row := self._told.get()) is not None:
+            if row.tick.track.balls:
+                self._room.release()
+            yield row
 
     def _spin_segment(self, rows: Iterator[_Tracked]) -> None:
         first = next(rows)
-        log, one = ShotLog(), first.arrived
-        for one, tick in self._answered(first, rows, first.chain, self._targets):
-            log.add(tick)
-            self._put_shots(log, one)
+        log, row = ShotLog(), first
+        for row in self._answered(first, rows, self._new_chain(), self._targets):
+            log.add(row.tick)
+            self._put_shots(log, row.arrived)
         log.close()
-        self._put_shots(log, one)
+        self._put_shots(log, row.arrived)
 
     def _put_shots(self, log: ShotLog, arrived: ArrivedTick) -> None:
         for shot in log.take_ended():
@@ -380,7 +404,7 @@ class LiveRun:
             late=counts.late,
             skipped=counts.skipped,
             backlog_ms=self.stream.waiting * tick_ms,
-            spin_backlog_ms=self._tracked.qsize() * tick_ms,
+            spin_backlog_ms=(self._tracked.qsize() + self._told.qsize()) * tick_ms,
             p50_ms=p50_ms,
             p99_ms=p99_ms,
         )

@@ -7,6 +7,7 @@ estimate of the whole shot, as of a recording, follows behind.
 
 from __future__ import annotations
 
+import math
 import queue
 import threading
 from collections import deque
@@ -21,6 +22,9 @@ from .spin.contrast.parameters import FLOW_METHOD
 
 # The methods by accuracy on the evaluation's flights, best first.
 ROLLING_METHODS = ("contrast", "normal_flow", "triplet")
+# Of a shot since contrast maximisation has last answered: 20 ms at 200 Hz. More often, and the tracker, which shares
+# Python's lock, comes too late.
+FEWEST_TICKS = 4
 ANSWERS_KEPT = 40  # of each method: 200 ms, longer than any shot's end takes to be known
 
 
@@ -104,6 +108,7 @@ class ContrastInFlight:
         self._parameters, self._spins = parameters.contrast, spins
         self._context = chain.context(parameters, contrast.STAGE)
         self._states: dict[int, contrast.ContrastState] = {}
+        self._rows: dict[int, list[BallTick]] = {}  # the ticks of each shot since its last answer
         self._waiting: queue.SimpleQueue[tuple[BallTick, ...] | None] = queue.SimpleQueue()
 
     def put(self, balls: tuple[BallTick, ...]) -> None:
@@ -117,13 +122,13 @@ class ContrastInFlight:
     def work(self) -> None:
         """Body of a thread: answer until `close`."""
         while (ticks := self._taken()) is not None:
-            rows: dict[int, list[BallTick]] = {}
             for ball in (ball for balls in ticks for ball in balls):
-                rows.setdefault(ball.track.shot, []).extend((*ball.earlier, ball))
+                self._rows.setdefault(ball.track.shot, []).extend((*ball.earlier, ball))
             flying = {ball.track.shot for ball in ticks[-1]}
             self._states = {shot: state for shot, state in self._states.items() if shot in flying}
-            for shot in flying:
-                self._answer(shot, rows[shot])
+            self._rows = {shot: rows for shot, rows in self._rows.items() if shot in flying}
+            for shot in [shot for shot, rows in self._rows.items() if len(rows) >= FEWEST_TICKS]:
+                self._answer(shot, self._rows.pop(shot))
 
     def _taken(self) -> list[tuple[BallTick, ...]] | None:
         """The ticks that wait, at least one; None at the end."""
@@ -134,6 +139,8 @@ class ContrastInFlight:
 
     def _answer(self, shot: int, rows: list[BallTick]) -> None:
         state = self._states.setdefault(shot, contrast.start(self._parameters, self._context))
+        if contrast.is_settled(self._parameters, state):
+            state.full_us = math.inf  # following an answer without rivals takes a tenth of another full estimate
         *skipped, last = rows
         for ball in skipped:
             contrast.take(self._parameters, state, ball.packet, ball.track, ball.results["logo"])

@@ -64,7 +64,7 @@ class CameraView:
         self._ticks: deque[tuple[ArrivedTick, Tick]] = deque()
         self._meter = EventRateMeter()
         self._seconds: deque[LiveSecond] = deque(maxlen=SECONDS_SHOWN)
-        self._shots: dict[int, LiveShotRow] = {}
+        self._shots: dict[tuple[int, int], LiveShotRow] = {}  # by number and end: numbers begin anew after a gap
         self._notices: deque[str] = deque(maxlen=NOTICES_SHOWN)
         self._latencies_ms: dict[str, float] = {}
         self._sweep: CameraSweep | None = None
@@ -103,12 +103,14 @@ class CameraView:
                 self._notices.append(output.text)
             elif isinstance(output, LiveSpin) and output.ended_by is not None:
                 self._latencies_ms["announced"] = output.latency_ms
-                self._add_shot(LiveShotRow(number=output.shot, text=_words(output), is_final=False, recording=None))
+                key, text = (output.shot, output.t_us), _words(output)
+                self._add_shot(key, LiveShotRow(text=text, is_final=False, recording=None))
             elif isinstance(output, LiveShot) and row is not None:
                 self._latencies_ms["final"] = output.latency_ms
                 text, file = row_words(row), row["events_file"]
                 name = None if file is None else Path(str(file)).name
-                self._add_shot(LiveShotRow(number=output.shot.number, text=text, is_final=True, recording=name))
+                key = output.shot.number, output.shot.end_us
+                self._add_shot(key, LiveShotRow(text=text, is_final=True, recording=name))
 
     def end(self) -> None:
         """Take note that the camera has ended."""
@@ -137,10 +139,10 @@ class CameraView:
             )
         )
 
-    def _add_shot(self, row: LiveShotRow) -> None:
-        known = self._shots.get(row.number)
+    def _add_shot(self, key: tuple[int, int], row: LiveShotRow) -> None:
+        known = self._shots.get(key)
         if known is None or not known.is_final:
-            self._shots[row.number] = row
+            self._shots[key] = row
         while len(self._shots) > SHOTS_SHOWN:
             del self._shots[next(iter(self._shots))]
 

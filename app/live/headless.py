@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import signal
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
@@ -27,9 +26,6 @@ from .opening import CameraChoice, open_live
 from .recording import RecordChoice, recorder, take_markers
 from .shot_table import ShotTable
 from .sweep_figure import write_sweep_figure
-
-# Python lets a thread run for 5 ms while another waits; with the tick's work in three threads that is a whole tick.
-SWITCH_S = 0.0005
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,7 +94,7 @@ class OpenLive:
 
 
 class LiveObserver(Protocol):
-    """What looks on at a live run."""
+    """Onlooker of a live run."""
 
     kept_us: int  # length of the events that it wants to see again
 
@@ -227,7 +223,6 @@ def warm_up() -> None:
     load_kernels()
     gc.collect()
     gc.freeze()
-    sys.setswitchinterval(SWITCH_S)
 
 
 @contextmanager

@@ -70,7 +70,6 @@ class LiveSecond(Response):
 class LiveShotRow(Response):
     """A shot that has ended, in words; `recording` has its events as soon as its spin is final."""
 
-    number: int
     text: str
     is_final: bool
     recording: str | None

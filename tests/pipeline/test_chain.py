@@ -358,6 +358,16 @@ def test_late_shots_are_the_same_in_batch_tick_by_tick_and_resumed(toys: Toys, t
     assert flown(list(growing.run(DEFAULT))) == whole
 
 
+def test_results_of_balls_that_another_run_has_made_are_taken(toys: Toys) -> None:
+    toys.flying = late_shots
+    whole = flown(list(Chain(source()).run(DEFAULT)))
+    tracked = list(Chain(source()).run(DEFAULT, OF_RECORDING))
+    quick = list(Chain(source()).answer(DEFAULT, tracked, ("logo", "rate")))
+    before = dict(toys.counts)
+    assert flown(list(Chain(source()).answer(DEFAULT, quick))) == whole
+    assert {name for name, count in toys.counts.items() if count == before[name]} == {*OF_RECORDING, "logo", "rate"}
+
+
 @pytest.mark.parametrize("forgotten", [*INPUTS, "all"])
 def test_late_shots_are_made_again_where_they_were_forgotten(toys: Toys, forgotten: str) -> None:
     toys.flying = late_shots

@@ -44,7 +44,7 @@ export type LiveParametersRequest = { parameters: Record<string, Record<string, 
 /** State of one second, `t_s` after the start; latencies and rates are None where there is nothing to measure. */
 export type LiveSecond = { t_s: number; rate_mev_s: number; p50_ms: number | null; p99_ms: number | null; announced_ms: number | null; final_ms: number | null; dropped: number; skipped: number; backlog_ms: number; spin_backlog_ms: number; noise_on_hz: number | null; noise_off_hz: number | null; ball_on_hz: number | null; ball_off_hz: number | null };
 /** A shot that has ended, in words; `recording` has its events as soon as its spin is final. */
-export type LiveShotRow = { number: number; text: string; is_final: boolean; recording: string | null };
+export type LiveShotRow = { text: string; is_final: boolean; recording: string | null };
 /** Running camera as the page shows it. */
 export type LiveView = { camera: string; is_running: boolean; kept_s: number; seconds: LiveSecond[]; shots: LiveShotRow[]; notices: string[] };
 /** Recording of the last seconds: its name in the folder. */

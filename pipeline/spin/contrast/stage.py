@@ -196,7 +196,7 @@ def _estimate(
     if normal_flow.vector_rps is not None and np.any(normal_flow.vector_rps):
         starts.append(normal_flow.vector_rps)
     starts_rps, ball = np.array(starts).reshape(-1, 3), _uncertainty(state.ball_stds)
-    answer, scanning = None, not _settled(parameters, state)
+    answer, scanning = None, not is_settled(parameters, state)
     if starts:
         answer = estimate_spin(
             events,
@@ -223,7 +223,7 @@ def _estimate(
         state.changes = state.reason is not None
 
 
-def _settled(parameters: ContrastParameters, state: ContrastState) -> bool:
+def is_settled(parameters: ContrastParameters, state: ContrastState) -> bool:
     """Whether the last answer has no rival worth looking for, nor a normal flow that could outweigh it.
 
     Of 2,022 answers of the normal flow on 116 simulated shots 3 % are more than 6 of their sigma off: log odds of 3.5.
@@ -260,7 +260,7 @@ def _result(
         answer,
         state.reason,
         state.changes,
-        _settled(parameters, state),
+        is_settled(parameters, state),
         _rarer_polarity(state),
         rate,
         flow,

@@ -1,19 +1,22 @@
-"""Routes of a running camera, with a stand-in behind them."""
+"""Routes and panel of a running camera, with a stand-in behind them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
+import cv2
 import httpx
+import numpy as np
 import pytest
 
 from spinscope.app.tuning.bias_sweep import BiasRange, BiasState, BiasSweep, BiasSweepPoint, SweptBias
-from spinscope.app.web.live_schemas import LiveView
+from spinscope.app.web.live_schemas import LiveSecond, LiveShotRow, LiveView
 from spinscope.pipeline.errors import CameraError
 from spinscope.pipeline.registry import Parameters
 
 from .conftest import Served, served
+from .test_browser import CHROMIUM, FLAGS, PATIENCE_MS
 
 
 class StandIn:
@@ -23,10 +26,15 @@ class StandIn:
         self.window, self.asked = window, list[object]()
 
     def view(self) -> LiveView:
-        return LiveView(camera="stand-in 1", is_running=True, kept_s=3.0, seconds=[], shots=[], notices=[])
+        second = dict.fromkeys(LiveSecond.model_fields, 1.0) | {"dropped": 2, "skipped": 0, "final_ms": None}
+        shots = [LiveShotRow(text="12.0 rps", is_final=True, recording=self.window.name)]
+        seconds = [LiveSecond.model_validate(second | {"t_s": float(t_s)}) for t_s in range(3)]
+        return LiveView(
+            camera="stand-in 1", is_running=True, kept_s=3.0, seconds=seconds, shots=shots, notices=["unplugged"]
+        )
 
     def picture(self) -> bytes:
-        return b"\x89PNG"
+        return bytes(cv2.imencode(".png", np.zeros((36, 64), np.uint8))[1])
 
     def save_window(self, seconds: float) -> Path:
         self.asked.append(seconds)
@@ -52,7 +60,7 @@ class StandIn:
 
 @pytest.fixture
 def running(flight: Path) -> Iterator[tuple[Served, StandIn]]:
-    live = StandIn(flight)
+    live = StandIn(flight.with_name("flight_two_balls.h5"))
     made = served(flight, live=live)
     yield made, live
     made.stop()
@@ -62,7 +70,7 @@ def test_state_picture_parameters_and_the_last_seconds(running: tuple[Served, St
     made, live = running
     with httpx.Client(base_url=made.address) as http:
         assert http.get("api/live/view").json()["camera"] == "stand-in 1"
-        assert http.get("api/live/picture").content == b"\x89PNG"
+        assert http.get("api/live/picture").content == live.picture()
         assert http.post("api/live/window", json={"seconds": 2.5}).json() == {"recording": live.window.name}
         assert http.post("api/live/window", json={"seconds": 0.0}).status_code == 422
         assert http.post("api/live/parameters", json={"parameters": {"logo": {"pad_px": 6.0}}}).status_code == 200
@@ -87,3 +95,36 @@ def test_biases_act_on_the_camera(running: tuple[Served, StandIn]) -> None:
 def test_without_a_camera_the_routes_say_so(tuner: Served) -> None:
     answer = httpx.get(f"{tuner.address}api/live/view")
     assert answer.status_code == 404 and "spinscope live" in answer.json()["error"]
+
+
+@pytest.mark.browser
+@pytest.mark.skipif(not CHROMIUM.exists(), reason=f"there is no browser at {CHROMIUM}")
+def test_the_panel_in_a_browser(running: tuple[Served, StandIn]) -> None:
+    from playwright.sync_api import sync_playwright
+
+    made, live = running
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
+        page = browser.new_page()
+        errors: list[str] = []
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.set_default_timeout(PATIENCE_MS)
+        page.route("**/re_viewer_bg.wasm", lambda route: route.abort())  # the viewer takes ten seconds to start
+        page.goto(made.address)
+        page.wait_for_selector("body[data-done]", state="attached")
+        panel = page.locator("[data-title='Live camera']")
+        panel.get_by_text("stand-in 1").wait_for()
+        panel.get_by_text("2 packets lost by the camera").wait_for()
+        page.locator("#notices").get_by_text("unplugged").wait_for()
+        assert panel.locator("svg path").count() == 8
+        page.wait_for_function("document.querySelector('img.live').naturalWidth === 64")
+        panel.get_by_text("Use the sliders from now on").click()
+        page.locator("#notices").get_by_text("go on with these settings").wait_for()
+        panel.get_by_text("Pause").click()
+        panel.get_by_text("Go on").wait_for()
+        page.evaluate("document.body.dataset.old = 'yes'")
+        panel.get_by_text("Look at them").click()
+        page.wait_for_selector("body[data-done]:not([data-old])", state="attached")
+        assert f"recording={live.window.name}" in page.url
+        browser.close()
+    assert live.asked == [Parameters().logo.pad_px, 10.0] and not errors

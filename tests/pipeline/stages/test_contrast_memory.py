@@ -61,7 +61,7 @@ def test_a_ball_that_flies_on_while_pixels_wait_is_less_sure_of_its_place() -> N
     (packet, *_) = ticks()
     ball = known_ball(packet.end_us)
     flying = dataclasses.replace(ball, mean=np.add(ball.mean, [0, 0, 4800.0, -6400.0, 0]))
-    contrast._take(parameters, state, packet, flying, seen(packet, position_std_px=0.15))
+    contrast.take(parameters, state, packet, flying, seen(packet, position_std_px=0.15))
     uncertainty = contrast._uncertainty(state.ball_stds)
     assert uncertainty.centre_std_px == pytest.approx(0.25)
     assert uncertainty.track_std_px == pytest.approx(0.15)
@@ -143,12 +143,12 @@ def test_an_answer_is_settled_by_a_scan_over_two_turns_with_a_clear_lead(
 ) -> None:
     parameters = ContrastParameters()
     state = contrast.start(parameters, CONTEXT)
-    assert not contrast._settled(parameters, state)
+    assert not contrast.is_settled(parameters, state)
     rivals = {"rivals_rps": np.zeros((len(changes.get("margins", ())), 3))}
     state.answer, state.scanned_turns, state.followed_contrast = answered(**changes, **rivals), scanned_turns, 1.0
-    assert contrast._settled(parameters, state) == settled
+    assert contrast.is_settled(parameters, state) == settled
     state.reason = "in doubt"
-    assert not contrast._settled(parameters, state)
+    assert not contrast.is_settled(parameters, state)
 
 
 def test_full_estimates_are_due_by_age_and_after_a_refusal_by_events() -> None:
