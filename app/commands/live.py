@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from spinscope.pipeline.cameras import FAULTS
+from spinscope.pipeline.cameras import FAULTS, CameraOptions
 from spinscope.pipeline.session import Choices, check_method
 
 from .options import RECORDING, session_options
@@ -16,6 +16,8 @@ from .options import RECORDING, session_options
 SOURCE_OPTIONS = (
     click.option("--camera", "serial", metavar="SERIAL", help="Serial number; the only camera by default."),
     click.option("--biases", type=click.Path(path_type=Path), metavar="FILE.bias", help="Biases to set."),
+    click.option("--roi", "roi_px", type=int, nargs=4, metavar="X Y W H", help="Region of interest of the camera."),
+    click.option("--most-mev-s", type=click.FloatRange(min=0, min_open=True), help="Event rate above which it drops."),
     click.option("--replay", type=RECORDING, metavar="FILE", help="Play a recording in the place of a camera."),
     click.option("--speed", type=float, default=1.0, show_default=True, help="Of the replay; inf: no waiting."),
     click.option("--loop", "loops", is_flag=True, help="Play the recording again and again."),
@@ -93,6 +95,8 @@ def _run(
     lines: str | None,
     serial: str | None,
     biases: Path | None,
+    roi_px: tuple[int, int, int, int] | None,
+    most_mev_s: float | None,
     replay: Path | None,
     speed: float,
     loops: bool,
@@ -113,7 +117,15 @@ def _run(
 
     if record is None and (split_mb or split_s):
         raise click.UsageError("--split-mb and --split-s go with --record NAME.raw")
-    chosen = CameraChoice(serial=serial, biases=biases, replay=replay, speed=speed, loops=loops, fault=fault)
+    chosen = CameraChoice(
+        serial=serial,
+        biases=biases,
+        options=CameraOptions(roi_px, most_mev_s),
+        replay=replay,
+        speed=speed,
+        loops=loops,
+        fault=fault,
+    )
     recording = None if record is None else RecordChoice(record, split_mb, split_s)
     swept = None if sweep is None else SweepChoice(**sweep)
     to = Outputs(lines=lines, port=port, table=table, record=recording, sweep=swept)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from spinscope.pipeline.biases import BiasParameters, read_bias_values
-from spinscope.pipeline.cameras import EventCamera, ReplayCamera, open_camera
+from spinscope.pipeline.cameras import CameraOptions, EventCamera, ReplayCamera, open_camera
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.live import session_of
 from spinscope.pipeline.recordings import Recording
@@ -24,6 +24,8 @@ class CameraChoice:
         Serial number of the camera; the only one by default.
     biases : Path, optional
         File of its biases.
+    options : CameraOptions
+        What the camera leaves out by itself.
     replay : Path, optional
         Recording in the place of a camera.
     speed, loops, fault
@@ -32,6 +34,7 @@ class CameraChoice:
 
     serial: str | None = None
     biases: Path | None = None
+    options: CameraOptions = CameraOptions()
     replay: Path | None = None
     speed: float = 1.0
     loops: bool = False
@@ -46,6 +49,8 @@ def open_live(chosen: CameraChoice, choices: Choices) -> tuple[EventCamera, Sess
     if chosen.replay is not None:
         if chosen.serial is not None:
             raise ParameterError("--camera and --replay exclude each other: give one of them")
+        if chosen.options != CameraOptions():
+            raise ParameterError("--roi and --most-mev-s are of a camera: a recording has `convert --roi`")
         session = Session.open(chosen.replay, choices)
         camera = replay_of(session, chosen)
         if biases:
@@ -53,13 +58,13 @@ def open_live(chosen: CameraChoice, choices: Choices) -> tuple[EventCamera, Sess
         return camera, session, lambda: camera
     if chosen.loops or chosen.fault is not None:
         raise ParameterError("--loop and --fake are of a recording: give --replay FILE with them")
-    opened = open_camera(chosen.serial, biases)
+    opened = open_camera(chosen.serial, biases, chosen.options)
     try:
         session = session_of(opened, choices)
     except BaseException:
         opened.close()
         raise
-    return opened, session, lambda: open_camera(opened.serial, opened.biases)
+    return opened, session, lambda: open_camera(opened.serial, opened.biases, chosen.options)
 
 
 def replay_of(session: Session, chosen: CameraChoice) -> ReplayCamera:

@@ -6,6 +6,7 @@ A clock is read here, so that stages and chain need none.
 from .drivers import neuromorphic as _neuromorphic  # noqa: F401  registers itself
 from .event_camera import DRIVERS as DRIVERS
 from .event_camera import CameraDriver as CameraDriver
+from .event_camera import CameraOptions as CameraOptions
 from .event_camera import CameraPacket as CameraPacket
 from .event_camera import EventCamera as EventCamera
 from .event_camera import ListedCamera as ListedCamera

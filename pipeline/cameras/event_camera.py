@@ -35,6 +35,22 @@ class CameraPacket:
     outside: int = 0
 
 
+@dataclass(frozen=True, slots=True)
+class CameraOptions:
+    """Events that a camera leaves out by itself, before they go over the cable.
+
+    Attributes
+    ----------
+    roi_px : (int, int, int, int), optional
+        Region of interest, x, y, width and height: no event comes from outside.
+    most_mev_s : float, optional
+        Millions of events a second, above which it drops some.
+    """
+
+    roi_px: tuple[int, int, int, int] | None = None
+    most_mev_s: float | None = None
+
+
 class EventCamera(ABC):
     """An open camera. All methods are called by one thread, the one that reads.
 
@@ -128,7 +144,8 @@ class CameraDriver:
     cameras : callable
         `cameras() -> list of ListedCamera`: what is plugged in; raises CameraError when the driver is not installed.
     open : callable
-        `open(serial or None, biases) -> EventCamera`; raises CameraError.
+        `open(serial or None, biases, options) -> EventCamera`; raises CameraError, also for an option that the device
+        does not have.
     udev_rules : tuple of str
         Lines that let everybody use its cameras on Linux.
     """
@@ -136,19 +153,23 @@ class CameraDriver:
     name: str
     label: str
     cameras: Callable[[], list[ListedCamera]]
-    open: Callable[[str | None, Mapping[str, int]], EventCamera]
+    open: Callable[[str | None, Mapping[str, int], CameraOptions], EventCamera]
     udev_rules: tuple[str, ...] = field(default=())
 
 
 DRIVERS: Registry[CameraDriver] = Registry("camera driver")
 
 
-def open_camera(serial: str | None = None, biases: Mapping[str, int] | None = None) -> EventCamera:
+def open_camera(
+    serial: str | None = None,
+    biases: Mapping[str, int] | None = None,
+    options: CameraOptions = CameraOptions(),
+) -> EventCamera:
     """Open the camera of this serial number, or the only one there is; raises CameraError with the remedy."""
     problems: list[str] = []
     for driver in DRIVERS:
         try:
-            return driver.open(serial, biases or {})
+            return driver.open(serial, biases or {}, options)
         except CameraError as error:
             problems.append(str(error))
     raise CameraError("; ".join(problems))

@@ -72,6 +72,8 @@ def test_lines_and_recording(bounce: Session, tmp_path: Path) -> None:
     assert [{name: one[name] for name in expected[0]} for one in shots] == expected
     assert [(one["clock"], one["recorded_us"]) for one in shots] == [(0, 75_000), (0, 120_000)]
     assert all(one["latency_ms"] >= 0 for one in shots)
+    told = [one["announced"] for one in written if "announced" in one]
+    assert [(one["t_us"], one["ended_by"]) for one in told] == [(one["end_us"], one["ended_by"]) for one in shots]
     assert {"events", "rate_mev_s", "dropped", "backlog_ms", "p50_ms", "p99_ms"} <= states[-1]["status"].keys()
     recorded = open_recording(raw).read()
     assert (recorded.t_us == bounce.source.between(0, 10**9).t_us).all()
@@ -230,6 +232,7 @@ def test_recent_events_are_bounded_in_number(monkeypatch: pytest.MonkeyPatch) ->
         (("watch", "table.txt"), "a table is one of"),
         (("live", "--headless", "--replay", "x.h5", "--window", "0", "5"), "no --window"),
         (("live", "--headless", "--replay", "{}", "--record", "a.h5"), "ends with .raw"),
+        (("live", "--headless", "--replay", "{}", "--roi", "0", "0", "9", "9"), "are of a camera"),
         (("live", "--headless", "--replay", "{}", "--speed", "0"), "speed = 0 is no speed"),
         (("live", "--headless", "--replay", "{}", "--jsonl", "/nowhere/out"), "lines cannot be written"),
     ],

@@ -12,10 +12,11 @@ import numpy as np
 
 from ...errors import CameraError
 from ...events import EventBatch
-from ..event_camera import DRIVERS, CameraDriver, CameraPacket, EventCamera, ListedCamera, check_biases
+from ..event_camera import DRIVERS, CameraDriver, CameraOptions, CameraPacket, EventCamera, ListedCamera, check_biases
 
 NAME = "neuromorphic"
 TIMEOUT_S = 0.05  # of a read, after which a camera that sees nothing is asked for commands and its end
+LIMITER_PERIOD_US = 200  # in which events are counted and dropped, as the maker's own software has it
 INSTALL = "install it with `uv sync --extra live` (or `pip install spinscope[live]`)"
 # Vendor and product numbers of the devices that the library knows (its own rules, 0.18).
 UDEV_RULES = (
@@ -84,21 +85,23 @@ class NeuromorphicCamera(EventCamera):
         Which one; the only one by default.
     biases : Mapping of str to int
         Values that differ from the device's own.
+    options : CameraOptions
+        What the device leaves out by itself.
     """
 
-    def __init__(self, serial: str | None, biases: Mapping[str, int]) -> None:
+    def __init__(self, serial: str | None, biases: Mapping[str, int], options: CameraOptions) -> None:
         self._library = library()
         try:
             self._device = self._library.open(serial=serial, iterator_timeout=TIMEOUT_S)
         except RuntimeError as error:
             raise camera_error(error, f"camera {serial}" if serial else "the camera") from error
         try:
-            self._set_up(biases)
+            self._set_up(biases, options)
         except BaseException:
             self.close()
             raise
 
-    def _set_up(self, biases: Mapping[str, int]) -> None:
+    def _set_up(self, biases: Mapping[str, int], options: CameraOptions) -> None:
         device, properties = self._device, self._device.properties()
         self.name, self.serial = str(device.name().value), str(device.serial())
         self.width_px, self.height_px = int(properties.width), int(properties.height)
@@ -107,13 +110,39 @@ class NeuromorphicCamera(EventCamera):
             bound.name: (int(getattr(bounds, bound.name).minimum), int(getattr(bounds, bound.name).maximum))
             for bound in fields(bounds)
         }
-        self._configuration = _configuration(self._library, device.name())
+        module = getattr(self._library, device.name().name.lower())
+        self._configuration = self._limited(module, _configuration(module), options)
         own = self._configuration.biases
         self.biases = {name: int(getattr(own, name)) for name in self.bias_limits}
         check_biases(biases, self.bias_limits, self.name)
         self._dropped, self._end_us = 0, 0
         self._apply_biases({**self.biases, **biases})
         self.biases = {**self.biases, **biases}
+
+    def _limited(self, module: Any, configuration: Any, options: CameraOptions) -> Any:
+        """The configuration with region of interest and limit of the event rate; raises CameraError."""
+        if options.roi_px is not None:
+            x, y, width, height = options.roi_px
+            if not (0 <= x < x + width <= self.width_px and 0 <= y < y + height <= self.height_px):
+                raise CameraError(
+                    f"region of interest {x} {y} {width} {height} lies outside the sensor of "
+                    f"{self.width_px} x {self.height_px} px: give X Y WIDTH HEIGHT in pixels"
+                )
+            if hasattr(configuration, "region_of_interest"):
+                configuration = replace(configuration, region_of_interest=module.RegionOfInterest(x, y, width, height))
+            elif hasattr(module, "RowColumnMask"):
+                mask = module.RowColumnMask(set=True)
+                mask.clear_rectangle(x=x, y=self.height_px - y - height, width=width, height=height)  # rows from below
+                configuration = replace(configuration, x_mask=mask.x_mask(), y_mask=mask.y_mask())
+            else:
+                raise CameraError(f"{self.name} has no region of interest: leave out --roi")
+        if options.most_mev_s is not None:
+            if not hasattr(configuration, "rate_limiter"):
+                raise CameraError(f"{self.name} has no limit of its event rate: leave out --most-mev-s")
+            most = max(round(options.most_mev_s * LIMITER_PERIOD_US), 1)
+            limiter = module.RateLimiter(reference_period_us=LIMITER_PERIOD_US, maximum_events_per_period=most)
+            configuration = replace(configuration, rate_limiter=limiter)
+        return configuration
 
     def read(self) -> CameraPacket | None:
         """The next packet of the device; raises CameraError when it was unplugged or another thread holds it."""
@@ -156,9 +185,8 @@ class NeuromorphicCamera(EventCamera):
         self._device.close()
 
 
-def _configuration(found: Any, name: Any) -> Any:
-    """The device's configuration, as the library has it by default but for a readout that waits for no frames."""
-    module = getattr(found, name.name.lower())
+def _configuration(module: Any) -> Any:
+    """A device's configuration, as the library has it by default but for a readout that waits for no frames."""
     configuration = module.Configuration()
     if hasattr(configuration, "readout_frames_per_second"):  # else events of a DVXplorer come every 10 ms
         fastest = module.ReadoutFramesPerSecond.VARIABLE5000

@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner
 
 from spinscope.app.cli import cli
-from spinscope.pipeline.cameras import open_camera
+from spinscope.pipeline.cameras import CameraOptions, open_camera
 from spinscope.pipeline.errors import CameraError
 
 DTYPE = np.dtype([("t", "<u8"), ("x", "<u2"), ("y", "<u2"), ("on", "?")])
@@ -32,8 +32,33 @@ class Biases:
 
 
 @dataclasses.dataclass
+class RateLimiter:
+    reference_period_us: int
+    maximum_events_per_period: int
+
+
+class RowColumnMask:
+    """The fake library's mask of rows and columns, rows from below."""
+
+    def __init__(self, set: bool) -> None:
+        self.is_left_out = np.full((720, 1280), set)
+
+    def clear_rectangle(self, x: int, y: int, width: int, height: int) -> None:
+        self.is_left_out[::-1][y : y + height, x : x + width] = False
+
+    def x_mask(self) -> list[int]:
+        return np.flatnonzero(~self.is_left_out.all(axis=0)).tolist()
+
+    def y_mask(self) -> list[int]:
+        return np.flatnonzero(~self.is_left_out.all(axis=1)).tolist()
+
+
+@dataclasses.dataclass
 class Evk4Configuration:
     biases: Biases = dataclasses.field(default_factory=Biases)
+    x_mask: Any = ()
+    y_mask: Any = ()
+    rate_limiter: RateLimiter | None = None
 
 
 class Readout(enum.Enum):
@@ -117,7 +142,9 @@ def library(monkeypatch: pytest.MonkeyPatch) -> Any:
         name=Name.PROPHESEE_EVK4, connection=connection, address="2:3", serial="00051195", error=None
     )
     fake.device, fake.opened = Device([]), []  # type: ignore[attr-defined]
-    fake.prophesee_evk4 = SimpleNamespace(Configuration=Evk4Configuration)  # type: ignore[attr-defined]
+    fake.prophesee_evk4 = SimpleNamespace(  # type: ignore[attr-defined]
+        Configuration=Evk4Configuration, RowColumnMask=RowColumnMask, RateLimiter=RateLimiter
+    )
     fake.inivation_dvxplorer = SimpleNamespace(  # type: ignore[attr-defined]
         Configuration=DvxplorerConfiguration, ReadoutFramesPerSecond=Readout
     )
@@ -229,3 +256,26 @@ def test_udev_instructions() -> None:
     result = CliRunner().invoke(cli, ["cameras", "--install-udev"])
     assert 'ATTRS{idVendor}=="04b4", ATTRS{idProduct}=="00f[4-5]"' in result.output
     assert "udevadm control --reload-rules" in result.output
+
+
+def test_region_of_interest_and_limit_of_the_event_rate(library: Any) -> None:
+    open_camera(options=CameraOptions((10, 20, 3, 2), 5.0))
+    configuration = library.device.configurations[-1]
+    assert (configuration.x_mask, configuration.y_mask) == ([10, 11, 12], [20, 21])
+    limiter = configuration.rate_limiter
+    assert limiter.maximum_events_per_period / limiter.reference_period_us == 5.0
+
+
+@pytest.mark.parametrize(
+    ("options", "name", "said"),
+    [
+        (CameraOptions((1270, 0, 20, 20)), Name.PROPHESEE_EVK4, "outside the sensor of 1280 x 720 px"),
+        (CameraOptions((0, 0, 20, 20)), Name.INIVATION_DVXPLORER, "no region of interest"),
+        (CameraOptions(most_mev_s=1.0), Name.INIVATION_DVXPLORER, "no limit of its event rate"),
+    ],
+)
+def test_options_that_a_device_does_not_have(library: Any, options: CameraOptions, name: Name, said: str) -> None:
+    library.device = Device([], name)
+    with pytest.raises(CameraError, match=said):
+        open_camera(options=options)
+    assert library.device.closed
