@@ -14,8 +14,11 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .biases import BiasParameters, read_biases
 from .camera import BallParameters, CameraParameters
+from .dotted_shots import DottedShots
 from .errors import ParameterError, RecordingError
 from .extensions import did_you_mean
 from .files import file_bytes
@@ -38,30 +41,40 @@ class StatedTruth:
         Spin in the camera frame; None where only its magnitude is known.
     rps : float
         Magnitude, as of a tachometer.
-    spin_std_rps : float, optional
-        1 sigma of the magnitude.
+    spin_std_rps, axis_std_deg : float, optional
+        1 sigma of the magnitude, and of the axis (root of the trace of both its directions).
     ball : int, optional
         Number of the ball, 1 to 7 of the paper's.
     speed_m_s : float, optional
         Speed as set.
     setting : str, optional
         Setting of the spinner or thrower, in the user's words.
+    dotted_shots : int, optional
+        Number of dotted balls of which the spin is the mean.
     """
 
     spin_rps: tuple[float, float, float] | None
     rps: float
     spin_std_rps: float | None = None
+    axis_std_deg: float | None = None
     ball: int | None = None
     speed_m_s: float | None = None
     setting: str | None = None
+    dotted_shots: int | None = None
 
     @classmethod
-    def of(cls, table: Mapping[str, Any]) -> StatedTruth:
-        """The truth of a table with `spin_rps`, `axis` and `rps`, or `rps` alone; raises ParameterError."""
-        known = (*(one.name for one in fields(cls)), "axis")
+    def of(cls, table: Mapping[str, Any], folder: Path = Path()) -> StatedTruth:
+        """The truth of a table with `spin_rps`, `axis` and `rps`, `rps` alone, or `dotted_shots`.
+
+        `dotted_shots` is the file of their spins, and `camera_frame` that of `spinscope calibrate stereo` where the
+        spin is stated in the frame camera's frame; both from the folder on. Raises SpinscopeError.
+        """
+        known = (*(one.name for one in fields(cls)), "axis", "camera_frame")
         for name in table:
             if name not in known:
                 raise ParameterError(f"truth.{name} is unknown{did_you_mean(name, known)}")
+        if "dotted_shots" in table:
+            return cls._of_dotted_shots(table, folder)
         spin, rps = _vector(table, "spin_rps"), _number(table, "rps")
         axis = _vector(table, "axis")
         if axis is not None:
@@ -73,14 +86,34 @@ class StatedTruth:
         elif spin is not None and rps is not None:
             raise ParameterError("truth.spin_rps is the whole vector, truth.rps its length: give one of them")
         elif spin is None and rps is None:
-            raise ParameterError("truth states no spin: give spin_rps = [x, y, z], axis and rps, or rps alone")
+            raise ParameterError(
+                "truth states no spin: give spin_rps = [x, y, z], axis and rps, rps alone, or dotted_shots"
+            )
+        if spin is not None:
+            spin = _in_event_camera(spin, table, folder)
         return cls(
             spin_rps=spin,
             rps=math.hypot(*(spin or ())) if rps is None else rps,
             spin_std_rps=_number(table, "spin_std_rps"),
-            ball=_ball_number(table),
-            speed_m_s=_number(table, "speed_m_s"),
-            setting=None if "setting" not in table else str(table["setting"]),
+            axis_std_deg=_number(table, "axis_std_deg"),
+            **_circumstances(table),
+        )
+
+    @classmethod
+    def _of_dotted_shots(cls, table: Mapping[str, Any], folder: Path) -> StatedTruth:
+        twice = [name for name in ("spin_rps", "axis", "rps", "spin_std_rps", "axis_std_deg") if name in table]
+        if twice:
+            raise ParameterError(f"truth.dotted_shots tells the spin, and so does {', '.join(twice)}: give one of them")
+        about = _circumstances(table)
+        shots = DottedShots.read(folder / str(table["dotted_shots"]), about["setting"])
+        x, y, z = shots.mean_rps.tolist()
+        return cls(
+            spin_rps=_in_event_camera((x, y, z), table, folder),
+            rps=math.hypot(x, y, z),
+            spin_std_rps=shots.magnitude_std_rps,
+            axis_std_deg=shots.axis_std_deg,
+            dotted_shots=len(shots.spins_rps),
+            **about,
         )
 
 
@@ -130,14 +163,14 @@ class Sidecar:
     @classmethod
     def _of(cls, tables: Mapping[str, Any], path: Path) -> Sidecar:
         try:
-            return cls._of_tables(tables)
+            return cls._of_tables(tables, path.parent)
         except ParameterError as error:
             raise ParameterError(f"{error}: {path}") from None
         except (ValueError, OverflowError):  # whole numbers beyond all floats, or too long to be shown
             raise ParameterError(f"a number is too large: {path}") from None
 
     @classmethod
-    def _of_tables(cls, tables: Mapping[str, Any]) -> Sidecar:
+    def _of_tables(cls, tables: Mapping[str, Any], folder: Path) -> Sidecar:
         for name, table in tables.items():
             if name not in TABLES:
                 hint = did_you_mean(name, TABLES)
@@ -153,7 +186,7 @@ class Sidecar:
         return cls(
             parameters=parameters,
             fixed_ball=None if circle is None else _circle(circle),
-            truth=StatedTruth.of(tables["truth"]) if "truth" in tables else None,
+            truth=StatedTruth.of(tables["truth"], folder) if "truth" in tables else None,
             biases=None
             if biases is None
             else BiasParameters().with_values({name.removeprefix("bias_"): value for name, value in biases.items()}),
@@ -189,6 +222,34 @@ def _number(table: Mapping[str, Any], name: str) -> float | None:
     if value is not None and value < 0:
         raise ParameterError(f"truth.{name} = {value:g} is not allowed: give a number of 0 or more")
     return value
+
+
+def _in_event_camera(
+    spin_rps: tuple[float, float, float], table: Mapping[str, Any], folder: Path
+) -> tuple[float, float, float]:
+    """A spin in the event camera's frame, from that of the table's `camera_frame`; raises SpinscopeError."""
+    if "camera_frame" not in table:
+        return spin_rps
+    path = folder / str(table["camera_frame"])
+    try:
+        rotation = np.array(_toml_tables(path)["stereo"]["rotation"], np.float64)
+    except (KeyError, TypeError, ValueError):
+        rotation = np.empty(0)
+    if rotation.shape != (3, 3) or not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3):
+        raise ParameterError(
+            f"truth.camera_frame names no rotation between two cameras: `spinscope calibrate stereo` writes one: {path}"
+        )
+    x, y, z = (rotation.T @ spin_rps).tolist()
+    return x, y, z
+
+
+def _circumstances(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Statements of a truth besides the spin."""
+    return {
+        "ball": _ball_number(table),
+        "speed_m_s": _number(table, "speed_m_s"),
+        "setting": None if "setting" not in table else str(table["setting"]),
+    }
 
 
 def _ball_number(table: Mapping[str, Any]) -> int | None:

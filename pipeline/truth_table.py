@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import csv
 import difflib
-import io
 import re
-from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from .errors import ParameterError, RecordingError
+from .errors import ParameterError
+from .text_table import table_rows
 
 TRUTH_TABLE = "truth.csv"
-LARGEST_BYTES = 8 << 20  # tens of thousands of recordings
 # Columns and the tables of a sidecar to which they belong; any other field is a column `table.field`.
 COLUMNS = {
-    **dict.fromkeys(("spin_rps", "axis", "rps", "spin_std_rps", "ball", "speed_m_s", "setting"), "truth"),
+    **dict.fromkeys(("spin_rps", "axis", "rps", "spin_std_rps", "axis_std_deg"), "truth"),
+    **dict.fromkeys(("ball", "speed_m_s", "setting", "dotted_shots", "camera_frame"), "truth"),
     **dict.fromkeys(("x_px", "y_px", "radius_px"), "fixed_ball"),
 }
+TEXTS = ("setting", "dotted_shots", "camera_frame")  # fields that are no numbers, whatever they look like
 MISSPELT = 0.8  # likeness (difflib) beyond which an unknown column is a known one misspelt: one or two letters off
 _COMPONENT = re.compile(r"_([xyz])(?=_|$)")  # spin_x_rps and spin_rps_x are components of spin_rps, axis_x of axis
 
@@ -52,31 +51,12 @@ def stated_tables(table: Path, recording: Path) -> dict[str, dict[str, Any]]:
     return _tables(rows[0], table) if rows else {}
 
 
-def _rows(table: Path) -> Iterator[dict[str, str]]:
-    """The rows by column, names and values without spaces around them."""
-    try:
-        with open(table, "rb") as file:
-            content = file.read(LARGEST_BYTES + 1)
-        text = content.decode("utf-8-sig")
-    except OSError as error:
-        raise RecordingError(f"the table cannot be read ({error.strerror}): {table}") from error
-    except ValueError:
-        raise RecordingError(f"the table is no UTF-8 text: {table}") from None
-    if len(content) > LARGEST_BYTES:
-        raise RecordingError(f"the table is larger than {LARGEST_BYTES >> 20} MB: {table}")
-    heading = text.partition("\n")[0]
-    delimiter = max(",;\t", key=heading.count)
-    if delimiter == ";":  # as spreadsheets write it where the comma is the decimal point
-        text = text.replace(",", ".")
-    try:
-        lines = list(csv.reader(io.StringIO(text), delimiter=delimiter, skipinitialspace=True))
-    except csv.Error as error:
-        raise RecordingError(f"the table is no CSV ({error}): {table}") from None
-    columns = [name.strip() for name in lines[0]] if lines else []
+def _rows(table: Path) -> list[dict[str, str]]:
+    """The rows by column; raises as `table_rows` does, and ParameterError without the column `recording`."""
+    columns, rows = table_rows(table)
     if "recording" not in columns:
         raise ParameterError(f"the table has no column `recording`, but {', '.join(columns) or 'nothing'}: {table}")
-    for line in lines[1:]:
-        yield {"recording": ""} | dict(zip(columns, map(str.strip, line), strict=False))
+    return [{"recording": ""} | row for row in rows]
 
 
 def _tables(row: dict[str, str], table: Path) -> dict[str, dict[str, Any]]:
@@ -92,7 +72,7 @@ def _tables(row: dict[str, str], table: Path) -> dict[str, dict[str, Any]]:
         elif text and name != column:
             tables.setdefault(group, {}).setdefault(field, []).append(_value(text))
         elif text:
-            tables.setdefault(group, {})[field] = text if field == "setting" else _value(text)
+            tables.setdefault(group, {})[field] = text if field in TEXTS else _value(text)
     return tables
 
 

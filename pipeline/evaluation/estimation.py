@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..api import estimate
 from ..chain import Chain, EventsInMemory
@@ -20,7 +21,7 @@ from ..sidecar import StatedTruth
 from ..simulator import SimulatedRecording
 from ..simulator.sensor import LOGO
 from .tables import Cell, Row, distinct, share, summary, where
-from .uncertainty_calibration import ERRORS, STATED, is_answer, is_right
+from .uncertainty_calibration import ERRORS, OF_TRUTH, STATED, is_answer, is_right
 
 BEST = "best"  # what the program itself trusts
 PAPER_METHOD = "triplet"
@@ -85,7 +86,13 @@ def rows_of_both_presets(result: Result, truth: Truth | StatedTruth, about: Row)
 
 def _estimate_row(result: Result, method: str | None, truth: Truth | StatedTruth, about: Row) -> Row:
     """The row of one method (None: none is trusted) in the longest shot."""
-    row: Row = {**about, "shots": len(result.shots), **dict.fromkeys((*ERRORS, *STATED, "reason"))}
+    row: Row = {
+        **about,
+        "shots": len(result.shots),
+        **dict.fromkeys(("found_rps", *ERRORS, *STATED, *OF_TRUTH.values(), "reason")),
+    }
+    if isinstance(truth, StatedTruth):
+        row |= zip(OF_TRUTH.values(), (truth.spin_std_rps, truth.axis_std_deg), strict=True)
     shot = longest(result)
     if shot is None:
         row["reason"] = result.no_shot_reason
@@ -95,6 +102,7 @@ def _estimate_row(result: Result, method: str | None, truth: Truth | StatedTruth
         found = shot.estimates[method]
         row |= zip(ERRORS, _errors(shot, method, truth), strict=True)
         row |= zip((*STATED, "reason"), (found.magnitude_std_rps, found.axis_std_deg, found.reason), strict=True)
+        row["found_rps"] = found.magnitude_rps
     return row
 
 
@@ -103,11 +111,14 @@ def _errors(shot: Shot, method: str, truth: Truth | StatedTruth) -> tuple[float 
     if isinstance(truth, Truth):
         return shot.error_against(truth, method) or (None, None)
     found = shot.estimates[method].vector_rps
-    if found is None:
-        return None, None
+    return (None, None) if found is None else errors_against_stated(found, truth)
+
+
+def errors_against_stated(found_rps: NDArray[np.float64], truth: StatedTruth) -> tuple[float, float | None]:
+    """Errors of magnitude in rps and axis in degrees of a spin (3,); None where the true axis is not known."""
     if truth.spin_rps is None or not truth.rps:
-        return abs(float(np.linalg.norm(found)) - truth.rps), None
-    return spin_errors(found, np.array(truth.spin_rps))
+        return abs(float(np.linalg.norm(found_rps)) - truth.rps), None
+    return spin_errors(found_rps, np.array(truth.spin_rps))
 
 
 COLUMNS = ("method", "n", "success", "right", "of those with logo", "magnitude error [rps]", "axis error [deg]")

@@ -135,12 +135,16 @@ def recordings_table(folder: LabFolder, kinds: Sequence[str], rows: Sequence[Row
     """Number of recordings by what became of them in a suite, and the names of those left out, with the reason."""
     of_kind = Counter(recording.kind for recording in folder.recordings)
     failed = {str(row["recording"]): str(row["error"]) for row in rows if "error" in row} | folder.wrong
-    done = distinct([row for row in rows if "error" not in row], "recording")
+    good = [row for row in rows if "error" not in row]
+    done, sensors = distinct(good, "recording"), distinct(good, "sensor")
     lines: list[tuple[Cell, ...]] = [("evaluated", len(done), None)]
     lines += [
         (f"not for this suite: {kind}", count, None) for kind, count in sorted(of_kind.items()) if kind not in kinds
     ]
     lines += [("left out", None, f"{name}: {reason}") for name, reason in sorted(failed.items())]
+    if len(sensors) > 1:
+        remedy = "state each camera in its recordings' sidecars, or keep each in its own folder"
+        lines.append(("mixed sensors", len(sensors), f"{', '.join(sorted(sensors))}: {remedy}"))
     return ResultTable(
         "Real recordings", ("recordings", "n", "which, and why"), lines, f"Of the folder {folder.path.name}."
     )

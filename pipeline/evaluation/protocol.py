@@ -77,5 +77,8 @@ def _lacking(recording: LabRecording) -> Iterator[str]:
     if recording.kind != SPINNER and sidecar.truth is not None:
         if sidecar.truth.speed_m_s is None:
             yield f"the speed is not stated: [truth] speed_m_s in {toml}; of a ball on a spinner, state [fixed_ball]"
+        dotted = sidecar.truth.dotted_shots
+        if dotted is not None and dotted < SHOTS_A_SETTING:
+            yield f"its truth is the mean of {dotted} dotted shots: shoot {SHOTS_A_SETTING} at each setting"
         if not sidecar.truth.setting:
             yield f"the thrower's setting is not stated: [truth] setting in {toml}"

@@ -11,11 +11,12 @@ from joblib import Parallel
 
 from ..errors import ParameterError, SpinscopeError
 from ..extensions import Registry
+from ..recordings import is_recording
 from ..recordings.recording import file_identity
 from .lab_recordings import LabFolder, LabRecording, recordings_table
 from .plots import Figures
 from .tables import ResultTable, Row
-from .tasks import Progress, SceneChoices, Task, TaskContext, run
+from .tasks import Progress, SceneChoices, Task, TaskContext, digest, run
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,6 +150,7 @@ def evaluate_real(
         able = ", ".join(one.name for one in SUITES if one.real)
         raise ParameterError(f"the suite {name} runs on simulated recordings only: real ones are for {able}")
     found = LabFolder.of(folder, context.choices, context.scene.ball)
+    beside = {one: digest(_beside(one)) for one in {recording.path.parent for recording in found.recordings}}
     tasks = [
         Task(
             real_rows,
@@ -156,7 +158,7 @@ def evaluate_real(
                 "suite": name,
                 "recording": recording.path.relative_to(folder).as_posix(),
                 "path": str(recording.path.absolute()),
-                "content": [file_identity(recording.path), recording.sidecar.digest],
+                "content": [file_identity(recording.path), recording.sidecar.digest, beside[recording.path.parent]],
             },
             keep=not suite.timed,
         )
@@ -169,15 +171,23 @@ def evaluate_real(
     return Report(suite, False, rows, [recordings_table(found, suite.real_kinds, every), *tables], folder)
 
 
+def _beside(folder: Path) -> list[str]:
+    """Names and times of change of what is no recording in a folder: labels, pictures, calibrations."""
+    others = (path for path in sorted(folder.iterdir()) if not is_recording(path))
+    return [f"{path.name} {path.stat().st_mtime_ns}" for path in others]
+
+
 def real_rows(context: TaskContext, suite: str, recording: str, path: str, content: list[str]) -> list[Row]:
     """Rows of a suite of one real recording; a single one with the `error` where it cannot be used.
 
-    `content` tells versions of recording and sidecar apart when rows are kept.
+    `content` tells versions of the recording and what stands beside it apart when rows are kept.
     """
     measure = SUITES[suite].real
     assert measure is not None
     try:
-        rows = measure(context, LabRecording.of(Path(path), context.choices))
+        opened = LabRecording.of(Path(path), context.choices)
+        rows = measure(context, opened)
+        sensor = f"{opened.session.source.width_px}x{opened.session.source.height_px}"
     except SpinscopeError as error:
-        rows = [{"error": str(error)}]
-    return [{"recording": recording, **row} for row in rows]
+        return [{"recording": recording, "error": str(error)}]
+    return [{"recording": recording, "sensor": sensor, **row} for row in rows]

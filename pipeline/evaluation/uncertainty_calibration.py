@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -25,6 +26,8 @@ FLIGHT_NOTE = (
 RIGHT_NOTE = f"Right: within {RIGHT_SHARE:.0%} of the magnitude and {RIGHT_DEG:g} degrees of the axis."
 ERRORS = ("magnitude_error_rps", "axis_error_deg")  # columns of the rows
 STATED = ("magnitude_std_rps", "axis_std_deg")
+# Errors stated of the truth itself, by those of the answer; a simulated truth has none.
+OF_TRUTH = dict(zip(STATED, ("truth_std_rps", "truth_axis_std_deg"), strict=True))
 
 
 def is_answer(row: Row) -> bool:
@@ -77,17 +80,22 @@ def calibration_table(groups: Sequence[tuple[str, Sequence[Row]]], methods: Sequ
         ("recordings", "method", "answers", "gross", *quantities),
         lines,
         "Shares of the answers; the median is of the error over the stated one. Calibrated: 0.68 within 1 sigma, 0.95 "
-        "within 2, median 0.67. The stated error of the axis is that of both its directions together (root of the "
-        "trace): equal both ways it gives 0.63, 0.98 and 0.83. Gross: more than "
+        "within 2, median 0.67. Where the truth itself is uncertain, its error is added. The stated error of the axis "
+        "is that of both its directions together (root of the trace): equal both ways it gives 0.63, 0.98 and 0.83. "
+        "Gross: more than "
         f"{GROSS_RPS:g} rps or {GROSS_DEG:g} degrees off.",
     )
 
 
 def ratios(rows: Sequence[Row], error: str, std: str) -> NDArray[np.float64]:
-    """(k,) error over stated error of the rows that have both."""
-    pairs = [(row[error], row[std]) for row in rows]
-    both = [(float(e), float(s)) for e, s in pairs if isinstance(e, float) and isinstance(s, float)]
-    return np.array([e / max(s, 1e-9) for e, s in both])
+    """(k,) error over stated error, that of the truth added to it, of the rows that have both."""
+    pairs = [(row[error], row[std], row.get(OF_TRUTH[std])) for row in rows]
+    both = [
+        (float(off), math.hypot(stated, true if isinstance(true, float) else 0.0))
+        for off, stated, true in pairs
+        if isinstance(off, float) and isinstance(stated, float)
+    ]
+    return np.array([off / max(stated, 1e-9) for off, stated in both])
 
 
 @dataclass(frozen=True)

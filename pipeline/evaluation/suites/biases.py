@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import dataclasses
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,10 +12,15 @@ from numpy.typing import NDArray
 
 from ...biases import PAPER, BiasParameters
 from ...camera import Camera
-from ...errors import RecordingError
+from ...errors import RecordingError, SpinscopeError
+from ...events import EventBatch
+from ...session import Session
+from ...shots import Shot
+from ...sidecar import biases_beside
 from ...simulator import Background, Scene, SimulatedRecording, flight, simulate_scene
 from ...simulator.sensor import LOGO
-from ..lab_recordings import FLIGHT, SPINNER, LabRecording
+from ..estimation import PAPER_METHOD, longest
+from ..lab_recordings import FLIGHT, SPINNER, LabFolder, LabRecording
 from ..plots import Figures, curve, label_axes, panels
 from ..rendering import camera_of
 from ..tables import Cell, ResultTable, Row, distinct, summary, where
@@ -42,6 +48,8 @@ SWEEPS: dict[str, tuple[tuple[str, ...], tuple[int, ...], tuple[int, ...]]] = {
 PICTURES = {"diff_on = diff_off": ((40, 90, 140), 3000), "refr": ((120, 80, -20), 2000), "fo": ((-35, 55), 1000)}
 NEEDS = ("simulator", "biases.py", "evaluation/suites/biases.py")  # the estimators have no part in it
 PICTURE_PX = 64  # side of a picture; the ball has a radius of about 17 px
+# Of real recordings: half a picture's side over the ball's radius, and the share of it that the rim does not reach.
+PICTURE_RADII, INNER_SHARE = 1.9, 0.8
 
 
 def tasks(quick: bool) -> list[Task]:
@@ -67,7 +75,7 @@ def _row(what: str, sweep: str, value: int, seed: int | None, made: SimulatedRec
     """The columns of every row; the rates are those of the recording, None without one."""
     paper = all(getattr(PAPER, name) == value for name in SWEEPS[sweep][0])
     row: Row = {"what": what, "sweep": sweep, "value": value, "paper": paper, "seed": seed}
-    row |= dict.fromkeys(("on_hz", "off_hz", "logo_hz"))
+    row |= dict.fromkeys(("on_hz", "off_hz", "logo_hz", "off_px"))
     if made is not None:
         on, seconds = made.events.on, made.scene.duration_s
         row |= {"on_hz": float(on.sum()) / seconds, "off_hz": float((~on).sum()) / seconds}
@@ -94,9 +102,68 @@ def real(context: TaskContext, recording: LabRecording) -> list[Row]:
         )
     start_us, end_us = session.source.start_us, session.source.end_us
     on, seconds = session.source.between(start_us, end_us).on, (end_us - start_us) * 1e-6
-    what = "ball" if session.estimate("triplet").shots else "noise"
+    shot = longest(session.estimate(PAPER_METHOD))
+    what = "noise" if shot is None else "ball"
     rates: Row = {"on_hz": float(on.sum()) / seconds, "off_hz": float((~on).sum()) / seconds}
-    return [_row(what, sweep, value, None) | rates for sweep, value in sweeps]
+    rows = [_row(what, sweep, value, None) | rates for sweep, value in sweeps]
+    pictured = [(sweep, value) for sweep, value in sweeps if sweep in PICTURES]
+    if shot is not None and pictured and recording.kind == FLIGHT and (reference := _reference(recording)):
+        for sweep, value in pictured:
+            rows += _same_pose(session, shot, sweep, value, reference)
+    return rows
+
+
+def _reference(recording: LabRecording) -> tuple[LabRecording, Shot] | None:
+    """The recording in the same folder with the paper's biases and a ball, by which the others are aligned."""
+    for other in LabFolder.of(recording.path.parent, recording.choices).recordings:
+        if biases_beside(other.path) == PAPER and other.path.parent == recording.path.parent:
+            try:
+                shot = longest(other.session.estimate(PAPER_METHOD))
+            except SpinscopeError:
+                continue
+            if shot is not None:
+                return other, shot
+    return None
+
+
+def _same_pose(session: Session, shot: Shot, sweep: str, value: int, reference: tuple[LabRecording, Shot]) -> list[Row]:
+    """The picture of a ball where that of the reference shows most; none where it never comes there.
+
+    For a robot arm that repeats its movement equal places are equal poses.
+    """
+    span_us = PICTURES[sweep][1]
+    other, its_shot = reference
+    inside = _events_on_ball(other.session, its_shot, span_us)
+    if not inside.size:
+        return []
+    place = its_shot.state[np.argmax(inside)]
+    away = np.hypot(shot.state[:, 0] - place[0], shot.state[:, 1] - place[1])
+    nearest = int(np.argmin(away))
+    # Between two ticks the ball goes on evenly: back or on to the foot of the perpendicular.
+    x, y, vx, vy = shot.state[nearest, :4]
+    late_s = ((place[0] - x) * vx + (place[1] - y) * vy) / max(vx**2 + vy**2, 1.0)
+    x, y = x + vx * late_s, y + vy * late_s
+    off_px = float(np.hypot(x - place[0], y - place[1]))
+    if off_px > place[4]:
+        return []
+    at_us = round(float(shot.t_us[nearest]) + 1e6 * late_s + session.parameters.track.latency_us)
+    side = 2 * math.ceil(PICTURE_RADII * float(place[4]))
+    shown = session.source.between(at_us - span_us, at_us)
+    row = _row("picture", sweep, value, None) | {"span_us": span_us, "off_px": off_px}
+    return [row | {"picture": _drawn(shown, at_us, (x, y), side, sweep)}]
+
+
+def _events_on_ball(session: Session, shot: Shot, span_us: int) -> NDArray[np.int64]:
+    """(n,) events of a span on the ball, without its rim, before each tick of the shot."""
+    counts = np.zeros(shot.t_us.size, np.int64)
+    for tick, (t_us, state) in enumerate(zip(shot.t_us, shot.state, strict=True)):
+        end_us = round(float(t_us) + session.parameters.track.latency_us)
+        seen = session.source.between(end_us - span_us, end_us)
+        x, y, vx, vy, radius = state
+        ago_s = (end_us - seen.t_us) * 1e-6
+        away = np.hypot(seen.x_px - x + vx * ago_s, seen.y_px - y + vy * ago_s)
+        counts[tick] = np.count_nonzero(away < INNER_SHARE * radius)
+    return counts
 
 
 def measure_noise(context: TaskContext, sweep: str, value: int, seed: int) -> list[Row]:
@@ -135,25 +202,31 @@ def take_picture(context: TaskContext, sweep: str, value: int, duration_ms: int 
     made = simulate_scene(scene, camera=camera, sensor=_set(sweep, value), seed=SEED)
     shown = made.events.between(at_us - span_us, at_us)
     truth = made.truth
+    centre = float(np.interp(at_us, truth.t_us, truth.x_px)), float(np.interp(at_us, truth.t_us, truth.y_px))
+    row = _row("picture", sweep, value, SEED) | {"span_us": span_us, "off_px": 0.0}
+    return [row | {"picture": _drawn(shown, at_us, centre, PICTURE_PX, sweep)}]
+
+
+def _drawn(shown: EventBatch, at_us: int, centre_px: tuple[float, float], side: int, sweep: str) -> str:
+    """A picture of so many pixels a side, as text for a row: the last event of each pixel before a time."""
     x, y = (
-        column.astype(np.int64) - round(float(np.interp(at_us, truth.t_us, centre)) - PICTURE_PX / 2)
-        for column, centre in ((shown.x_px, truth.x_px), (shown.y_px, truth.y_px))
+        column.astype(np.int64) - round(middle - side / 2)
+        for column, middle in zip((shown.x_px, shown.y_px), centre_px, strict=True)
     )
-    inside = (x >= 0) & (y >= 0) & (x < PICTURE_PX) & (y < PICTURE_PX)
+    inside = (x >= 0) & (y >= 0) & (x < side) & (y < side)
     sign = np.where(shown.on, 1.0, -1.0)
     if sweep == "fo":  # linear time surface: the latest event counts, the older the less
-        sign = sign * (1 - (at_us - shown.t_us) / span_us)
-    picture = np.zeros((PICTURE_PX, PICTURE_PX))
+        sign = sign * (1 - (at_us - shown.t_us) / PICTURES[sweep][1])
+    picture = np.zeros((side, side))
     picture[y[inside], x[inside]] = sign[inside]
-    row = _row("picture", sweep, value, SEED) | {"span_us": span_us}
-    row["picture"] = base64.b64encode(np.rint(127 * picture).astype(np.int8).tobytes()).decode("ascii")
-    return [row]
+    return base64.b64encode(np.rint(127 * picture).astype(np.int8).tobytes()).decode("ascii")
 
 
 def picture_of(row: Row) -> NDArray[np.float64]:
-    """(PICTURE_PX, PICTURE_PX) float64 in -1 (OFF) to 1 (ON) of a row of `take_picture`."""
+    """(side, side) float64 in -1 (OFF) to 1 (ON) of a row with a picture."""
     flat = np.frombuffer(base64.b64decode(str(row["picture"])), np.int8)
-    return flat.reshape(PICTURE_PX, PICTURE_PX) / 127.0
+    side = math.isqrt(flat.size)
+    return flat.reshape(side, side) / 127.0
 
 
 def _busiest(scene: Scene, camera: Camera, span_us: int) -> int:
@@ -182,7 +255,19 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
             lines.append((mark, *rates, *(summary(ball, name) for name in ("on_hz", "off_hz", "logo_hz"))))
         columns = ("bias", "noise ON [1/s]", "noise OFF [1/s]", "ball ON [1/s]", "ball OFF [1/s]", "logo [1/s]")
         result.append(ResultTable(f"Event rate against bias_{sweep}", columns, lines, EXPECTED[sweep]))
+    aligned = [row for row in rows if row["what"] == "picture" and row["seed"] is None]
+    if aligned:
+        names = ("recording", "sweep", "value", "off_px")
+        of_pictures: list[tuple[Cell, ...]] = [tuple(row[name] for name in names) for row in aligned]
+        header = ("recording", "bias", "value", "off the reference's place [px]")
+        result.append(ResultTable("Pictures at equal places of the ball", header, of_pictures, ALIGNED_NOTE))
     return result
+
+
+ALIGNED_NOTE = (
+    "Of recordings of one movement, as of a robot arm: where the ball of the one with the paper's biases shows most "
+    "events inside its rim. A recording whose ball never comes there has no picture."
+)
 
 
 EXPECTED = {
@@ -207,7 +292,7 @@ def figures(rows: Sequence[Row]) -> Figures:
             title = f"{what}, bias_{sweep}"
             label_axes(panel, title, "bias (green: the paper's)", "events [1/s]", log=what == "noise")
     result = {"rates": figure}
-    pictures = where(rows, what="picture")
+    pictures = sorted(where(rows, what="picture"), key=lambda row: (sweeps.index(row["sweep"]), row["value"]))
     if pictures:
         columns = min(len(pictures), 4)
         figure, axes = panels(-(-len(pictures) // columns), columns)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 import tomli_w
 
@@ -15,16 +17,30 @@ from spinscope.pipeline.errors import ParameterError, RecordingError
 from spinscope.pipeline.evaluation import LabFolder, SceneChoices, TaskContext, evaluate, evaluate_real
 from spinscope.pipeline.evaluation.protocol import protocol_findings
 from spinscope.pipeline.evaluation.rendering import render
-from spinscope.pipeline.evaluation.suites import SUITES, filters, runtime, spinner, thrower
+from spinscope.pipeline.evaluation.suites import SUITES, biases, filters, runtime, spinner, thrower
+from spinscope.pipeline.evaluation.suites.biases import picture_of
 from spinscope.pipeline.evaluation.tables import Row, where
-from spinscope.pipeline.recordings import write_recording
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.recordings import open_recording, write_recording
 from spinscope.pipeline.registry import Parameters
 from spinscope.pipeline.session import Choices
 from spinscope.pipeline.simulator import SimulatedRecording
 from spinscope.pipeline.simulator import spinner as spinner_scene
 
 Lab = tuple[Path, dict[str, list[Row]]]  # folder of recordings, and rows of the suites by name
-UNKNOWN = {"recording", "seed", "logo_events", "visible", "velocity_setting", "spin_setting", "kind", "duration_ms"}
+UNKNOWN = {
+    "setting",
+    "dotted_shots",
+    "sensor",
+    "recording",
+    "seed",
+    "logo_events",
+    "visible",
+    "velocity_setting",
+    "spin_setting",
+    "kind",
+    "duration_ms",
+}
 
 
 def keep(made: SimulatedRecording, path: Path, truth: dict[str, object], **tables: object) -> None:
@@ -133,13 +149,59 @@ def test_filters_biases_and_run_times_of_real_flights(
     assert [row["kept_all"] for row in kept] == sorted(float(str(row["kept_all"])) for row in kept)
     best = where(of_filters.rows, question="spin", method="best", mode="trail")
     assert len(best) == 1 and all(float(str(row["magnitude_error_rps"])) < 0.5 for row in best)
-    biases = evaluate_real("biases", tmp_path, TaskContext())
-    assert {row["sweep"] for row in biases.rows} >= {"fo", "hpf", "refr"} and {row["what"] for row in biases.rows} == {
-        "ball"
-    }
+    of_biases = evaluate_real("biases", tmp_path, TaskContext()).rows
+    assert {row["sweep"] for row in of_biases} >= {"fo", "hpf", "refr"}
+    assert {row["what"] for row in of_biases} == {"ball", "picture"}
     monkeypatch.setattr(runtime, "TICKS_US", (5000,))
     times = evaluate_real("runtime", tmp_path, TaskContext())
     assert len(times.rows) > 10 and all(float(str(row["latency_ms"])) > 0 for row in times.rows)
+
+
+def test_dotted_balls_are_the_truth_of_their_setting(lab: Lab, tmp_path: Path) -> None:
+    source = lab[0] / "day2-flight0.npz"
+    (tmp_path / source.name).write_bytes(source.read_bytes())
+    truth = tomllib.loads(source.with_suffix(".toml").read_text())["truth"]
+    about = {"setting": truth["setting"], "dotted_shots": "spindoe.csv", "speed_m_s": truth["speed_m_s"]}
+    (tmp_path / source.with_suffix(".toml").name).write_text(tomli_w.dumps({"truth": about}))
+    scatter = np.random.default_rng(76_010).standard_normal((5, 3))
+    shots = np.array(truth["spin_rps"]) + 2.0 * (scatter - scatter.mean(axis=0))
+    lines = [f'"{truth["setting"]}",{x:.9f},{y:.9f},{z:.9f}' for x, y, z in shots * 2 * np.pi]
+    (tmp_path / "spindoe.csv").write_text("\n".join(["setting,x_spin,y_spin,z_spin", *lines, "other,1,2,3"]))
+    found = evaluate_real("thrower", tmp_path, TaskContext())
+    (table,) = (table for table in found.tables if table.title == "Flying balls by setting")
+    assert table.rows[0][:2] == (truth["setting"], 5)
+    assert table.rows[0][2:4] == pytest.approx((np.linalg.norm(truth["spin_rps"]), 2.2), rel=0.5)
+    (own,) = where(lab[1]["thrower"], method="best", seed=lab[1]["thrower"][0]["seed"])
+    (best,) = where(found.rows, method="best")
+    assert best["axis_error_deg"] == pytest.approx(own["axis_error_deg"], abs=1e-4)
+    (tmp_path / "spindoe.csv").write_text("setting,x_spin,y_spin,z_spin\nother,1,2,3")
+    assert "no dotted shot is of the setting" in str(
+        evaluate_real("thrower", tmp_path, TaskContext()).tables[0].rows[-1]
+    )
+
+
+def test_pictures_of_one_movement_are_taken_at_equal_places(lab: Lab, tmp_path: Path) -> None:
+    source = lab[0] / "day2-flight0.npz"
+    flown = open_recording(source)
+    events = flown.read()
+    for name, values, later_us in (("paper", {}, 0), ("short", {"refr": 120}, 7_300), ("wide", {"fo": -35}, 51_900)):
+        moved = EventBatch(events.t_us + later_us, events.x_px, events.y_px, events.on)
+        write_recording(tmp_path / f"{name}.npz", moved, width_px=flown.width_px, height_px=flown.height_px)
+        write_biases(PAPER.with_values(values), tmp_path / f"{name}.bias")
+    found = evaluate_real("biases", tmp_path, TaskContext())
+    pictures = where(found.rows, what="picture")
+    assert [(row["recording"], row["sweep"]) for row in pictures] == [
+        *(("paper.npz", sweep) for sweep in ("diff_on = diff_off", "fo", "refr")),
+        ("short.npz", "refr"),
+        ("wide.npz", "fo"),
+    ]
+    assert all(float(str(row["off_px"])) < 0.5 for row in pictures)
+    of_paper, of_short = (picture_of(row) for row in where(pictures, sweep="refr"))
+    assert of_paper.shape == of_short.shape
+    assert np.count_nonzero(of_paper) > 100
+    assert np.corrcoef(of_paper.ravel(), of_short.ravel())[0, 1] > 0.5  # the same events, a part of a pixel apart
+    (table,) = (table for table in found.tables if table.title == "Pictures at equal places of the ball")
+    assert len(table.rows) == 5 and len(biases.figures(found.rows)["pictures"].axes) >= 5
 
 
 def test_protocol(lab: Lab, capsys: pytest.CaptureFixture[str]) -> None:
