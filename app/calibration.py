@@ -7,17 +7,25 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomli_w
 
 from spinscope.pipeline.calibration.board import Board, BoardView, Pattern, board_views
 from spinscope.pipeline.calibration.camera_calibration import calibrate_camera, focal_length_px
+from spinscope.pipeline.calibration.pixel_latency import TurningDisc, pixel_latency
+from spinscope.pipeline.calibration.stereo_calibration import calibrate_stereo
 from spinscope.pipeline.calibration.table_pose import table_pose
 from spinscope.pipeline.camera import Camera
 from spinscope.pipeline.errors import ParameterError, RecordingError
 from spinscope.pipeline.files import atomic_file, check_writable
+from spinscope.pipeline.pictures import grey_picture
 from spinscope.pipeline.presets import preset
+from spinscope.pipeline.recording_folders import recordings_in
 from spinscope.pipeline.recordings import ReadingOptions, open_recording
+from spinscope.pipeline.recordings.trials import trial_windows_us
 from spinscope.pipeline.session import Choices, Progress, Session
+
+LATENCY_RANGE_US = 10_000.0  # of `track.latency_us`
 
 
 def calibrate_by_board(
@@ -98,6 +106,87 @@ def calibrate_table(
         f"{pose.reprojection_px:.2f} px at most",
         f"wrote {out}",
     ]
+
+
+def calibrate_second_camera(
+    folder: Path,
+    size: tuple[int, int],
+    square_mm: float,
+    pattern: Pattern,
+    camera: str,
+    frame_camera: str | None,
+    reading: ReadingOptions,
+    out: Path,
+) -> list[str]:
+    """Find where a frame camera stands beside the event camera; see `calibrate_by_board`.
+
+    The folder holds a recording `NAME.raw` (or of another format) and a picture `NAME.png` of the board for each pose.
+    Without a preset for the frame camera the pictures calibrate it, too.
+    """
+    board = Board(*size, square_mm, pattern)
+    _check_name(out)
+    pairs: list[tuple[BoardView, BoardView]] = []
+    said: list[str] = []
+    sizes: set[tuple[tuple[int, int], tuple[int, int]]] = set()
+    for path in recordings_in([folder]):
+        try:
+            picture = grey_picture(path.with_suffix(".png"))
+            recording = open_recording(path, **dataclasses.asdict(reading))
+            views = board_views(recording, board)
+            if len(views) > 1:
+                raise RecordingError(f"the board moves: keep it still for each pair of recording and picture: {path}")
+            seen = board.find(picture)
+            if seen is None:
+                raise RecordingError(f"the board is not seen in {path.with_suffix('.png')}")
+        except RecordingError as error:
+            said.append(f"left out: {error}")
+            continue
+        pairs.append((views[0], BoardView(views[0].t_us, *seen)))
+        sizes.add(((recording.width_px, recording.height_px), (picture.shape[1], picture.shape[0])))
+    if len(sizes) != 1:
+        wrong = "; ".join(said) or "no recordings"
+        if sizes:
+            wrong = (
+                "sensors or pictures are of several sizes: keep those of one pair of cameras in a folder of their own"
+            )
+        raise RecordingError(f"the cameras cannot be calibrated: {wrong}: {folder}")
+    ((event_size, frame_size),) = sizes
+    if frame_camera is None:
+        own = calibrate_camera([frame for _, frame in pairs], board, frame_size)
+        said.append(f"frame camera: {own}")
+        second = own.camera
+    else:
+        second = Camera.of(preset(frame_camera).camera, *frame_size)
+    found = calibrate_stereo(pairs, board, Camera.of(preset(camera).camera, *event_size), second)
+    found.write(out)
+    return [*said, *(f"warning: {one}" for one in found.warnings), str(found), f"wrote {out}"]
+
+
+def calibrate_latency(
+    recordings: Sequence[Path],
+    circle: tuple[float, float, float],
+    channel: int | None,
+    reading: ReadingOptions,
+    out: Path,
+) -> list[str]:
+    """Find track.latency_us by recordings of a turning disc with a trigger a turn; see `calibrate_by_board`."""
+    _check_name(out)
+    discs = []
+    for path in recordings:
+        recording = open_recording(path, **dataclasses.asdict(reading))
+        edges_us = np.array([start_us for start_us, _ in trial_windows_us(recording, channel=channel)], np.int64)
+        discs.append(TurningDisc(recording.read(), edges_us))
+    found = pixel_latency(discs, circle)
+    if not 0.0 <= found.latency_us <= LATENCY_RANGE_US:
+        raise RecordingError(
+            f"the pixels seem to be {found.latency_us:.0f} us late: do the triggers come at the same place of the disc "
+            "at each speed, and is their clock the camera's?"
+        )
+    with atomic_file(out, "calibration") as part:
+        part.write_text(tomli_w.dumps({"track": {"latency_us": round(found.latency_us, 1)}}))
+    speeds = ", ".join(f"{disc.speed_rps:.1f}" for disc in discs)
+    known = f"the pixels report an edge {found.latency_us:.1f} +- {found.std_us:.1f} us late (at {speeds} rps)"
+    return [known, f"wrote {out}"]
 
 
 def _check_name(out: Path) -> None:

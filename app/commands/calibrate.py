@@ -1,4 +1,4 @@
-"""`spinscope calibrate`: the camera by a board or a ball, and the table's pose."""
+"""`spinscope calibrate`: the camera, a frame camera beside it, the pixels' latency, and the table's pose."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class BoardSize(click.ParamType[tuple[int, int]]):
 
 @click.group()
 def calibrate() -> None:
-    """Calibrate the camera, and the table's pose."""
+    """Calibrate the camera, a frame camera beside it, the pixels' latency, and the table's pose."""
 
 
 @calibrate.command()
@@ -81,6 +81,65 @@ def camera(
                 raise click.UsageError("how large are the board's squares? give --square-mm")
             said = running.calibrate_by_board(recordings, board, square_mm, pattern, pixel_um, reading, out, bar)
     for line in said:
+        note(line)
+
+
+@calibrate.command()
+@click.argument("folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
+@click.option("--board", type=BoardSize(), required=True, help="Inner corners of the board, like 9x6.")
+@click.option("--square-mm", type=float, required=True, help="Side of the board's squares on the screen, in mm.")
+@click.option("--pattern", type=click.Choice(["chessboard", "charuco"]), default="chessboard", show_default=True)
+@click.option("--camera", "preset", required=True, metavar="FILE.toml", help="The calibrated event camera.")
+@click.option(
+    "--frame-camera", metavar="FILE.toml", help="The calibrated frame camera; by default the pictures calibrate it."
+)
+@click.option("--out", type=click.Path(path_type=Path), required=True, metavar="FILE.toml", help="File to write.")
+@reading_options
+def stereo(
+    folder: Path,
+    board: tuple[int, int],
+    square_mm: float,
+    pattern: Pattern,
+    preset: str,
+    frame_camera: str | None,
+    out: Path,
+    reading: ReadingOptions,
+) -> None:
+    """Find where a frame camera stands beside the event camera.
+
+    FOLDER holds, for each pose of the board, a recording of it blinking (NAME.raw) and a picture of it (NAME.png). With
+    `camera_frame = "FILE.toml"` in a sidecar's [truth], spins measured by the frame camera are turned into the event
+    camera's frame.
+    """
+    from .. import calibration as running
+
+    for line in running.calibrate_second_camera(folder, board, square_mm, pattern, preset, frame_camera, reading, out):
+        note(line)
+
+
+@calibrate.command()
+@click.argument("recordings", nargs=-1, required=True, type=RECORDING, metavar="FILE...")
+@click.option(
+    "--disc", type=float, nargs=3, required=True, metavar="X Y RADIUS", help="Axis of the disc, and its marks, in px."
+)
+@click.option("--channel", type=click.IntRange(0, 255), help="Trigger input, where there are several.")
+@click.option("--out", type=click.Path(path_type=Path), required=True, metavar="FILE.toml", help="Preset to write.")
+@reading_options
+def latency(
+    recordings: tuple[Path, ...],
+    disc: tuple[float, float, float],
+    channel: int | None,
+    out: Path,
+    reading: ReadingOptions,
+) -> None:
+    """Find how late the pixels report an edge (track.latency_us), from a turning disc.
+
+    Let a disc with marks turn before the camera, facing it, with a pulse a turn on the trigger input (a light barrier).
+    Record it at two speeds or more, turning the same way.
+    """
+    from .. import calibration as running
+
+    for line in running.calibrate_latency(recordings, disc, channel, reading, out):
         note(line)
 
 

@@ -81,7 +81,7 @@ def simulate_board(
     for pose in poses:
         turn = rotations(np.array(pose.turn_rad))[0]
         corners.append(camera.project(points_m @ turn.T + pose.shift_m))
-        white = _share_of_white(rays, pose, columns, rows, square_mm * 1e-3, lens).ravel()
+        white = share_of_white(rays, pose, columns, rows, square_mm * 1e-3, lens).ravel()
         lit = np.flatnonzero(white > 1e-3)
         for _ in range(blinks):
             for begin_us, on, threshold in ((start_us, True, up[lit]), (start_us + half_us, False, down[lit])):
@@ -98,7 +98,7 @@ def simulate_board(
     return SimulatedBoard(read_out([*parts, still], sensor, duration_us, random).events, camera, np.array(corners))
 
 
-def _share_of_white(rays: Floats, pose: BoardPose, columns: int, rows: int, square_m: float, lens: Lens) -> Floats:
+def share_of_white(rays: Floats, pose: BoardPose, columns: int, rows: int, square_m: float, lens: Lens) -> Floats:
     """(height, width) share of each pixel's light that comes from white squares and margin, blurred by the lens.
 
     Between the pixels, rays (height, width, 3) change evenly.
