@@ -17,6 +17,7 @@ from ..camera import Camera, CameraParameters
 from ..errors import ParameterError, RecordingError
 from ..files import atomic_file
 from .board import Board, BoardView, corners_of
+from .bundle_adjustment import BoardPoses, adjusted, distortion_std_px, residuals
 
 Floats = NDArray[np.float64]
 
@@ -24,7 +25,8 @@ LEAST_VIEWS = 5  # five unknowns of the lens and six of each view; OpenCV's advi
 # A view that fits so much worse than the median's is wrong: a corner taken for its neighbour, or a moving board.
 OUTLIER_RATIO = 3.0
 GRID = 4  # cells of the image a side; the four at its corners tell the distortion
-FOCAL_STD_SHARE = 0.005  # a focal length known less well than this is said to be so
+# A focal length, and a distortion in the image's corners, known less well than this are said to be so.
+FOCAL_STD_SHARE, CORNER_STD_PX = 0.005, 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +38,8 @@ class CameraCalibration:
     camera : Camera
     pixel_um : float
         Pitch by which the focal length is stated in mm.
-    focal_std_px : float
-        1 sigma of the focal length.
+    focal_std_px, corner_std_px : float
+        1 sigma of the focal length, and of the distortion in the image's worst corner.
     reprojection_px : float
         Root mean square distance of the corners from where the camera puts them.
     corners_px, residual_px : (n, 2) float64
@@ -49,6 +51,7 @@ class CameraCalibration:
     camera: Camera
     pixel_um: float
     focal_std_px: float
+    corner_std_px: float
     reprojection_px: float
     corners_px: Floats
     residual_px: Floats
@@ -82,6 +85,11 @@ class CameraCalibration:
                 f"the board never came into the image's corners {', '.join(names)}: the distortion there is a guess; "
                 "record views with the board in them"
             )
+        if not names and self.corner_std_px > CORNER_STD_PX:
+            said.append(
+                f"the distortion in the image's corners is uncertain by {self.corner_std_px:.1f} px: bring the board "
+                "farther into them, and nearer, or show a ChArUco board, of which a part is enough"
+            )
         if self.focal_std_px > FOCAL_STD_SHARE * self.camera.focal_px:
             said.append(
                 f"the focal length is uncertain by {100 * self.focal_std_px / self.camera.focal_px:.1f} %: tilt the "
@@ -103,7 +111,8 @@ class CameraCalibration:
             f"focal length {self.values['focal_length_mm']:.4f} mm "
             f"({camera.focal_px:.2f} +- {self.focal_std_px:.2f} px), "
             f"principal point ({camera.principal_x_px:.1f}, {camera.principal_y_px:.1f}) px, "
-            f"distortion {distortion}; {self.views} views, reprojection error {self.reprojection_px:.3f} px{left_out}"
+            f"distortion {distortion} (+- {self.corner_std_px:.2f} px in the image's corners); {self.views} views, "
+            f"reprojection error {self.reprojection_px:.3f} px{left_out}"
         )
 
     def write(self, path: Path) -> None:
@@ -181,17 +190,20 @@ def calibrate_camera(
     if not good.all() and good.sum() >= LEAST_VIEWS:
         used = [view for view, keep in zip(used, good, strict=True) if keep]
         fit = _fit(used, board, size_px)
-    matrix = fit.matrix
-    camera = Camera(
-        *size_px, float(matrix[0, 0]), float(matrix[0, 2]), float(matrix[1, 2]), fit.distortion, CameraParameters().up
-    )
+    intrinsics, covariance = adjusted(fit.intrinsics, fit.poses)
+    focal_px, cx, cy, *distortion = intrinsics.tolist()
+    camera = Camera(*size_px, focal_px, cx, cy, (*distortion, 0.0), CameraParameters().up)
+    right, bottom = size_px[0] - 1.0, size_px[1] - 1.0
+    image_corners = camera.rays([0.0, right, 0.0, right], [0.0, 0.0, bottom, bottom])
+    residual_px = np.concatenate(residuals(intrinsics, fit.poses))
     return CameraCalibration(
         camera=camera,
         pixel_um=pixel_um,
-        focal_std_px=fit.focal_std_px,
-        reprojection_px=math.sqrt(float(np.mean(np.sum(fit.residual_px**2, axis=1)))),
+        focal_std_px=math.sqrt(covariance[0, 0]),
+        corner_std_px=float(distortion_std_px(intrinsics, covariance, image_corners).max()),
+        reprojection_px=math.sqrt(float(np.mean(np.sum(residual_px**2, axis=1)))),
         corners_px=np.concatenate([view.corners_px for view in used]),
-        residual_px=fit.residual_px,
+        residual_px=residual_px,
         views=len(used),
         left_out=len(views) - len(used),
     )
@@ -199,22 +211,20 @@ def calibrate_camera(
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """OpenCV's answer."""
+    """OpenCV's answer, with the root mean square residual of each view."""
 
-    matrix: Floats
-    distortion: tuple[float, ...]
-    focal_std_px: float
+    intrinsics: Floats
+    poses: BoardPoses
     view_px: Floats
-    residual_px: Floats
 
 
 def _fit(views: Sequence[BoardView], board: Board, size_px: tuple[int, int]) -> _Fit:
     import cv2
 
-    on_board, in_image = zip(*corners_of(views, board), strict=True)
+    on_board, in_image = (list(places) for places in zip(*corners_of(views, board), strict=True))
     flags = cv2.CALIB_FIX_ASPECT_RATIO | cv2.CALIB_FIX_K3
     try:
-        _, matrix, distortion, turns, shifts, std, _, view_px = cv2.calibrateCameraExtended(
+        _, matrix, distortion, turns, shifts, _, _, view_px = cv2.calibrateCameraExtended(
             [points.astype(np.float32) for points in on_board],
             [points.astype(np.float32).reshape(-1, 1, 2) for points in in_image],
             size_px,
@@ -224,14 +234,10 @@ def _fit(views: Sequence[BoardView], board: Board, size_px: tuple[int, int]) -> 
         )
     except cv2.error as error:
         raise RecordingError(f"no camera explains the views of the board ({error.err}): check --board") from error
-    residual = [
-        seen - cv2.projectPoints(points, turn, shift, matrix, distortion)[0].reshape(-1, 2)
-        for points, seen, turn, shift in zip(on_board, in_image, turns, shifts, strict=True)
-    ]
-    # With a fixed aspect ratio OpenCV states the error of the vertical focal length alone.
-    coefficients = tuple(float(value) for value in distortion.ravel()[:5])
-    fitted, of_view = (np.asarray(values, np.float64) for values in (matrix, view_px))
-    return _Fit(fitted, coefficients, float(std[1, 0]), of_view.ravel(), np.concatenate(residual))
+    turned, shifted = ([np.asarray(one, np.float64).ravel() for one in every] for every in (turns, shifts))
+    poses = BoardPoses(on_board, in_image, turned, shifted)
+    intrinsics = np.array([matrix[0, 0], matrix[0, 2], matrix[1, 2], *distortion.ravel()[:4]], np.float64)
+    return _Fit(intrinsics, poses, np.asarray(view_px, np.float64).ravel())
 
 
 def focal_length_px(
