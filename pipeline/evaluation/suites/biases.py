@@ -6,6 +6,7 @@ import base64
 import dataclasses
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,12 +117,10 @@ def real(context: TaskContext, recording: LabRecording) -> list[Row]:
 def _reference(recording: LabRecording) -> tuple[LabRecording, Shot] | None:
     """The recording in the same folder with the paper's biases and a ball, by which the others are aligned."""
     for other in LabFolder.of(recording.path.parent, recording.choices).recordings:
-        if biases_beside(other.path) == PAPER and other.path.parent == recording.path.parent:
-            try:
-                shot = longest(other.session.estimate(PAPER_METHOD))
-            except SpinscopeError:
-                continue
-            if shot is not None:
+        if other.path.parent != recording.path.parent:
+            continue
+        with suppress(SpinscopeError):  # what is wrong with it is said where it is measured itself
+            if biases_beside(other.path) == PAPER and (shot := longest(other.session.estimate(PAPER_METHOD))):
                 return other, shot
     return None
 
