@@ -4,20 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from ...errors import RecordingError
 from ...results import spin_errors
+from ...simulator.logos import Logo
 from .. import paper
-from ..estimation import COLUMNS, method_lines
+from ..estimation import COLUMNS, errors_against_stated, method_lines
 from ..frame_camera import FrameCamera, frames
+from ..frame_folder import FrameFolder, frame_camera_beside
 from ..frame_matching import spin_from_frames
+from ..lab_recordings import FLIGHT, LabRecording
 from ..plots import flight_figure
 from ..tables import Cell, ResultTable, Row
 from ..tasks import Task, TaskContext
-from ..uncertainty_calibration import RIGHT_NOTE
+from ..uncertainty_calibration import ERRORS, RIGHT_NOTE, STATED
 from . import thrower
 
 LABEL = "Frame camera against event camera: the paper's table 2"
 HELP = "A frame camera beside the event camera on the same flights (table 2)."
 
+REAL_KINDS = (FLIGHT,)
+
+STEREO = "stereo.toml"  # of `spinscope calibrate stereo`
 FRAME = "frame"  # the rival among the methods
 # What the rival's results depend on: nothing of the event camera's pipeline.
 FILES = ("rendering", "suites/thrower", "suites/frames", "frame_camera", "frame_albedo", "frame_matching")
@@ -43,6 +52,30 @@ def measure(context: TaskContext, velocity: int, spin: int, side: bool, seed: in
     if found is not None:
         row["magnitude_error_rps"], row["axis_error_deg"] = spin_errors(found, recording.truth.spin_rps[0])
     return [row]
+
+
+def real(context: TaskContext, recording: LabRecording) -> list[Row]:
+    """The same of a real flight, of which pictures lie in the folder `NAME.frames` beside `NAME.raw`.
+
+    `stereo.toml` there or beside the recording tells of the frame camera; `logo.png` beside the recording is the
+    ball's logo, the simulator's where it is absent.
+    """
+    folder = recording.path.with_suffix(".frames")
+    if not folder.is_dir():
+        raise RecordingError(f"no pictures of the frame camera: put them, named by time, in the folder {folder.name}")
+    rows = thrower.real(context, recording)
+    truth, session = recording.stated, recording.session
+    read = FrameFolder.read(folder)
+    own = folder / STEREO
+    camera, rotation = frame_camera_beside(own if own.is_file() else folder.parent / STEREO, read.size_px)
+    drawn = folder.parent / "logo.png"
+    logo = Logo.of(str(drawn)) if drawn.is_file() else Logo()
+    found, reason = spin_from_frames(read.frames, camera, session.ball_radius_m, read.rate_hz, logo)
+    row = rows[0] | dict.fromkeys(("found_rps", *ERRORS, *STATED)) | {"method": FRAME, "reason": reason}
+    if found is not None:
+        row["found_rps"] = float(np.linalg.norm(found))
+        row |= zip(ERRORS, errors_against_stated(rotation.T @ found, truth), strict=True)
+    return [*rows, row]
 
 
 def tables(rows: Sequence[Row]) -> list[ResultTable]:
