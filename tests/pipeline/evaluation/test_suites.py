@@ -85,6 +85,15 @@ def test_thrower_and_the_frame_camera_beside_it(cache: Path) -> None:
     assert magnitude < 0.05 and axis < 0.5
 
 
+def test_the_sample_shows_the_papers_preset_and_ours(cache: Path) -> None:
+    (table,) = run("samples", cache).tables
+    assert {line[0] for line in table.rows} == {"flight_back.h5"} and table.rows[0][2] == pytest.approx(55.2, abs=0.3)
+    ours, of_paper = (
+        next(line[3] for line in table.rows if line[1] == method) for method in ("triplet", "triplet, paper preset")
+    )
+    assert ours != of_paper and (ours, of_paper) == pytest.approx((54.2, 54.2), abs=1.5)
+
+
 def test_detector(cache: Path) -> None:
     rows = run("detector", cache).rows
     for scene, centre_px, velocity_px_s in (
