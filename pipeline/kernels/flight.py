@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from .arrays import Floats
+from .hinged_path import solve
 from .moving_circle import inverse_matrix
 
 # Student's t for the circles: with 4 degrees of freedom one that is 10 sigma off counts for a fifteenth.
@@ -84,7 +85,7 @@ def _add_circles(
     half_s: float,
     camera: tuple[float, float],
 ) -> None:
-    """Add the circles' normal equations to system (16, 17): information and, in the last column, gradient."""
+    """Add the circles' normal equations to zeros (16, 17): information and, in the last column, gradient."""
     focal_px, ball_radius_m = camera
     terms = np.empty(5)
     slope = np.zeros((3, 3))
@@ -99,22 +100,25 @@ def _add_circles(
             pull = 0.0
             for row in range(3):
                 pull += slope[row, a] * precision[row] * off_px[i, row]
-            for j in range(5):
-                system[3 * j + a, 16] += weights[i] * terms[j] * pull
+            pull *= weights[i]
             cross = weights[i] * slope[2, a] * precision[2]
             for j in range(5):
+                system[3 * j + a, 16] += terms[j] * pull
                 system[3 * j + a, 15] += terms[j] * cross
-                system[15, 3 * j + a] += terms[j] * cross
             for b in range(3):
                 block = 0.0
                 for row in range(3):
                     block += slope[row, a] * precision[row] * slope[row, b]
                 block *= weights[i]
                 for j in range(5):
-                    for k in range(5):
-                        system[3 * j + a, 3 * k + b] += terms[j] * terms[k] * block
+                    scaled = terms[j] * block
+                    for k in range(j, 5):
+                        system[3 * j + a, 3 * k + b] += scaled * terms[k]
         system[15, 15] += weights[i] * precision[2]
         system[15, 16] += weights[i] * precision[2] * off_px[i, 2]
+    for i in range(16):  # symmetric: only blocks on and above the diagonal are added up
+        for j in range(i):
+            system[i, j] = system[j, i]
 
 
 @njit(cache=True, nogil=True)
@@ -163,7 +167,7 @@ def fit_motion(
     n = tau_s.size
     expected = motion.copy()
     seen, off = np.empty((n, 3)), np.empty((n, 3))
-    system, weights, precision = np.zeros((16, 17)), np.ones(n), np.empty(3)
+    system, step, weights, precision = np.zeros((16, 17)), np.empty(16), np.ones(n), np.empty(3)
     centre_2, radius_2 = noise_px[0] ** 2, noise_px[1] ** 2
     floor = FIRST_NOISE_PX
     for _ in range(ROUNDS):
@@ -190,7 +194,8 @@ def fit_motion(
             for j in range(9):
                 whole[6 + i, 6 + j] += prior[i, j]
                 whole[6 + i, 16] -= prior[i, j] * (motion[6 + j] - expected[6 + j])
-        motion += inverse_matrix(whole[:, :16].copy()) @ whole[:, 16].copy()
+        solve(step, whole, whole[:, 16], 16)
+        motion += step
         floor *= SHRINK
     predict_places(seen, motion, tau_s, half_s, camera[0], camera[1])
     off[:] = places - seen

@@ -183,11 +183,14 @@ def spin_grid(
     velocity_m_s, information, pull, most, air, lift_std = likelihood
     directions, magnitudes = weights.shape
     quadratic, linear, turn_per_rps, lift = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
+    rps = np.empty(magnitudes)
     low, high = math.log(SLOWEST * max_spin_rps), math.log(max_spin_rps)
     begin, width = 0.0, 2.0 * math.pi
     step, turn, misfit = 0.0, 0.0, 0.0
     for narrowing in range(NARROWINGS + 1):
         step, turn = (high - low) / magnitudes, width / directions
+        for m in range(magnitudes):
+            rps[m] = math.exp(low + (m + 0.5) * step)
         for a in range(directions):
             cosine, sine = math.cos(begin + (a + 0.5) * turn), math.sin(begin + (a + 0.5) * turn)
             direction = (
@@ -197,9 +200,8 @@ def spin_grid(
             )
             _lift_in_direction(quadratic, linear, turn_per_rps, direction, velocity_m_s, information, pull, air)
             for m in range(magnitudes):
-                magnitude = math.exp(low + (m + 0.5) * step)
                 for node in range(3):
-                    lift[node] = math.tanh(magnitude * turn_per_rps[node])
+                    lift[node] = math.tanh(rps[m] * turn_per_rps[node])
                 along, squared = 0.0, 0.0
                 for node in range(3):
                     along += linear[node] * lift[node]
