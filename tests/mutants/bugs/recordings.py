@@ -157,8 +157,8 @@ FORMATS = [
     ),
     Mutant(
         "pipeline/isolation.py",
-        "self.is_idle = wish == STOP",
-        "self.is_idle = True",
+        "            wish = STOP\n",
+        "            wish = NEXT\n",
         "tests/pipeline/test_isolation.py",
     ),
     Mutant(
