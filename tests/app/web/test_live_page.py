@@ -16,7 +16,6 @@ from spinscope.pipeline.errors import CameraError
 from spinscope.pipeline.registry import Parameters
 
 from .conftest import Served, served
-from .test_browser import CHROMIUM, FLAGS, PATIENCE_MS
 
 
 class StandIn:
@@ -95,36 +94,3 @@ def test_biases_act_on_the_camera(running: tuple[Served, StandIn]) -> None:
 def test_without_a_camera_the_routes_say_so(tuner: Served) -> None:
     answer = httpx.get(f"{tuner.address}api/live/view")
     assert answer.status_code == 404 and "spinscope live" in answer.json()["error"]
-
-
-@pytest.mark.browser
-@pytest.mark.skipif(not CHROMIUM.exists(), reason=f"there is no browser at {CHROMIUM}")
-def test_the_panel_in_a_browser(running: tuple[Served, StandIn]) -> None:
-    from playwright.sync_api import sync_playwright
-
-    made, live = running
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
-        page = browser.new_page()
-        errors: list[str] = []
-        page.on("pageerror", lambda error: errors.append(str(error)))
-        page.set_default_timeout(PATIENCE_MS)
-        page.route("**/re_viewer_bg.wasm", lambda route: route.abort())  # the viewer takes ten seconds to start
-        page.goto(made.address)
-        page.wait_for_selector("body[data-done]", state="attached")
-        panel = page.locator("[data-title='Live camera']")
-        panel.get_by_text("stand-in 1").wait_for()
-        panel.get_by_text("2 packets lost by the camera").wait_for()
-        page.locator("#notices").get_by_text("unplugged").wait_for()
-        assert panel.locator("svg path").count() == 8
-        page.wait_for_function("document.querySelector('img.live').naturalWidth === 64")
-        panel.get_by_text("Use the sliders from now on").click()
-        page.locator("#notices").get_by_text("go on with these settings").wait_for()
-        panel.get_by_text("Pause").click()
-        panel.get_by_text("Go on").wait_for()
-        page.evaluate("document.body.dataset.old = 'yes'")
-        panel.get_by_text("Look at them").click()
-        page.wait_for_selector("body[data-done]:not([data-old])", state="attached")
-        assert f"recording={live.window.name}" in page.url
-        browser.close()
-    assert live.asked == [Parameters().logo.pad_px, 10.0] and not errors
