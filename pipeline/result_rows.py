@@ -104,17 +104,21 @@ def tick_rows(result: Result) -> list[ResultRow]:
     session = result.session
     rows: list[ResultRow] = []
     for number, shot in enumerate(result.shots, start=1):
+        history = shot.history
+        if history is None:
+            continue
         places_m = shot.positions_m(session.camera, session.ball_radius_m)
-        for t_us, state, place_m, measured, tick in zip(
-            shot.t_us, shot.state, places_m, shot.measured, shot.history, strict=True
+        for tick, (t_us, state, place_m, measured) in enumerate(
+            zip(shot.t_us, shot.state, places_m, shot.measured, strict=True)
         ):
             row: ResultRow = {"shot": number, "t_us": round(t_us), "measured": bool(measured)}
             row |= zip(("x_px", "y_px", "vx_px_s", "vy_px_s", "radius_px"), map(float, state), strict=True)
             row |= zip(("x_m", "y_m", "z_m"), map(float, place_m), strict=True)
-            row |= {"logo_rate_hz": tick.logo_rate_hz, "rate_rps": tick.rate_rps}
-            for method, estimate in tick.estimates.items():
-                if result.method in ("all", method) or method in session.chain.rivals:
-                    row |= {f"{method}_{name}": value for name, value in _numbers(estimate).items()}
+            for name, value in (("logo_rate_hz", history.logo_rate_hz[tick]), ("rate_rps", history.rate_rps[tick])):
+                row[name] = None if np.isnan(value) else float(value)
+            for estimate in history.estimates(tick):
+                if result.method in ("all", estimate.method) or estimate.method in session.chain.rivals:
+                    row |= {f"{estimate.method}_{name}": value for name, value in _numbers(estimate).items()}
             rows.append(row)
     return rows
 

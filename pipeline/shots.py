@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -11,14 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .camera import Camera
-from .chain import BallTick, Tick
+from .chain import EARLIER_US, BallTick, Tick
 from .errors import ParameterError
-from .registry import distrust_reason, trusted_method
-from .results import SpinEstimate, Truth, spin_errors
+from .results import ReadOnlyArrays, SpinEstimate, Truth, spin_errors
 from .spin.combined.result import CombinedResult
 from .spin.trajectory.motion import FittedMotion
 from .stages.track_result import BallTrack, BeganBy, EndedBy, ShotEnd
-from .track_evidence import TrackEvidence
 
 Floats = NDArray[np.float64]
 
@@ -40,22 +39,35 @@ ENDED_WORDS: dict[EndedBy, str] = {
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ShotTick:
-    """Results of the stages for a shot at the end of one of its ticks, from all events up to there.
+class ShotHistory(ReadOnlyArrays):
+    """Results of the stages for a shot at the end of each of its n ticks, from all events up to there.
 
     Attributes
     ----------
-    logo_rate_hz : float, optional
-        Logo events of the tick over its length; None where the logo was not asked for.
-    rate_rps : float, optional
-        Magnitude by the rhythm of the logo's events; None where it tells none or was not asked for.
-    estimates : dict[str, SpinEstimate]
-        The spin by method.
+    logo_rate_hz : (n,) float64
+        Logo events of the tick over its length; NaN where the logo was not asked for.
+    rate_rps : (n,) float64
+        Magnitude by the rhythm of the logo's events; NaN where it tells none or was not asked for.
+    methods : tuple of str
+        Names of the m spin methods that were run.
+    vector_rps, covariance_rps2 : (n, m, 3) and (n, m, 3, 3) float64
+        Spin by each method, as in `SpinEstimate`; NaN where it refused.
     """
 
-    logo_rate_hz: float | None
-    rate_rps: float | None
-    estimates: dict[str, SpinEstimate]
+    logo_rate_hz: Floats
+    rate_rps: Floats
+    methods: tuple[str, ...]
+    vector_rps: Floats
+    covariance_rps2: Floats
+
+    def estimates(self, tick: int) -> list[SpinEstimate]:
+        """The spins at the end of a tick (from 0), of the methods that did not refuse."""
+        rows = zip(self.methods, self.vector_rps[tick], self.covariance_rps2[tick], strict=True)
+        return [
+            SpinEstimate(method, vector, None if np.isnan(covariance).any() else covariance, None)
+            for method, vector, covariance in rows
+            if not np.isnan(vector).any()
+        ]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,8 +104,8 @@ class Shot:
         The flight as fitted by the trajectory method; None where that was not run or found none.
     combined : CombinedResult, optional
         Evidence of each witness for the combined answer; None where that was not run.
-    history : tuple of ShotTick
-        Each tick's results, one for each row of `state`.
+    history : ShotHistory, optional
+        Results at the end of each tick, one for each row of `state`.
     """
 
     start_us: int
@@ -111,7 +123,7 @@ class Shot:
     number: int = 0
     motion: FittedMotion | None = None
     combined: CombinedResult | None = None
-    history: tuple[ShotTick, ...] = ()
+    history: ShotHistory | None = None
 
     def positions_m(self, camera: Camera, ball_radius_m: float) -> Floats:
         """(n, 3) float64 centres of the ball in the camera frame, from silhouettes, metres."""
@@ -177,7 +189,7 @@ class ShotLog:
 
     def __init__(self) -> None:
         self._ended: list[Shot] = []
-        self._flying: dict[int, list[_Row]] = {}
+        self._flying: dict[int, _FlyingShot] = {}
         self._last_reason: str | None = None
         self._tick_count = 0
 
@@ -196,16 +208,18 @@ class ShotLog:
         balls = {ball.track.shot: ball for ball in tick.balls}
         ends = {end.shot: end for end in tick.track.ended}
         for shot in self._flying.keys() - balls.keys():
-            self._end(ends.get(shot) or ShotEnd(shot, self._flying[shot][-1].end_us, "lost"))
+            self._end(ends.get(shot) or ShotEnd(shot, self._flying[shot].end_us, "lost"))
         for shot, ball in balls.items():
-            self._flying.setdefault(shot, []).extend(map(_row, (*ball.earlier, ball)))
+            flying = self._flying.setdefault(shot, _FlyingShot())
+            for one in (*ball.earlier, ball):
+                flying.add(one)
         if not balls and tick.track.reason:
             self._last_reason = tick.track.reason
 
     def close(self) -> None:
         """End the shots that are still in flight, with the recording."""
-        for shot, rows in list(self._flying.items()):
-            self._end(ShotEnd(shot, rows[-1].end_us, "end"))
+        for shot, flying in list(self._flying.items()):
+            self._end(ShotEnd(shot, flying.end_us, "end"))
 
     def take_ended(self) -> list[Shot]:
         """The shots that have ended since the last call, in order of their start; they are kept no longer."""
@@ -227,68 +241,103 @@ class ShotLog:
         return None if self._ended else self._last_reason or "no ball, because there are no events"
 
     def _end(self, end: ShotEnd) -> None:
-        rows = [row for row in self._flying.pop(end.shot) if row.end_us <= end.end_us]
-        if rows and not rows[-1].track.is_shot:
+        flying = self._flying.pop(end.shot)
+        ticks = flying.ticks_until(end.end_us)
+        if ticks and not flying.last_until(end.end_us).track.is_shot:
             self._last_reason = "no shot: what is seen rolls, lies or is a shadow, it does not fly"
-        elif len(rows) > 1 or (rows and self._tick_count == 1):
-            self._ended.append(_shot(rows, end))
+        elif ticks > 1 or (ticks and self._tick_count == 1):
+            self._ended.append(flying.shot(end))
         else:
             self._last_reason = "no shot: a ball was seen for a single tick only"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Row:
-    """One tick of a shot."""
+class _FlyingShot:
+    """A shot in flight: some numbers of each tick, and all results of the last ticks, with one of which it ends.
 
-    start_us: int
-    end_us: int
-    track: BallTrack
-    evidence: TrackEvidence
-    logo_events: int | None
-    rate_rps: float | None
-    estimates: dict[str, SpinEstimate]
-    motion: FittedMotion | None
-    combined: CombinedResult | None
+    A ball on a spinner is one shot of 120,000 ticks in ten minutes, and all results of a tick take 6 kB.
+    """
+
+    def __init__(self) -> None:
+        self._numbers: list[Floats] = []  # see `_numbers`
+        self._recent: deque[BallTick] = deque()  # a contact is known EARLIER_US later at most
+        self._first: BallTrack | None = None
+
+    @property
+    def end_us(self) -> int:
+        """End of the last tick."""
+        return self._recent[-1].packet.end_us
+
+    def add(self, ball: BallTick) -> None:
+        """Take the next tick."""
+        self._first = self._first or ball.track
+        self._numbers.append(_numbers(ball))
+        self._recent.append(ball)
+        while len(self._recent) > 1 and self._recent[1].packet.end_us <= self.end_us - EARLIER_US:
+            self._recent.popleft()
+
+    def ticks_until(self, end_us: int) -> int:
+        """Number of ticks that end by a time."""
+        later = next((number for number, row in enumerate(reversed(self._numbers)) if row[_END_US] <= end_us), None)
+        return 0 if later is None else len(self._numbers) - later
+
+    def last_until(self, end_us: int) -> BallTick:
+        """The last tick that ends by a time, of those that are kept whole."""
+        return next((ball for ball in reversed(self._recent) if ball.packet.end_us <= end_us), self._recent[0])
+
+    def shot(self, end: ShotEnd) -> Shot:
+        """The shot, whose end is known now."""
+        first, last = self._first, self.last_until(end.end_us)
+        assert first is not None
+        rows = np.array(self._numbers[: self.ticks_until(end.end_us)])
+        methods = tuple(last.estimates)
+        spins = rows[:, _SPINS].reshape(len(rows), len(methods), 12)
+        counted = rows[:, _LOGO_EVENTS]
+        trajectory = last.results.get("trajectory")
+        return Shot(
+            start_us=first.start_us,
+            end_us=end.end_us,
+            t_us=rows[:, _T_US].copy(),
+            state=rows[:, _STATE].copy(),
+            std=rows[:, _STD].copy(),
+            measured=rows[:, _MEASURED] > 0,
+            logo_events=None if np.isnan(counted).all() else int(np.nansum(counted)),
+            estimates=last.estimates,
+            best=last.best,
+            best_reason=last.best_reason,
+            began_by=first.began_by,
+            ended_by=end.ended_by,
+            number=end.shot,
+            motion=None if trajectory is None else trajectory.motion,
+            combined=last.results.get("combined"),
+            history=ShotHistory(
+                logo_rate_hz=counted / (rows[:, _LENGTH_US] * 1e-6),
+                rate_rps=rows[:, _RATE_RPS].copy(),
+                methods=methods,
+                vector_rps=spins[:, :, :3].copy(),
+                covariance_rps2=spins[:, :, 3:].reshape(*spins.shape[:2], 3, 3).copy(),
+            ),
+        )
 
 
-def _row(ball: BallTick) -> _Row:
-    logo, rate, trajectory = (ball.results.get(name) for name in ("logo", "rate", "trajectory"))
-    return _Row(
-        start_us=ball.packet.start_us,
-        end_us=ball.packet.end_us,
-        track=ball.track,
-        evidence=ball.evidence,
-        logo_events=None if logo is None else len(logo.events),
-        rate_rps=None if rate is None else rate.spin_rps,
-        estimates=ball.estimates,
-        motion=None if trajectory is None else trajectory.motion,
-        combined=ball.results.get("combined"),
-    )
+# Places in a row of `_numbers`.
+_END_US, _LENGTH_US, _T_US, _MEASURED, _LOGO_EVENTS, _RATE_RPS = range(6)
+_STATE, _STD, _SPINS = slice(6, 11), slice(11, 16), slice(16, None)
 
 
-def _shot(rows: list[_Row], end: ShotEnd) -> Shot:
-    events = [row.logo_events for row in rows if row.logo_events is not None]
-    estimates, doubt = rows[-1].estimates, rows[-1].evidence.doubt
-    return Shot(
-        start_us=rows[0].track.start_us,
-        end_us=end.end_us,
-        t_us=np.array([row.track.t_us for row in rows]),
-        state=np.array([row.track.mean for row in rows]),
-        std=np.array([np.sqrt(np.diag(row.track.covariance)) for row in rows]),
-        measured=np.array([row.track.measured is not None for row in rows]),
-        logo_events=sum(events) if events else None,
-        estimates=estimates,
-        best=trusted_method(estimates, doubt),
-        best_reason=distrust_reason(estimates, doubt),
-        began_by=rows[0].track.began_by,
-        ended_by=end.ended_by,
-        number=end.shot,
-        motion=rows[-1].motion,
-        combined=rows[-1].combined,
-        history=tuple(map(_shot_tick, rows)),
-    )
-
-
-def _shot_tick(row: _Row) -> ShotTick:
-    events, length_us = row.logo_events, row.end_us - row.start_us
-    return ShotTick(None if events is None else events / (length_us * 1e-6), row.rate_rps, row.estimates)
+def _numbers(ball: BallTick) -> Floats:
+    """One row of numbers of a tick, 0.7 kB: last the spins, 12 numbers a method; NaN for what is not told."""
+    packet, track, logo, rate = ball.packet, ball.track, ball.results.get("logo"), ball.results.get("rate")
+    row = np.full(_SPINS.start + 12 * len(ball.estimates), np.nan)
+    row[_END_US], row[_LENGTH_US], row[_T_US] = packet.end_us, packet.end_us - packet.start_us, track.t_us
+    row[_MEASURED] = track.measured is not None
+    if logo is not None:
+        row[_LOGO_EVENTS] = len(logo.events)
+    if rate is not None and rate.spin_rps is not None:
+        row[_RATE_RPS] = rate.spin_rps
+    row[_STATE], row[_STD] = track.mean, np.sqrt(np.diag(track.covariance))
+    for spin, estimate in zip(row[_SPINS].reshape(-1, 12), ball.estimates.values(), strict=True):
+        if estimate.vector_rps is not None:
+            spin[:3] = estimate.vector_rps
+        if estimate.covariance_rps2 is not None:
+            spin[3:] = estimate.covariance_rps2.ravel()
+    return row

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,6 +11,7 @@ import numpy as np
 import pytest
 
 from spinscope.pipeline.camera import Camera, CameraParameters
+from spinscope.pipeline.chain import EARLIER_US
 from spinscope.pipeline.results import SpinEstimate, Truth
 from spinscope.pipeline.shots import Shot, ShotLog
 from spinscope.pipeline.stages.track_result import ShotEnd
@@ -35,6 +38,8 @@ def ball(number: int, shot: int, *, start_us: int | None = None, x_px: float = 1
         earlier=(),
         results={"logo": SimpleNamespace(events=[0] * number)},
         estimates={"triplet": SpinEstimate.refused("triplet", f"tick {number}")},
+        best=None,
+        best_reason=f"tick {number}",
     )
 
 
@@ -126,6 +131,35 @@ def test_a_shot_keeps_each_ticks_state_and_its_standard_deviations() -> None:
     assert shot.std == pytest.approx(np.tile([0.1, 0.2, 10.0, 20.0, 0.5], (3, 1)))
     assert shot.measured.tolist() == [True, False, True]
     assert shot.t_us.tolist() == [4900.0, 9900.0, 14_900.0]
+
+
+def test_the_history_has_each_ticks_spin_and_rates() -> None:
+    balls = [ball(number, 4) for number in range(3)]
+    vector, covariance = np.array([1.0, 2.0, 3.0]), np.diag([0.1, 0.2, 0.3])
+    balls[1].estimates = {"triplet": SpinEstimate("triplet", vector, covariance, None)}
+    balls[2].results["rate"] = SimpleNamespace(spin_rps=50.0)
+    (shot,) = gathered(*(tick(number, one) for number, one in enumerate(balls))).shots
+    history = shot.history
+    assert history is not None
+    assert history.logo_rate_hz.tolist() == [0.0, 200.0, 400.0]
+    assert np.isnan(history.rate_rps).tolist() == [True, True, False] and history.rate_rps[2] == 50.0
+    assert history.estimates(0) == history.estimates(2) == []
+    (estimate,) = history.estimates(1)
+    assert estimate.method == "triplet" and estimate.vector_rps is not None
+    assert estimate.vector_rps.tolist() == vector.tolist()
+    assert np.array_equal(estimate.covariance_rps2, covariance)
+
+
+def test_of_a_long_shot_only_the_last_ticks_are_kept_whole() -> None:
+    """A ball on a spinner is one shot of any length."""
+    log, balls = ShotLog(), [ball(number, 4) for number in range(200)]
+    alive = [weakref.ref(one.track.mean) for one in balls]
+    for number in range(200):
+        log.add(tick(number, balls.pop(0)))
+    gc.collect()
+    assert sum(mean() is not None for mean in alive) <= EARLIER_US // 5000 + 2, "those, and the first"
+    log.close()
+    assert log.shots[0].t_us.size == 200 and log.shots[0].estimates["triplet"].reason == "tick 199"
 
 
 def test_velocity_is_the_flights() -> None:
