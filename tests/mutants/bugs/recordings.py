@@ -44,13 +44,13 @@ RECORDINGS = [
         RAW,
     ),
     Mutant(
-        "pipeline/recordings/dat_decoding.py",
+        "pipeline/recordings/formats/prophesee_dat/decoding.py",
         "if ahead > TURN_US >> 1 and t >= TURN_US:",
         "if t >= TURN_US:",
         "tests/pipeline/recordings/test_recordings_dat.py",
     ),
     Mutant(
-        "pipeline/recordings/dat_decoding.py",
+        "pipeline/recordings/formats/prophesee_dat/decoding.py",
         "if outside or _is_copy(words, i):",
         "if outside:",
         "tests/pipeline/recordings/test_recordings_dat.py",

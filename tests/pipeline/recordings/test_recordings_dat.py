@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from spinscope.pipeline.recordings import ReadingOptions, open_recording
-from spinscope.pipeline.recordings.formats.prophesee_dat import DatReader
+from spinscope.pipeline.recordings.formats.prophesee_dat.reader import DatReader
 from spinscope.pipeline.recordings.reader import ReadPass
 from tests.reference.recordings import NaiveDecoded, naive_dat
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.recordings import Recording, Triggers, index, open_recording, streamed, write_recording
-from spinscope.pipeline.recordings.formats.prophesee_dat import DatReader
+from spinscope.pipeline.recordings.formats.prophesee_dat.reader import DatReader
 from spinscope.pipeline.recordings.in_memory import RecordingInMemory
 from spinscope.pipeline.recordings.streamed import RecordingPieces, StreamedEvents, events_of
 from spinscope.pipeline.session import Choices, Session

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compilation import njit
-from .reader import MAX_DISORDER_US
-from .sensor import MAX_SIDE_PX
+from ....compilation import njit
+from ...reader import MAX_DISORDER_US
+from ...sensor import MAX_SIDE_PX
 
 TURN_US = 1 << 32  # times are counted modulo this
 X_BITS = Y_BITS = 14  # of the second word; the polarity has the four above
