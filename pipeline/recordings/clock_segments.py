@@ -78,9 +78,10 @@ class ClockSegments:
         return max(self._latest_us, int(t_us[:first].max()) if first else NO_TIME_US)
 
     def _is_set_back(self, t_us: NDArray[np.int64], first: int) -> bool:
-        """Whether SEGMENT_EVENTS events from `first` on are late and in order."""
+        """Whether SEGMENT_EVENTS events from `first` on are late and in order; not those of a file sorted backwards."""
         run = t_us[first : first + SEGMENT_EVENTS]
-        in_order = bool(np.all(run >= np.maximum.accumulate(run) - MAX_DISORDER_US))
+        rises = np.count_nonzero(run[1:] < run[:-1]) <= SEGMENT_EVENTS // 2
+        in_order = bool(rises and np.all(run >= np.maximum.accumulate(run) - MAX_DISORDER_US))
         sure_us = self._latest_before(t_us, first) - MAX_DISORDER_US
         return run.size == SEGMENT_EVENTS and in_order and bool(np.all(run < sure_us))
 

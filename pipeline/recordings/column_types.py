@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import RecordingError
 from ..events import EventBatch
 from .reader import Damage, ReadingOptions, UncheckedEvents
-from .time_units import UNITS_US, check_unit, microseconds, rate_warning, split_unit
+from .time_units import UNITS_US, check_unit, microseconds, rate_warning, resolution_warning, split_unit
 
 # Names in use for the four columns, in lower case and without a unit behind them; ours and DSEC's first.
 NAMES = {
@@ -110,14 +110,16 @@ class ColumnTypes:
         check_unit(options.time_unit)
         finite = sampled_times[np.isfinite(sampled_times)] if sampled_times.dtype.kind == "f" else sampled_times
         self.unit = options.time_unit or stated or "us"
-        if options.time_unit or stated:
+        if options.time_unit:
             return
-        if sampled_times.dtype.kind == "f":
+        if sampled_times.dtype.kind == "f" and not stated:
             self.unit = "s" if np.any(finite != np.floor(finite)) else "us"
             why = "seconds (they have fractions)" if self.unit == "s" else "microseconds (they are whole)"
             self.warnings.append(f"times are floating-point numbers without a unit: taken as {why}")
         if finite.size:
             warning = rate_warning(self.unit, events, float(np.ptp(finite)))
+            if warning is None and not stated and sampled_times.dtype.kind in "iu":
+                warning = resolution_warning(sampled_times)
             self.warnings += [warning] if warning else []
 
     def columns(

@@ -43,11 +43,6 @@ class IsolatedReader(FormatReader):
                 if part.events is not None:
                     yield part.events
 
-    def place_before(self, start_us: int) -> Place | None:
-        """Place before which all events are earlier than `start_us`; None if there is no way to find it."""
-        with self._isolation_errors():
-            return call(_place_before, self._reader, start_us)
-
     def frames(self, start_us: int, end_us: int) -> Iterator[CameraFrame]:
         """Yield the camera's pictures."""
         with self._isolation_errors():
@@ -119,10 +114,6 @@ def _parts(pickled: bytes, reading: ReadPass) -> Iterator[ReadPart]:
 
     yield from map(part, reader.columns(reading))
     yield part(None)
-
-
-def _place_before(pickled: bytes, start_us: int) -> Place | None:
-    return _restored(pickled).place_before(start_us)
 
 
 def _frames(pickled: bytes, start_us: int, end_us: int) -> Iterator[CameraFrame]:

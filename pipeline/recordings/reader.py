@@ -195,7 +195,8 @@ class FormatReader(ABC):
     format : str
         Format and encoding for people.
     strict_order : bool
-        Whether events far behind others make the file unreadable (columns) or are dropped (RAW).
+        Whether late events that are no segment of their own (see `ClockSegments`) make the file unreadable (columns)
+        or are dropped (RAW).
     seeks : bool
         Whether `columns` can begin at any `Place` it went by.
     attributes : dict of str to str or float
@@ -227,10 +228,6 @@ class FormatReader(ABC):
 
         Counts damage and triggers on the way.
         """
-
-    def place_before(self, start_us: int) -> Place | None:
-        """Place before which all events are earlier than `start_us`, found without a pass; None if there is no way."""
-        return None
 
     def frames(self, start_us: int, end_us: int) -> Iterator[CameraFrame]:
         """Yield the camera's pictures of [start_us, end_us), where the format holds any."""

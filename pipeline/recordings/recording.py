@@ -294,9 +294,8 @@ class Recording:
             return None, NO_TIME_US, 0
         index = self.known_index()
         if index is None:
-            place = self._reader.place_before(reading.start_us)
-            if place is not None or not self.is_large:
-                return place, NO_TIME_US, 0
+            if not self.is_large:
+                return None, NO_TIME_US, 0
             index = self.index(reading.on_progress)
         return index.place(reading.start_us)
 
@@ -309,7 +308,7 @@ class Recording:
         end_us = 2**63 - 1 if reading.end_us is None else reading.end_us
         builder = IndexBuilder()
         parts = builder.noting_places(self._reader.columns(reading), reading, segments, order)
-        for columns in order.sorted(parts if self._reader.strict_order else segments.joined(parts)):
+        for columns in order.sorted(segments.joined(parts)):
             batch = self._on_sensor(columns, reading).between(start_us, end_us)
             for first in range(0, len(batch), reading.max_events):
                 part = batch[first : first + reading.max_events]

@@ -24,6 +24,7 @@ _SUFFIX = re.compile(r"(?P<name>.*?)(?:_|\s*[\[(]\s*)(?P<unit>[a-zµμ]+)\s*[\])
 # events or more are a sign of a wrong unit rather than of a scene.
 PLAUSIBLE_HZ = (1e3, 2e8)
 JUDGED_EVENTS = 1000
+JUDGED_TIMES = 4  # different ones: by chance all are multiples of 1000 once in 10^12 files
 
 
 def unit_of(word: object) -> str | None:
@@ -82,4 +83,18 @@ def rate_warning(unit: str, events: int, span: float) -> str | None:
     return (
         f"times taken as {unit} make {rate_hz(unit):.3g} events a second, which no event camera sends"
         f"{': state ' if remedy else ''}{remedy}"
+    )
+
+
+def resolution_warning(times: NDArray[np.integer[Any]]) -> str | None:
+    """Sentence about whole-number times (n,), taken as microseconds, that look like nanoseconds; None for others.
+
+    A camera's clock counts microseconds: its times in nanoseconds are multiples of 1000. A busy scene's rate would be
+    plausible in both units.
+    """
+    if np.any(times % 1000) or np.unique(times).size < JUDGED_TIMES:
+        return None
+    return (
+        "times taken as us are all multiples of 1000, as a camera's are in nanoseconds: state --time-unit ns if they "
+        "are, or --time-unit us if the clock counted milliseconds"
     )

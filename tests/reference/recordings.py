@@ -345,6 +345,7 @@ def naive_segments(events: list[Event], run: int) -> tuple[list[Event], int, int
         if latest is not None and t < latest - MAX_DISORDER_US:
             following = [event[0] for event in events[at : at + run]]
             in_order = all(b >= max(following[: k + 1]) - MAX_DISORDER_US for k, b in enumerate(following))
+            in_order = in_order and sum(b < a for a, b in pairwise(following)) <= run // 2
             if len(following) == run and in_order and max(following) < latest - MAX_DISORDER_US:
                 if resets == 0 and count < run:
                     stale, out = stale + count, []

@@ -16,8 +16,6 @@ from ....isolation import without_time_limit
 from ....results import Truth
 from ...column_types import ColumnTypes, check_expansion, check_types, column_order
 from ...reader import (
-    MAX_DISORDER_US,
-    Damage,
     FormatReader,
     Place,
     ReadingOptions,
@@ -85,22 +83,6 @@ class Hdf5Reader(FormatReader):
             if "truth" not in file:
                 return None
             return _truth(file["truth"], self.events or 0, self.path)
-
-    def place_before(self, start_us: int) -> Place | None:
-        """Find the place by bisection, close to the first event that is not earlier."""
-        with file_errors(self.path, "HDF5"), h5py.File(self.path, "r") as file:
-            table = Hdf5Table(file, self._layout, self.path)
-            low, high = 0, table.rows  # invariant: all rows before low are early
-            while high - low > 1:
-                middle = (low + high) // 2
-                t_us = self._types.columns(middle, **table.rows_of(middle, middle + 1), damage=Damage()).t_us
-                # Later events may be up to 10 ms earlier than this one, earlier events up to 10 ms later. A broken
-                # row tells nothing.
-                if t_us.size and int(t_us[0]) + MAX_DISORDER_US < start_us:
-                    low = middle
-                else:
-                    high = middle
-            return Place(low)
 
 
 class RowDataset:
