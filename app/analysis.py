@@ -13,6 +13,9 @@ from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.flight_calibration import estimate_with_measured_up
 from spinscope.pipeline.session import Choices, Progress, Result, Session
 
+# The fastest hit measured is 116 km/h, 32 m/s (L. Budner, 2016); speeds of a few ticks are known to 10 %.
+FASTEST_M_S = 36.0
+
 
 def analyzed(path: Path, choices: Choices, method: str = "all", on_progress: Progress | None = None) -> Result:
     """The shots of a recording, or its ball on a spinner where there is no flight; raises SpinscopeError.
@@ -31,6 +34,7 @@ def analyzed_session(session: Session, method: str = "all", on_progress: Progres
     result = _flights_or_turning_ball(session, method, on_progress)
     if result.shots and not session.states_focal_length:
         result.session.warnings.append(_assumed_focal_length(result))
+    result.session.warnings.extend(implausible_speed(result))
     return result
 
 
@@ -44,6 +48,21 @@ def _assumed_focal_length(result: Result) -> str:
         f"assumed, by which the ball is {distance_m:.2f} m away; if that is wrong, state --set "
         "camera.focal_length_mm=MM and --set camera.pixel_um=UM"
     )
+
+
+def implausible_speed(result: Result) -> list[str]:
+    """Warning about a ball that is faster than any can be, with the options that mend it."""
+    session = result.session
+    if session.parameters.track.ball == "fixed":
+        return []
+    velocities_m_s = [shot.velocity_m_s(session.camera, session.ball_radius_m) for shot in result.shots]
+    fastest_m_s = max((float(np.linalg.norm(v)) for v in velocities_m_s if v is not None), default=0.0)
+    if fastest_m_s <= FASTEST_M_S:
+        return []
+    return [
+        f"a ball flies at {fastest_m_s:.0f} m/s, faster than any that was measured (32 m/s): state the unit of the "
+        "times (--time-unit s|ms|us|ns) or the ball's diameter (--set ball.diameter_mm=MM)"
+    ]
 
 
 def _flights_or_turning_ball(session: Session, method: str, on_progress: Progress | None) -> Result:

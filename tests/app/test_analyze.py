@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import h5py
@@ -17,13 +18,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from spinscope.app.analysis import implausible_speed
 from spinscope.app.cli import cli
 from spinscope.app.commands.analyze import PrintedRecording, print_shots
 from spinscope.pipeline import calibrate_flights, estimate
 from spinscope.pipeline.flight_calibration import estimate_with_measured_up
 from spinscope.pipeline.recordings import open_recording, write_recording
 from spinscope.pipeline.result_rows import shot_rows
-from spinscope.pipeline.session import Choices, Session
+from spinscope.pipeline.session import Choices, Result, Session
 from spinscope.pipeline.stages.logo import LogoParameters
 from tests.command_line import spinscope
 
@@ -71,6 +73,17 @@ def test_track_and_speed_are_the_truths(reports: dict[str, dict[str, Any]], samp
     assert error.mean() <= 0.3
     assert np.abs(track["radius_px"] - true_r)[whole].mean() <= 0.5
     assert shot["speed_m_s"] == pytest.approx(np.linalg.norm(velocity, axis=1).mean(), rel=0.05)
+
+
+def test_a_ball_faster_than_any_is_warned_of() -> None:
+    def warnings(*speeds_m_s: float) -> str:
+        parameters = SimpleNamespace(track=SimpleNamespace(ball="flying"))
+        session: Any = SimpleNamespace(camera=None, ball_radius_m=0.02, parameters=parameters)
+        shots: Any = [SimpleNamespace(velocity_m_s=lambda *_, v=v: np.array([0.0, v, 0.0])) for v in speeds_m_s]
+        return " ".join(implausible_speed(Result(session, tuple(shots), None)))
+
+    assert "8000 m/s" in warnings(8.0, 8000.0) and "--time-unit" in warnings(8000.0)
+    assert not warnings(8.0, 33.0) and not warnings()
 
 
 def test_an_assumed_focal_length_is_said_with_the_distance(
