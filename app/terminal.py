@@ -15,6 +15,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 UNFOLDED_COLUMNS = 1000  # wider than any table
 PATIENCE_S = 1.0  # work that ends sooner shows no bar
+LOGGED_S = 30.0  # from line to line of a log: 120 lines an hour
 FULL_DISK = (ENOSPC, EDQUOT, EFBIG, EIO)  # errors of writing that are the disk's
 
 
@@ -54,10 +55,13 @@ def console() -> Console:
 
 
 class ProgressBar:
-    """Bar on standard error of a terminal for work that takes longer than a second; calls take (share 0..1, what)."""
+    """Progress on standard error; calls take (share 0..1, what).
+
+    On a terminal a bar for work that takes longer than a second, in a log a line every LOGGED_S.
+    """
 
     def __init__(self) -> None:
-        self._begin = time.perf_counter()
+        self._begin = self._logged = time.perf_counter()
         self._bar: Progress | None = None
 
     def __enter__(self) -> ProgressBar:
@@ -72,7 +76,13 @@ class ProgressBar:
     def __call__(self, share: float, what: str) -> None:
         """Show the share done (0..1) and what is being done."""
         if self._bar is None:
-            if time.perf_counter() - self._begin < PATIENCE_S or not sys.stderr.isatty():
+            now = time.perf_counter()
+            if not sys.stderr.isatty():
+                if now - self._logged >= LOGGED_S:
+                    self._logged = now
+                    note(f"{what}: {share:.0%}")
+                return
+            if now - self._begin < PATIENCE_S:
                 return
             self._bar = Progress(
                 TextColumn("{task.description}"),

@@ -7,8 +7,11 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+
+from spinscope.app.terminal import ProgressBar
 
 SAMPLE = "spinner_ball5_back_no_logo.h5"
 
@@ -47,3 +50,16 @@ def test_64_open_files_are_enough(samples: Path) -> None:
     ball = ["--fixed-ball", "606.67", "302.79", "16.47", "--method", "contrast"]
     done = run("analyze", str(samples / SAMPLE), *ball, stdout=subprocess.PIPE, preexec_fn=few)
     assert done.returncode == 0, done.stderr
+
+
+def test_progress_in_a_log_is_a_line_now_and_then(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    seconds = iter(range(0, 1000, 10))
+    clock = SimpleNamespace(perf_counter=lambda: float(next(seconds)))
+    monkeypatch.setattr("spinscope.app.terminal.time", clock)
+    with ProgressBar() as bar:
+        for number in range(1, 10):
+            bar(number / 9, f"{number} of 9 recordings")
+    lines = capfd.readouterr().err
+    assert lines == "3 of 9 recordings: 33%\n6 of 9 recordings: 67%\n9 of 9 recordings: 100%\n"
