@@ -130,3 +130,16 @@ def test_summary_against_reading_alone(benchmark: Any, tmp_path: Path) -> None:
     recording.scan()
     benchmark.pedantic(lambda: summary(recording), rounds=3)
     say("summary of EVT3", best_seconds(lambda: summary(recording)), "reading", best_seconds(recording.read))
+
+
+def test_seeking_in_an_indexed_file(tmp_path: Path) -> None:
+    """A window of 5 ms anywhere in a file that was read once: what a click in the overview waits for."""
+    path = tmp_path / "a.raw"
+    write_recording(path, scene(EVENTS), width_px=1280, height_px=720)
+    recording = open_recording(path)
+    last_us = recording.index().last_us
+    starts_us = np.random.default_rng(3).integers(0, last_us - 5000, 50).tolist()
+    seconds = best_seconds(lambda: [recording.read(start_us, start_us + 5000) for start_us in starts_us]) / 50
+    sys.stdout.write(
+        f"\nseek and read of 5 ms: {seconds * 1e3:.1f} ms, whole file {best_seconds(recording.read):.2f} s\n"
+    )
