@@ -128,14 +128,14 @@ VALUES = [
     ),
     Mutant(
         "pipeline/shots.py",
-        "np.sqrt(np.diag(row.track.covariance))",
-        "np.diag(row.track.covariance)",
+        "np.sqrt(np.diag(track.covariance))",
+        "np.diag(track.covariance)",
         "tests/pipeline/test_shots.py",
     ),
     Mutant(
         "pipeline/shots.py",
-        "estimates, doubt = rows[-1].estimates,",
-        "estimates, doubt = rows[0].estimates,",
+        "first, last = self._first, self.last_until(end.end_us)",
+        "first, last = self._first, self._recent[0]",
         "tests/pipeline/test_shots.py",
     ),
     Mutant(
@@ -147,8 +147,8 @@ VALUES = [
     Mutant("pipeline/shots.py", "end_us=end.end_us", "end_us=rows[-1].end_us", "tests/pipeline/test_shots.py"),
     Mutant(
         "pipeline/shots.py",
-        "rows = [row for row in self._flying.pop(end.shot) if row.end_us <= end.end_us]",
-        "rows = self._flying.pop(end.shot)",
+        "rows = np.array(self._numbers[: self.ticks_until(end.end_us)])",
+        "rows = np.array(self._numbers)",
         "tests/pipeline/test_shots.py",
     ),
     Mutant(
