@@ -20,6 +20,7 @@ GROUND, WHITE, INK, AXIS = ((247, 248, 250), (252, 250, 244), (34, 48, 110), (21
 BALL_SHARE = 0.7  # of the picture's half side: the axis stands out of the ball
 AXIS_LENGTH, AXIS_WIDTH = 1.4, 0.045  # in ball radii
 FINER = 3
+SMOOTH = 4  # a texture's pixel is 6 of a ball of 400 px: no wider than 2 are left
 PHASES = 36  # of a turn that are looked at for the one that shows most of the logo
 # From where the ball is looked at: behind the hitter, to the right and above, so that top, side and corkscrew can be
 # told apart. In right, up, forward of the hitter's frame.
@@ -38,7 +39,7 @@ def view_frame(detail: Mapping[str, Any]) -> Floats:
 
 
 def ink_of(detail: Mapping[str, Any]) -> Bytes | None:
-    """(n, n) uint8 ink on the ball, see `logo_texture`; None where the logo was not seen."""
+    """(n, n) uint8 ink on the ball, as `logo_texture` gives it; None where the logo was not seen."""
     if detail["texture"] is None:
         return None
     import cv2  # 60 ms to load
@@ -79,13 +80,21 @@ def ball_picture(
             turn = _phase(ink, spin_rps, frame[2])
         else:
             turn = rotations(2 * np.pi * (t_us - detail["reference_us"]) * 1e-6 * spin_rps)[0]
-        cover = ink.ravel()[octahedral_pixels(normals @ frame @ turn, ink.shape[0])] / 255
+        smooth = _smoothed(ink)
+        cover = smooth.ravel()[octahedral_pixels(normals @ frame @ turn, smooth.shape[0])] / 255
     colour = np.array(WHITE) + cover[:, None] * (np.array(INK) - np.array(WHITE))
     light = np.array([-0.35, 0.6, 0.72])  # from above, as in a hall
     picture[inside] = colour * (0.62 + 0.38 * np.clip(normals @ light, 0, 1))[:, None]
     _paint_axis(picture, frame @ spin_rps / np.linalg.norm(spin_rps), x, y, z, inside)
     small: Bytes = picture.reshape(side_px, finer, side_px, finer, 3).mean(axis=(1, 3)).round().astype(np.uint8)
     return small
+
+
+def _smoothed(ink: Bytes) -> Bytes:
+    """The ink with SMOOTH pixels each way for one, interpolated: looked up, its pixels are not seen."""
+    import cv2  # 60 ms to load
+
+    return np.asarray(cv2.resize(ink, None, fx=SMOOTH, fy=SMOOTH, interpolation=cv2.INTER_LINEAR), np.uint8)
 
 
 def _phase(ink: Bytes, spin_rps: Floats, towards: Floats) -> Floats:

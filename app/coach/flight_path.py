@@ -9,8 +9,6 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from spinscope.pipeline.errors import ParameterError
-
 Floats = NDArray[np.float64]
 
 # Of the laws of table tennis (ITTF 2.1, 2.2), metres.
@@ -60,7 +58,8 @@ def flight_path(
     shot, detail : mapping
         Row of a session and its `shot_detail`.
     pose : mapping, optional
-        `axes`: rows of the table's frame (along, left, up) in that of the camera; `camera_m`: the camera's place in it.
+        As `mark_table` keeps it: `axes`, rows of the table's frame (along, left, up) in that of the camera, and
+        `camera_m`, the camera's place in it.
 
     Notes
     -----
@@ -110,15 +109,3 @@ def flight_path(
         height_std_m=height_std_m,
         landing_m=landing,
     )
-
-
-def checked_pose(pose: Any) -> dict[str, Any]:
-    """A pose as `flight_path` takes it; raises ParameterError where it is none."""
-    try:
-        axes, camera = np.array(pose["axes"], np.float64), np.array(pose["camera_m"], np.float64)
-        good = axes.shape == (3, 3) and camera.shape == (3,) and np.allclose(axes @ axes.T, np.eye(3), atol=0.01)
-    except (TypeError, ValueError, LookupError):
-        good = False
-    if not good:
-        raise ParameterError("the pose is no three unit axes at right angles and a place in metres")
-    return {"axes": axes.tolist(), "camera_m": camera.tolist()}

@@ -89,7 +89,7 @@ def answers(players: Mapping[str, SeriesStatistics], kind: str, words: ShotWords
         found.append(words.text("answer_more", group=name, kind=kind, value=words.spin(known[name].median_rps)))
     for name, one in players.items():
         change = None if one.change_rps is None else abs(one.change_rps)
-        found.append(words.text(one.trend, group=name, value=words.spin(change)))
+        found.append(words.text(one.trend, group=name, value=words.spin(change), since=words.text("halves")))
     return found
 
 

@@ -115,7 +115,13 @@ class ShotSession:
             row = table.execute(f"SELECT {', '.join(SHOT_COLUMNS)} FROM shots WHERE id = ?", (shot_id,)).fetchone()
         if row is None:
             raise ParameterError(f"there is no shot {shot_id} in this session: choose one of the list")
-        return {**dict(row), "detail": json.loads(row["detail"])}
+        return _unpacked(row)
+
+    def bounced(self) -> list[Row]:
+        """All columns of the shots that ended with a bounce, as `shot` gives them."""
+        with self._table() as table:
+            found = table.execute(f"SELECT {', '.join(SHOT_COLUMNS)} FROM shots WHERE ended_by = 'bounce'")
+            return [_unpacked(row) for row in found]
 
     def picture(self, shot_id: int) -> Path | None:
         """File of a shot's picture; None where there is none."""
@@ -235,6 +241,10 @@ def _add_tables(table: sqlite3.Connection) -> None:
             table.execute(f"ALTER TABLE {name} ADD COLUMN {one} {columns[one]}")
     table.execute("CREATE INDEX IF NOT EXISTS shots_recording ON shots (recording)")
     table.execute("INSERT OR IGNORE INTO about VALUES ('format', ?), ('revision', '0')", (str(FORMAT),))
+
+
+def _unpacked(row: sqlite3.Row) -> Row:
+    return {**dict(row), "detail": json.loads(row["detail"])}
 
 
 def _next_revision(table: sqlite3.Connection) -> int:

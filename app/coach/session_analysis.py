@@ -18,6 +18,7 @@ from spinscope.app.terminal import note
 from spinscope.pipeline.errors import RecordingError, SpinscopeError
 from spinscope.pipeline.evaluation.tables import Row
 from spinscope.pipeline.evaluation.tasks import Task, TaskContext, digest, executor, performed
+from spinscope.pipeline.live import load_kernels
 from spinscope.pipeline.recording_folders import recordings_in
 from spinscope.pipeline.recordings.recording import file_identity
 from spinscope.pipeline.session import Choices
@@ -64,8 +65,8 @@ class SessionAnalysis:
         jobs: int | None = None,
         on_change: Callable[[], None] = lambda: None,
     ) -> None:
-        self.session, self.progress = session, AnalysisProgress()
-        self._sources, self._choices, self._jobs, self._on_change = list(sources), choices, jobs, on_change
+        self.session, self.choices, self.progress = session, choices, AnalysisProgress()
+        self._sources, self._jobs, self._on_change = list(sources), jobs, on_change
         self._settings_hash = settings_hash(choices)
         self._version = program_version()
         self._ended = threading.Event()
@@ -96,9 +97,13 @@ class SessionAnalysis:
         self._tell(AnalysisProgress(len(pending), self.progress.done, False))
 
     def _follow(self) -> None:
+        is_ready = False
         while not self._ended.is_set():
             try:
                 self.run_once()
+                if not is_ready:  # a single new recording is analyzed by this process
+                    load_kernels()
+                    is_ready = True
             except SpinscopeError as error:  # of the session itself, as a full disk
                 note(f"warning: {error}")
             self._ended.wait(POLL_S)
@@ -144,7 +149,7 @@ class SessionAnalysis:
             if known.error is not None:
                 yield path, known, None
                 continue
-            arguments = {"path": path, "content": known.recording_hash, "choices": self._choices}
+            arguments = {"path": path, "content": known.recording_hash, "choices": self.choices}
             left[number] = Task(session_rows, {**arguments, "folder": self.session.folder}, keep=False)
         jobs = min(cpu_count() if self._jobs is None else self._jobs, len(left))
         while left:

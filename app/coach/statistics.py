@@ -1,4 +1,4 @@
-"""Statistics of series of shots: centre, spread, best, most constant, and whether it got better."""
+"""Statistics of series of shots: centre, spread, best, and whether it got better."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Trend = Literal["rose", "fell", "unclear", "too_few"]
 
-FEWEST = 3  # shots of a spread; with two it says nothing
-FEWEST_TREND = 6  # shots of a trend: three a half
+FEWEST = 3  # shots of a spread, and of each part of a series that are compared; with two it says nothing
 # Half-axes of the ellipse that holds two of three shots of a normal distribution in the plane: sqrt(-2 ln(1 - 0.68)).
 ELLIPSE_SIGMAS = math.sqrt(-2 * math.log(1 - 0.68))
 CLEAR_SIGMAS = 2.0  # of the difference's own error: chance does that once in twenty times
@@ -39,9 +38,9 @@ class SeriesStatistics:
     ellipse : list of (float, float), optional
         Outline of the ellipse that holds two of three shots, see `spread_ellipse`.
     trend : str
-        Whether the spin rose or fell from the earlier half of the series to the later.
+        Whether the spin rose or fell from the earlier part of the series to the later.
     change_rps, change_std_rps : float, optional
-        Mean of the later half less that of the earlier, and its standard error.
+        Mean of the later part less that of the earlier, and its standard error.
     """
 
     count: int
@@ -57,14 +56,20 @@ class SeriesStatistics:
     change_std_rps: float | None
 
 
-def series_statistics(shots: Sequence[Mapping[str, Any]]) -> SeriesStatistics:
-    """Statistics of shots (rows of a session) in order of time."""
+def series_statistics(shots: Sequence[Mapping[str, Any]], since_s: float | None = None) -> SeriesStatistics:
+    """Statistics of shots (rows of a session) in order of time.
+
+    Parameters
+    ----------
+    since_s : float, optional
+        Begin of the later part, which is compared with the earlier, in seconds since 1970; by default halves are.
+    """
     known = [shot for shot in shots if shot["spin_rps"] is not None]
     spins = np.array([shot["spin_rps"] for shot in known], np.float64)
     moving = [shot for shot in known if shot["speed_m_s"] is not None]
     speeds = np.array([shot["speed_m_s"] for shot in moving], np.float64)
     best = max(known, key=lambda shot: shot["spin_rps"], default=None)
-    trend, change, change_std = _trend(spins)
+    trend, change, change_std = _trend(*_parts(known, spins, since_s))
     return SeriesStatistics(
         count=len(known),
         unseen=len(shots) - len(known),
@@ -92,13 +97,20 @@ def spread_ellipse(speeds_m_s: Floats, spins_rps: Floats, points: int = 48) -> l
     return [(float(speed), float(spin)) for speed, spin in outline.T]
 
 
-def _trend(spins_rps: Floats) -> tuple[Trend, float | None, float | None]:
-    """Whether the later half differs from the earlier by more than chance, the difference and its standard error."""
-    if len(spins_rps) < FEWEST_TREND:
+def _parts(shots: Sequence[Mapping[str, Any]], spins_rps: Floats, since_s: float | None) -> tuple[Floats, Floats]:
+    """Spins of the earlier and the later part: before an instant and from it on, or halves, which share no shot."""
+    if since_s is None:
+        return spins_rps[: len(spins_rps) // 2], spins_rps[(len(spins_rps) + 1) // 2 :]
+    later = np.array([shot["recorded_s"] >= since_s for shot in shots], np.bool_)
+    return spins_rps[~later], spins_rps[later]
+
+
+def _trend(earlier: Floats, later: Floats) -> tuple[Trend, float | None, float | None]:
+    """Whether the later part differs from the earlier by more than chance, the difference and its standard error."""
+    if min(len(earlier), len(later)) < FEWEST:
         return "too_few", None, None
-    earlier, later = spins_rps[: len(spins_rps) // 2], spins_rps[(len(spins_rps) + 1) // 2 :]
     change = float(later.mean() - earlier.mean())
     std = math.sqrt(earlier.var(ddof=1) / len(earlier) + later.var(ddof=1) / len(later))
-    if abs(change) < CLEAR_SIGMAS * std:
+    if abs(change) <= CLEAR_SIGMAS * std:
         return "unclear", change, std
     return "rose" if change > 0 else "fell", change, std

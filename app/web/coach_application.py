@@ -4,39 +4,43 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import AsyncIterator, Collection, Sequence
+from collections.abc import AsyncIterator, Callable, Collection, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated
+from typing import Annotated, Literal
 
 from fastapi import FastAPI, HTTPException, Query, Response
 from fastapi.responses import FileResponse, JSONResponse, StreamingResponse
 from fastapi.staticfiles import StaticFiles
 
-from spinscope.app.coach.flight_path import checked_pose, flight_path
-from spinscope.app.coach.report import report_html
+from spinscope.app.coach.flight_path import flight_path
+from spinscope.app.coach.report import write_report
 from spinscope.app.coach.session import NAMES, Row, ShotSession
 from spinscope.app.coach.session_analysis import AnalysisProgress, SessionAnalysis
 from spinscope.app.coach.session_table import write_session_table
 from spinscope.app.coach.shot_words import ShotWords, kind_codes
 from spinscope.app.coach.statistics import series_statistics
+from spinscope.app.coach.table_marking import event_picture, mark_table, marking_recordings
 from spinscope.app.coach.terms import clock_hours, confidence, corkscrew_share, effect_word, spin_effect
 from spinscope.app.coach.texts import texts
 from spinscope.app.coach.video import write_video
+from spinscope.pipeline.session import Choices
 
 from .coach_schemas import (
     AnalysisState,
     CoachShot,
     Kept,
+    Landings,
     Names,
     NamesRequest,
-    PoseRequest,
     SessionNames,
     SessionShots,
     ShotDetail,
     Statistics,
     StatisticsRequest,
+    TableMarks,
+    TableRequest,
     WordsQuery,
 )
 from .error_answers import add_error_handlers
@@ -45,6 +49,13 @@ from .security import SecurityMiddleware
 STATIC = Path(__file__).parent / "static"
 POLL_S = 0.3  # a session that another program writes to; a new shot is to appear within a second
 SESSION = "/api/coach/{session}/"
+MEDIA_TYPES = {
+    ".csv": "text/csv; charset=utf-8",
+    ".parquet": "application/vnd.apache.parquet",
+    ".html": "text/html; charset=utf-8",
+    ".pdf": "application/pdf",
+    ".mp4": "video/mp4",
+}
 
 
 class CoachState:
@@ -93,6 +104,10 @@ class CoachState:
         """Progress of the work on a session."""
         return next((one.progress for one in self._analyses if one.session is session), AnalysisProgress())
 
+    def choices(self, session: ShotSession) -> Choices:
+        """Options of the analysis of a session."""
+        return next((one.choices for one in self._analyses if one.session is session), Choices())
+
     def start(self) -> None:
         """Begin the work in the background."""
         for analysis in self._analyses:
@@ -134,6 +149,7 @@ def coach_application(state: CoachState, token: str | None = None, hosts: Collec
 
     _add_shot_routes(app, state)
     _add_name_routes(app, state)
+    _add_table_routes(app, state)
     _add_exports(app, state)
     return app
 
@@ -146,7 +162,7 @@ def _add_shot_routes(app: FastAPI, state: CoachState) -> None:
         now = {name: value for name, value in (own.setting("now") or {}).items() if name in NAMES}
         return SessionShots(
             revision=revision,
-            shots=[coach_shot(row) for row in own.shots(since)],
+            shots=[coach_shot(session, row) for row in own.shots(since)],
             analysis=state.analysis(own),
             now=Names(**now),
         )
@@ -157,7 +173,14 @@ def _add_shot_routes(app: FastAPI, state: CoachState) -> None:
         row = own.shot(shot_id)
         detail = row["detail"]
         drawn = {name: detail[name] for name in ("spin_rps", "reference_us", "hitter", "texture", "proof")}
-        return ShotDetail(shot=coach_shot(row), flight=flight_path(row, detail, own.setting("pose")), **drawn)
+        return ShotDetail(shot=coach_shot(session, row), flight=flight_path(row, detail, own.setting("pose")), **drawn)
+
+    @app.get(SESSION + "landings")
+    def landings(session: str) -> Landings:
+        own = state.session(session)
+        pose = own.setting("pose")
+        paths = {row["id"]: flight_path(row, row["detail"], pose) for row in own.bounced()} if pose else {}
+        return Landings(landings={one: path.landing_m for one, path in paths.items() if path and path.landing_m})
 
     @app.get(SESSION + "pictures/{shot_id}", include_in_schema=False)
     def picture(session: str, shot_id: int) -> Response:
@@ -172,37 +195,41 @@ def _add_shot_routes(app: FastAPI, state: CoachState) -> None:
         headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
         return StreamingResponse(_revisions(state, own), media_type="text/event-stream", headers=headers)
 
-    @app.post(SESSION + "statistics")
-    def statistics(session: str, request: StatisticsRequest) -> Statistics:
-        rows = {row["id"]: row for row in state.session(session).shots()}
-        return Statistics(
-            series={
-                name: series_statistics([rows[one] for one in ids if one in rows])
-                for name, ids in request.series.items()
-            }
-        )
+    @app.post("/api/coach/statistics")
+    def statistics(request: StatisticsRequest) -> Statistics:
+        names = dict.fromkeys(name for series in request.series.values() for name in series)
+        rows = {(name, row["id"]): row for name in names for row in state.session(name).shots()}
+        found = {}
+        for name, series in request.series.items():
+            own = [rows[key] for session, ids in series.items() for one in ids if (key := (session, one)) in rows]
+            found[name] = series_statistics(sorted(own, key=lambda row: row["recorded_s"]), request.since_s)
+        return Statistics(series=found)
 
 
 def _add_exports(app: FastAPI, state: CoachState) -> None:
-    @app.get(SESSION + "shots.csv", include_in_schema=False)
-    def table(session: str) -> Response:
-        with TemporaryDirectory(prefix="spinscope-") as folder:
-            path = Path(folder) / "shots.csv"
-            write_session_table(state.session(session), path)
-            return Response(path.read_bytes(), media_type="text/csv; charset=utf-8")
+    @app.get(SESSION + "shots.{kind}", include_in_schema=False)
+    def table(session: str, kind: Literal["csv", "parquet"]) -> Response:
+        own = state.session(session)
+        return _file(f"shots.{kind}", lambda path: write_session_table(own, path))
 
-    @app.get(SESSION + "report.html", include_in_schema=False)
-    def report(session: str, words: Annotated[WordsQuery, Query()]) -> Response:
-        page = report_html(state.session(session), ShotWords(**words.model_dump()))
-        return Response(page, media_type="text/html; charset=utf-8")
+    @app.get(SESSION + "report.{kind}", include_in_schema=False)
+    def report(session: str, kind: Literal["html", "pdf"], words: Annotated[WordsQuery, Query()]) -> Response:
+        own = state.session(session)
+        return _file(f"report.{kind}", lambda path: write_report(own, path, ShotWords(**words.model_dump())))
 
     @app.get(SESSION + "shots/{shot_id}/video.mp4", include_in_schema=False)
     def video(session: str, shot_id: int, words: Annotated[WordsQuery, Query()]) -> Response:
         shot = state.session(session).shot(shot_id)
-        with TemporaryDirectory(prefix="spinscope-") as folder:
-            path = Path(folder) / "shot.mp4"
-            write_video(shot, shot["detail"], path, ShotWords(**words.model_dump()))
-            return Response(path.read_bytes(), media_type="video/mp4")
+        drawn = ShotWords(**words.model_dump())
+        return _file("shot.mp4", lambda path: write_video(shot, shot["detail"], path, drawn))
+
+
+def _file(name: str, write: Callable[[Path], None]) -> Response:
+    """What is written to a file of that name, as an answer."""
+    with TemporaryDirectory(prefix="spinscope-") as folder:
+        path = Path(folder) / name
+        write(path)
+        return Response(path.read_bytes(), media_type=MEDIA_TYPES[path.suffix])
 
 
 def _add_name_routes(app: FastAPI, state: CoachState) -> None:
@@ -218,21 +245,39 @@ def _add_name_routes(app: FastAPI, state: CoachState) -> None:
         own.keep_setting("now", {name: value for name, value in request.model_dump().items() if value})
         return Kept(revision=own.revision)
 
-    @app.post(SESSION + "pose")
-    def pose(session: str, request: PoseRequest) -> Kept:
+
+def _add_table_routes(app: FastAPI, state: CoachState) -> None:
+    @app.get(SESSION + "table")
+    def table(session: str) -> TableMarks:
+        return _marks(state.session(session))
+
+    @app.get(SESSION + "table.png", include_in_schema=False)
+    def picture(session: str, recording: str) -> Response:
         own = state.session(session)
-        own.keep_setting("pose", None if request.pose is None else checked_pose(request.pose))
-        return Kept(revision=own.revision)
+        return Response(event_picture(own, recording, state.choices(own)), media_type="image/png")
+
+    @app.post(SESSION + "table")
+    def mark(session: str, request: TableRequest) -> TableMarks:
+        own = state.session(session)
+        mark_table(own, request.recording, request.corners_px, state.choices(own))
+        return _marks(own)
 
 
-def coach_shot(row: Row) -> CoachShot:
-    """A row of a session in the terms of coaches."""
+def _marks(session: ShotSession) -> TableMarks:
+    pose = session.setting("pose") or {}
+    marks = {name: pose.get(name) for name in ("recording", "corners_px", "off_px")}
+    height_m = pose["camera_m"][2] if pose else None
+    return TableMarks(recordings=marking_recordings(session), height_m=height_m, **marks)
+
+
+def coach_shot(session: str, row: Row) -> CoachShot:
+    """A row of the session of that name in the terms of coaches."""
     spin, speed = row["spin_rps"], row["speed_m_s"]
     is_named = spin is not None and row["topspin_rps"] is not None
     effect = spin_effect(spin, speed) if spin is not None and speed else None
     columns = {name: value for name, value in row.items() if name in CoachShot.model_fields}
     return CoachShot(
-        **{**columns, "marked": bool(row["marked"]), "deleted": bool(row["deleted"])},
+        **{**columns, "session": session, "marked": bool(row["marked"]), "deleted": bool(row["deleted"])},
         has_picture=row["picture_file"] is not None,
         kind=list(kind_codes(row)),
         effect=effect,

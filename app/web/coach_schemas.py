@@ -31,15 +31,17 @@ class NamesRequest(Request):
 
 
 class StatisticsRequest(Request):
-    """Statistics of series of shots by their names, each in order of time."""
+    """Statistics of series by their names: ids of shots by session; see `series_statistics` for `since_s`."""
 
-    series: dict[str, list[int]] = Field(max_length=SHOTS_MOST)
+    series: dict[str, dict[str, list[int]]] = Field(max_length=SHOTS_MOST)
+    since_s: float | None = None
 
 
-class PoseRequest(Request):
-    """Camera's place over the table, see `flight_path`; None forgets it."""
+class TableRequest(Request):
+    """Corners of the table in the picture of a recording, columns and rows in order round the table."""
 
-    pose: dict[str, list[float] | list[list[float]]] | None
+    recording: str
+    corners_px: list[tuple[float, float]] = Field(min_length=4, max_length=4)
 
 
 class WordsQuery(Request):
@@ -53,6 +55,7 @@ class WordsQuery(Request):
 class CoachShot(Response):
     """One shot of a session: its columns, and what follows from them."""
 
+    session: str
     id: int
     revision: int
     recording: str
@@ -130,6 +133,26 @@ class SessionNames(Response):
     """Sessions that are open."""
 
     sessions: list[str]
+
+
+class Landings(Response):
+    """Where shots bounced, by id: metres along the table with the flight from the net, and to the left."""
+
+    landings: dict[int, tuple[float, float]]
+
+
+class TableMarks(Response):
+    """Recordings that the table can be marked in, and the present marks.
+
+    `height_m` is that of the camera over the table, `off_px` the largest distance of a corner from where the pose puts
+    it; None, like the rest, where no corners are marked.
+    """
+
+    recordings: list[str]
+    recording: str | None
+    corners_px: list[tuple[float, float]] | None
+    height_m: float | None
+    off_px: float | None
 
 
 class Statistics(Response):

@@ -25,6 +25,8 @@ class TablePose:
     ----------
     up : (3,) float64
         Unit normal of the table, camera frame.
+    along : (3,) float64
+        Unit vector along its long sides, camera frame; which of the two directions is left open.
     middle_m : (3,) float64
         Middle of the table, camera frame.
     reprojection_px : float
@@ -32,6 +34,7 @@ class TablePose:
     """
 
     up: Floats
+    along: Floats
     middle_m: Floats
     reprojection_px: float
 
@@ -80,7 +83,8 @@ def table_pose(corners_px: Sequence[tuple[float, float]], camera: Camera) -> Tab
                 continue
             off_px = np.linalg.norm(pinhole.project(placed) - seen_px, axis=1)
             normal = rotation[:, 2]
-            found = TablePose(-np.sign(normal @ middle_m) * normal, middle_m, float(off_px.max()))
+            along = rotation[:, 0 if length_m == LENGTH_M else 1]
+            found = TablePose(-np.sign(normal @ middle_m) * normal, along, middle_m, float(off_px.max()))
             if best is None or found.reprojection_px < best.reprojection_px:
                 best = found
     if best is None or best.reprojection_px > WORST_PX:

@@ -26,7 +26,7 @@ export type CancelRequest = { kind: "sweep" | "optimization" | "biases" | "bias_
 /** Anything that the page offers by name. */
 export type Choice = { name: string; label: string; help: string };
 /** One shot of a session: its columns, and what follows from them. */
-export type CoachShot = { id: number; revision: number; recording: string; shot: number; start_us: number; end_us: number; recorded_s: number; began_by: string; ended_by: string; speed_m_s: number | null; spin_rps: number | null; spin_std_rps: number | null; axis_std_deg: number | null; topspin_rps: number | null; sidespin_rps: number | null; corkscrew_rps: number | null; told_by: "logo" | "rhythm" | "flight" | null; reason: string | null; has_picture: boolean; player: string | null; wing: string | null; stroke: string | null; drill: string | null; marked: boolean; deleted: boolean; kind: string[]; effect: number | null; effect_word: "spinny" | "neutral" | "speedy" | null; confidence: "sure" | "good" | "rough" | null; clock_hours: number | null; corkscrew_share: number | null };
+export type CoachShot = { session: string; id: number; revision: number; recording: string; shot: number; start_us: number; end_us: number; recorded_s: number; began_by: string; ended_by: string; speed_m_s: number | null; spin_rps: number | null; spin_std_rps: number | null; axis_std_deg: number | null; topspin_rps: number | null; sidespin_rps: number | null; corkscrew_rps: number | null; told_by: "logo" | "rhythm" | "flight" | null; reason: string | null; has_picture: boolean; player: string | null; wing: string | null; stroke: string | null; drill: string | null; marked: boolean; deleted: boolean; kind: string[]; effect: number | null; effect_word: "spinny" | "neutral" | "speedy" | null; confidence: "sure" | "good" | "rough" | null; clock_hours: number | null; corkscrew_share: number | null };
 /** Declaration of one parameter, as its control needs it. */
 export type ControlInfo = { name: string; label: string; kind: string; default: any; optional: boolean; unit: string; low: number | null; high: number | null; step: number | null; choices: string[]; help: string; allowed: string; scale: "linear" | "logarithmic" | "cubic" | "none" };
 /** Answer without content. */
@@ -39,6 +39,8 @@ export type EventRate = { counts: number[]; edges_us: number[] };
 export type FlightPath = { frame: "table" | "hitter"; t_us: number[]; points_m: [number, number, number][]; net_clearance_m: number | null; height_std_m: number | null; landing_m: [number, number] | null };
 /** Revision after a change. */
 export type Kept = { revision: number };
+/** Where shots bounced, by id: metres along the table with the flight from the net, and to the left. */
+export type Landings = { landings: Record<string, [number, number]> };
 /** Have the running camera's stages go on with these parameters. */
 export type LiveParametersRequest = { parameters: Record<string, Record<string, any>> };
 /** State of one second, `t_s` after the start; latencies and rates are None where there is nothing to measure. */
@@ -73,8 +75,6 @@ export type OptimizationRequest = { parameters: Record<string, Record<string, an
 export type ParameterSweep = { name: string; total: number; points: SweepPoint[] };
 /** An .rrd picture that is ready to be fetched. */
 export type Picture = { id: string; size_bytes: number; start_us: number; end_us: number; opening_us: number };
-/** Camera's place over the table, see `flight_path`; None forgets it. */
-export type PoseRequest = { pose: Record<string, number[] | number[][]> | null };
 /** Parameters read from a preset, and notices of former names in it. */
 export type PresetValues = { parameters: Record<string, Record<string, any>>; notices: string[] };
 /** The opened recording, worked on shot by shot if it is long; `clip_us` is the first clip, [start, end). */
@@ -109,8 +109,8 @@ export type ShotsMessage = { kind: "shots"; share: number; shots: [number, numbe
 export type SpinProofPoints = { first_us: number; second_us: number; first: number[][]; second: number[][]; turned: number[][] };
 /** Statistics of series of shots, by their names. */
 export type Statistics = { series: Record<string, SeriesStatistics> };
-/** Statistics of series of shots by their names, each in order of time. */
-export type StatisticsRequest = { series: Record<string, number[]> };
+/** Statistics of series by their names: ids of shots by session; see `series_statistics` for `since_s`. */
+export type StatisticsRequest = { series: Record<string, Record<string, number[]>>; since_s?: number | null };
 /** Progress of a parameter sweep. */
 export type SweepMessage = { kind: "sweep"; state: "running" | "done" | "cancelled" | "failed"; error: string | null; content: ParameterSweep | null };
 /** Metrics of a run with one value; only `error` where the value does not go with the others. */
@@ -119,6 +119,10 @@ export type SweepPoint = { value: boolean | number | string; error: string | nul
 export type SweepRequest = { parameters: Record<string, Record<string, any>>; start_us?: number | null; end_us?: number | null; name: string; low?: number | null; high?: number | null; points?: number };
 /** Subject of one sweep: one bias, or several together. */
 export type SweptBias = { name: string; label: string; biases: string[] };
+/** Recordings that the table can be marked in, and the present marks. */
+export type TableMarks = { recordings: string[]; recording: string | null; corners_px: [number, number][] | null; height_m: number | null; off_px: number | null };
+/** Corners of the table in the picture of a recording, columns and rows in order round the table. */
+export type TableRequest = { recording: string; corners_px: [number, number][] };
 /** A preset (TOML) or a .bias file to read. */
 export type TextRequest = { text: string };
 /** Settings as a preset and as a command line; `needs` names a file that the command reads. */
@@ -160,11 +164,12 @@ export interface Posts {
 export interface CoachPosts {
   "names": { sent: NamesRequest; answered: Kept };
   "now": { sent: Names; answered: Kept };
-  "pose": { sent: PoseRequest; answered: Kept };
-  "statistics": { sent: StatisticsRequest; answered: Statistics };
+  "table": { sent: TableRequest; answered: TableMarks };
 }
 /** GET requests of a session: what is sent and answered. */
 export interface CoachGets {
+  "landings": { sent: null; answered: Landings };
   "shots": { sent: null; answered: SessionShots };
   "shots/{shot_id}": { sent: null; answered: ShotDetail };
+  "table": { sent: null; answered: TableMarks };
 }

@@ -7,6 +7,11 @@ from typing import Any
 from spinscope.app.coach.session import KnownRecording
 from spinscope.app.coach.shot_record import RecordingShots, ShotRecord
 
+# Of a shot whose spin and flight are not drawn.
+NO_DETAIL = (
+    '{"path": {"t_us": [], "x_m": [], "y_m": [], "z_m": []}, "hitter": null, "spin_rps": null, "depth_std_m": 0, '
+    '"line_of_sight": [0, 0, 1], "reference_us": 0, "texture": null, "proof": null}'
+)
 KNOWN = KnownRecording("content", "settings", "version", None)
 
 
@@ -27,6 +32,7 @@ def shot(number: int = 1, start_us: int = 0, end_us: int = 100_000, **others: An
         "corkscrew_rps": 0.0,
         "method": "contrast",
         "told_by": "logo",
+        "detail": NO_DETAIL,
     }
     return ShotRecord(**{**values, "shot": number, "start_us": start_us, "end_us": end_us, **others})
 

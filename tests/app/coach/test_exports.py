@@ -15,7 +15,7 @@ from pyarrow import parquet
 from sample_recordings.make_session import SampleShot, shots
 from spinscope.app.cli import cli
 from spinscope.app.coach import video
-from spinscope.app.coach.flight_path import TABLE_LENGTH_M, checked_pose, flight_path
+from spinscope.app.coach.flight_path import TABLE_LENGTH_M, flight_path
 from spinscope.app.coach.report import report_html, write_report
 from spinscope.app.coach.session import ShotSession
 from spinscope.app.coach.session_folders import SAMPLE
@@ -158,12 +158,6 @@ def test_a_flight_from_the_far_end_is_turned_with_the_table() -> None:
 def test_words_have_the_chosen_units() -> None:
     assert ShotWords("en", "rpm").spin(50.0) == "3000 rpm" and ShotWords().spin(50.0) == "50 rps"
     assert ShotWords("de", speed_unit="m_s").speed(14.04) == "14,0 m/s" and ShotWords().speed(10.0) == "36 km/h"
-
-
-@pytest.mark.parametrize("pose", [None, {}, {"axes": [[1, 0, 0]] * 3, "camera_m": [0, 0, 2]}, {"axes": 3}])
-def test_a_pose_that_is_none_is_refused(pose: Any) -> None:
-    with pytest.raises(ParameterError, match="pose"):
-        checked_pose(pose)
 
 
 def test_the_command_writes_report_table_and_says_what_is_wrong(

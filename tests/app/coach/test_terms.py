@@ -109,6 +109,14 @@ def test_a_trend_is_told_only_beyond_chance() -> None:
     assert trends.count("unclear") > 0.9 * 300
 
 
+def test_what_was_before_an_instant_is_compared_with_what_came_after() -> None:
+    dated = [{**row, "recorded_s": float(i)} for i, row in enumerate(rows([60, 61, 59, 50, None, 52, 51, 50]))]
+    found = series_statistics(dated, since_s=3.0)
+    assert found.trend == "fell" and found.change_rps == pytest.approx(50.75 - 60)
+    assert series_statistics(dated, since_s=2.0).trend == "too_few"  # two before
+    assert series_statistics(dated, since_s=99.0).trend == "too_few"
+
+
 def test_the_ellipse_holds_two_of_three_shots() -> None:
     random = np.random.default_rng(6)
     speeds, spins = random.multivariate_normal([10, 60], [[4, 6], [6, 25]], 20_000).T

@@ -195,6 +195,7 @@ def test_table_pose(seed: int, tmp_path: Path) -> None:
     corners = np.roll(TRUE.project(table_m @ turn.T + place), random.integers(4), axis=0)[:: random.choice([-1, 1])]
     pose = table_pose([tuple(corner) for corner in corners], TRUE)
     assert pose.up == pytest.approx(-turn[:, 2], abs=1e-4) and pose.middle_m == pytest.approx(place, abs=1e-3)
+    assert abs(pose.along @ turn[:, 0]) == pytest.approx(1.0, abs=1e-6)
     assert pose.height_m == pytest.approx(abs(place @ turn[:, 2]), abs=1e-3)
     with pytest.raises(ParameterError, match="in order round the table"):
         table_pose([tuple(corner) for corner in corners[[0, 2, 1, 3]]], TRUE)

@@ -1,13 +1,16 @@
-// Charts of series of shots in SVG: spin against speed with the ellipses of the spread, and shot by shot.
+// Charts of series of shots in SVG: spin against speed with the ellipses of the spread, shot by shot, day by day.
 
 /** @import { CoachShot, SeriesStatistics } from "../messages.d.ts" */
 
 import { drawing } from "../elements.js";
+import { TABLE } from "./drawings.js";
 import { chosen, dayOf, decimal, inSpeedUnit, inSpinUnit, kindWords, spinWords, text } from "./texts.js";
 
 // Okabe and Ito's palette, dark enough on white, told apart by shape as well.
 export const COLOURS = ["#0072b2", "#c24e00", "#007a5a", "#a3427d", "#6b5900", "#2c7da0", "#555555"];
 const SHAPES = ["circle", "square", "triangle", "diamond"];
+const AROUND_M = 0.15; // of the table that is drawn
+const DAY_LABEL = 84; // wide, and so far apart
 const WIDTH = 560, HEIGHT = 340, LEFT = 52, RIGHT = 12, TOP = 12, BOTTOM = 44;
 
 /** @typedef {{name: string, shots: CoachShot[], statistics: SeriesStatistics}} Series */
@@ -106,8 +109,11 @@ export function spreadChart(series, open) {
   return svg;
 }
 
-/** Spin shot by shot, with the middle of each day. @param {Series[]} series @param {(shot: CoachShot) => void} open */
-export function trendChart(series, open) {
+/**
+ * Spin shot by shot, with the middle of each day.
+ * @param {Series[]} series @param {Series[][]} days of each series @param {(shot: CoachShot) => void} open
+ */
+export function trendChart(series, days, open) {
   const seen = series.map(({ name, shots }) => ({ name, shots: shots.filter((shot) => shot.spin_rps !== null) }));
   const all = [...new Set(seen.flatMap(({ shots }) => shots))].sort((a, b) => a.recorded_s - b.recorded_s);
   if (all.length < 2) return null;
@@ -120,32 +126,22 @@ export function trendChart(series, open) {
     range(spins, 0),
     (value) => Number.isInteger(value) ? decimal(value) : "",
   );
-  let day = "";
-  for (const shot of all) {
-    if (dayOf(shot) === day) continue;
-    day = dayOf(shot);
-    const at = x((place.get(shot) ?? 0) - 0.5);
-    svg.append(
-      drawing("line", { x1: at, y1: TOP, x2: at, y2: HEIGHT - BOTTOM, class: "day" }),
-      drawing("text", { x: at + 4, y: TOP + 10, class: "day" }, day),
-    );
+  let free = 0;
+  for (const [first] of Map.groupBy(all, dayOf).values()) {
+    const at = x((place.get(first) ?? 0) - 0.5);
+    svg.append(drawing("line", { x1: at, y1: TOP, x2: at, y2: HEIGHT - BOTTOM, class: "day" }));
+    if (at < free) continue;
+    svg.append(drawing("text", { x: at + 4, y: TOP + 10, class: "day" }, dayOf(first)));
+    free = at + DAY_LABEL;
   }
   seen.forEach(({ name, shots }, index) => {
-    const colour = COLOURS[index % COLOURS.length];
-    for (const own of Map.groupBy(shots, dayOf).values()) {
-      const values = own.map((shot) => shot.spin_rps ?? 0).sort((a, b) => a - b);
-      const middle = y(inSpinUnit((values[(values.length - 1) >> 1] + values[values.length >> 1]) / 2));
-      const ends = [place.get(own[0]) ?? 0, place.get(own[own.length - 1]) ?? 0];
-      svg.append(
-        drawing("line", {
-          x1: x(ends[0] - 0.4),
-          y1: middle,
-          x2: x(ends[1] + 0.4),
-          y2: middle,
-          stroke: colour,
-          "stroke-width": 2,
-        }),
-      );
+    const stroke = COLOURS[index % COLOURS.length];
+    for (const { shots: own, statistics } of days[index]) {
+      const places = own.map((shot) => place.get(shot)).filter((one) => one !== undefined);
+      if (statistics.median_rps === null) continue;
+      const middle = y(inSpinUnit(statistics.median_rps));
+      const ends = { x1: x(Math.min(...places) - 0.4), y1: middle, x2: x(Math.max(...places) + 0.4), y2: middle };
+      svg.append(drawing("line", { ...ends, stroke, "stroke-width": 2 }));
     }
     for (const shot of shots) {
       const title = `${name}: ${spinWords(shot.spin_rps)}, ${dayOf(shot)}`;
@@ -153,6 +149,76 @@ export function trendChart(series, open) {
     }
   });
   return svg;
+}
+
+/** Middle and spread of each day in the course of weeks and months. @param {Series[]} series @param {Series[][]} days */
+export function daysChart(series, days) {
+  const known = days.map((own) => own.filter(({ statistics }) => statistics.median_rps !== null));
+  const at = (/** @type {Series} */ day) => day.shots[0].recorded_s;
+  const ordered = known.flat().sort((a, b) => at(a) - at(b));
+  if (new Set(ordered.map(({ shots: [first] }) => dayOf(first))).size < 2) return null;
+  const ends = ({ statistics: { median_rps, spread_rps } } = ordered[0]) =>
+    [-1, 1].map((sign) => inSpinUnit((median_rps ?? 0) + sign * (spread_rps ?? 0)));
+  const { svg, x, y } = axes(
+    text("days"),
+    text("day"),
+    range(ordered.map(at)),
+    range(ordered.flatMap((day) => ends(day)), 0),
+    () => "",
+  );
+  let free = 0;
+  for (const day of ordered) {
+    const middle = x(at(day));
+    if (middle < free) continue;
+    const inside = Math.min(Math.max(middle, LEFT + DAY_LABEL / 2), WIDTH - RIGHT - DAY_LABEL / 2);
+    svg.append(drawing("text", { x: inside, y: HEIGHT - BOTTOM + 18, class: "x" }, dayOf(day.shots[0])));
+    free = middle + DAY_LABEL;
+  }
+  known.forEach((own, index) => {
+    const stroke = COLOURS[index % COLOURS.length];
+    const middles = own.map((day) => [x(at(day)), y(inSpinUnit(day.statistics.median_rps ?? 0))]);
+    svg.append(
+      drawing("polyline", { points: middles.map((one) => one.join(",")).join(" "), fill: "none", stroke }),
+    );
+    own.forEach((day, i) => {
+      const [x1, middle] = middles[i], [low, high] = ends(day);
+      const { count, median_rps } = day.statistics;
+      const title = `${series[index].name}: ${spinWords(median_rps)}, ${dayOf(day.shots[0])} (${count})`;
+      svg.append(
+        drawing("line", { x1, y1: y(low), x2: x1, y2: y(high), stroke, "stroke-width": 2, "stroke-opacity": 0.5 }),
+        mark(x1, middle, index, title),
+      );
+    });
+  });
+  return svg;
+}
+
+/**
+ * Where the shots of series bounced on the table, from above, the hitter on the left.
+ * @param {{name: string, shots: CoachShot[]}[]} series @param {Record<number, number[]>} landings by id
+ * @param {(shot: CoachShot) => void} open
+ */
+export function placementChart(series, landings, open) {
+  const wide = TABLE.long + 2 * AROUND_M, high = TABLE.wide + 2 * AROUND_M, scale = WIDTH / wide;
+  const x = (/** @type {number} */ m) => scale * (m + wide / 2),
+    y = (/** @type {number} */ m) => scale * (high / 2 - m);
+  const [left, right, top, bottom] = [x(-TABLE.long / 2), x(TABLE.long / 2), y(TABLE.wide / 2), y(-TABLE.wide / 2)];
+  const svg = drawing(
+    "svg",
+    { viewBox: `0 0 ${WIDTH} ${scale * high}`, role: "img", "aria-label": text("placement"), class: "chart placement" },
+    drawing("rect", { x: left, y: top, width: right - left, height: bottom - top, class: "table" }),
+    drawing("line", { x1: left, y1: y(0), x2: right, y2: y(0), class: "line" }),
+    drawing("line", { x1: x(0), y1: top - 8, x2: x(0), y2: bottom + 8, class: "net" }),
+  );
+  const landed = series.flatMap(({ name, shots }, index) =>
+    shots.filter((shot) => landings[shot.id]).map((shot) => {
+      const [along, aside] = landings[shot.id];
+      const title = `${name}: ${spinWords(shot.spin_rps)}, ${kindWords(shot.kind)}`;
+      return mark(x(along), y(aside), index, title, () => open(shot));
+    })
+  );
+  svg.append(...landed);
+  return landed.length ? svg : null;
 }
 
 /** The mark of a series, for legends. @param {number} index */

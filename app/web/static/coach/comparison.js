@@ -2,14 +2,14 @@
 
 /** @import { CoachShot } from "../messages.d.ts" */
 /** @import { Series } from "./charts.js" */
-/** @import { Shots } from "./shots.js" */
 
-import { element } from "../elements.js";
-import { legendMark, spreadChart, trendChart } from "./charts.js";
+import { attempt, element } from "../elements.js";
+import { daysChart, legendMark, spreadChart, trendChart } from "./charts.js";
 import { nameWords, ShotFilter } from "./shot_list.js";
+import { Shots } from "./shots.js";
 import { dayOf, mainKind, speedWords, spinWords, term, text, wordsQuery } from "./texts.js";
 
-const GROUPINGS = ["player", "kind", "wing", "stroke", "drill", "day"];
+const GROUPINGS = ["player", "kind", "wing", "stroke", "drill", "day", "session"];
 const FEWEST = 3; // shots of a group that is called the most constant or the strongest
 
 /** Name of a shot's group. @param {CoachShot} shot @param {string} by */
@@ -19,17 +19,26 @@ function groupOf(shot, by) {
   return nameWords(/** @type {any} */ (shot)[by]) || text("none");
 }
 
-/** @param {Shots} shots @param {CoachShot[]} list @param {(shot: CoachShot) => string} name @returns {Promise<Series[]>} */
-export async function seriesOf(shots, list, name) {
+/**
+ * Series of shots with their statistics.
+ * @param {CoachShot[]} list in order of time
+ * @param {(shot: CoachShot) => string} name of a shot's series
+ * @param {number | null} since_s begin of the later part that is compared with the earlier; null for halves
+ * @returns {Promise<Series[]>}
+ */
+export async function seriesOf(list, name, since_s = null) {
   const groups = [...Map.groupBy(list, name).entries()];
   if (!groups.length) return [];
-  const series = Object.fromEntries(groups.map(([one, own]) => [one, own.map((shot) => shot.id)]));
-  const statistics = (await shots.post("statistics", { series })).series;
+  const series = Object.fromEntries(groups.map(([one, own]) => {
+    const ids = [...Map.groupBy(own, (shot) => shot.session).entries()];
+    return [one, Object.fromEntries(ids.map(([session, shots]) => [session, shots.map((shot) => shot.id)]))];
+  }));
+  const statistics = (await Shots.statistics({ series, since_s })).series;
   return groups.map(([one, own]) => ({ name: one, shots: own, statistics: statistics[one] }));
 }
 
-/** What the series answer, in sentences. @param {Series[]} series */
-export function answers(series) {
+/** What the series answer, in sentences. @param {Series[]} series @param {string} since words for what is compared */
+function answers(series, since) {
   const sentences = [];
   const large = series.filter(({ statistics }) => statistics.count >= FEWEST);
   const strongest = [...large].sort((a, b) => (b.statistics.median_rps ?? 0) - (a.statistics.median_rps ?? 0))[0];
@@ -41,27 +50,34 @@ export function answers(series) {
     );
   }
   for (const { name, statistics } of series) {
-    sentences.push(text(statistics.trend, { group: name, value: spinWords(Math.abs(statistics.change_rps ?? 0)) }));
+    const value = spinWords(Math.abs(statistics.change_rps ?? 0));
+    sentences.push(text(statistics.trend, { group: name, value, since }));
   }
   return sentences;
 }
 
 export class Comparison {
   #by = "player";
-
-  filter = new ShotFilter();
+  #isOfAll = false;
+  /** @type {number | null} first instant of the day from which on "after" counts; null for halves */
+  #since_s = null;
   #hasBegun = false;
+  #filled = 0;
+  /** @type {CoachShot[]} */
+  #list = [];
+  filter = new ShotFilter();
 
-  /** @param {{shots: Shots, go: (place: string) => void}} page */
-  constructor({ shots, go }) {
-    this.shots = shots;
-    this.go = go;
+  /** @param {{shots: Shots, sessions: string[], openShot: (shot: CoachShot) => void}} page */
+  constructor(page) {
+    this.page = page;
     this.root = element("section.comparison");
     this.content = element("div.content");
     this.filter.addEventListener("change", () => this.#fill());
   }
 
-  show() {
+  async show() {
+    const { shots, sessions } = this.page;
+    this.#list = this.#isOfAll ? await shots.ofSessions(sessions) : shots.list;
     if (!this.#hasBegun) this.filter.values.kind = this.#usualKind();
     this.#hasBegun = true;
     const by = element(
@@ -69,34 +85,74 @@ export class Comparison {
       { name: "by", onchange: () => (this.#by = by.value, this.#fill()) },
       GROUPINGS.map((value) => element("option", { value, selected: value === this.#by }, text(value))),
     );
-    const bar = this.filter.bar(this.shots.list);
+    const all = element("input", {
+      type: "checkbox",
+      name: "all-sessions",
+      checked: this.#isOfAll,
+      onchange: () => (this.#isOfAll = all.checked, this.show()),
+    });
+    const bar = this.filter.bar(this.#list);
     bar.prepend(element("label.name", {}, text("by"), by));
-    const report = element("a.button", {
-      href: this.shots.path(`report.html?${wordsQuery()}`),
-      target: "_blank",
-    }, text("download_report"));
-    bar.append(report);
+    bar.append(
+      this.#sinceSelect(),
+      sessions.length > 1 ? element("label.check", {}, all, text("all_sessions")) : "",
+      element(
+        "a.button",
+        { href: shots.path(`report.html?${wordsQuery()}`), target: "_blank" },
+        text("download_report"),
+      ),
+      element(
+        "button",
+        { onclick: () => attempt(() => shots.save(`report.pdf?${wordsQuery()}`, `${shots.session}.pdf`)) },
+        text("download_pdf"),
+      ),
+    );
     this.root.replaceChildren(bar, this.content);
     this.#fill();
     return this.root;
   }
 
+  // What "did it get better" compares: the halves of each series, or what was before a day and after.
+  #sinceSelect() {
+    const days = [...Map.groupBy(this.#list, dayOf).values()].map(([first]) => first).slice(1);
+    if (!days.some((shot) => shot.recorded_s === this.#since_s)) this.#since_s = null;
+    const made = element(
+      "select",
+      { name: "since", onchange: () => (this.#since_s = made.value ? Number(made.value) : null, this.#fill()) },
+      element("option", { value: "" }, text("halves")),
+      days.map((shot) =>
+        element(
+          "option",
+          { value: String(shot.recorded_s), selected: shot.recorded_s === this.#since_s },
+          text("since", { day: dayOf(shot) }),
+        )
+      ),
+    );
+    return element("label.name", {}, text("before_after"), made);
+  }
+
   // Spins of different kinds are not compared unless somebody wishes it.
   #usualKind() {
-    const groups = [...Map.groupBy(this.shots.list, (shot) => mainKind(shot) ?? "not_seen").entries()];
+    const groups = [...Map.groupBy(this.#list, (shot) => mainKind(shot) ?? "not_seen").entries()];
     return groups.sort(([, a], [, b]) => b.length - a.length)[0]?.[0] ?? "";
   }
 
   async #fill() {
-    const list = this.filter.of(this.shots.list);
-    const series = await seriesOf(this.shots, list, (shot) => groupOf(shot, this.#by));
-    const open = (/** @type {CoachShot} */ shot) => this.go(`shot/${shot.id}`);
+    const filled = ++this.#filled;
+    const list = this.filter.of(this.#list), since_s = this.#since_s;
+    const group = (/** @type {CoachShot} */ shot) => groupOf(shot, this.#by);
+    const [series, days] = await Promise.all([
+      seriesOf(list, group, since_s),
+      seriesOf(list, (shot) => JSON.stringify([group(shot), dayOf(shot)])),
+    ]);
+    if (filled !== this.#filled) return;
+    const daysOf = (/** @type {Series} */ one) => days.filter(({ shots: [first] }) => group(first) === one.name);
+    const open = this.page.openShot;
     const legend = element(
       "ul.legend",
       {},
       series.map(({ name }, index) => element("li", {}, legendMark(index), ` ${name}`)),
     );
-    const spread = spreadChart(series, open), trend = trendChart(series, open);
     const figure = (/** @type {any} */ chart, /** @type {string} */ key) =>
       chart &&
       element(
@@ -106,10 +162,18 @@ export class Comparison {
         chart,
         element("figcaption.note", {}, text(`${key}_help`)),
       );
+    const first = list.find((shot) => shot.recorded_s === since_s);
+    const since = first ? text("since", { day: dayOf(first) }) : text("halves");
     this.content.replaceChildren(
-      element("ul.answers", {}, answers(series).map((sentence) => element("li", {}, sentence))),
+      element("ul.answers", {}, answers(series, since).map((sentence) => element("li", {}, sentence))),
       legend,
-      element("div.two", {}, figure(spread, "spread"), figure(trend, "trend")),
+      element(
+        "div.two",
+        {},
+        figure(spreadChart(series, open), "spread"),
+        figure(trendChart(series, series.map(daysOf), open), "trend"),
+        figure(daysChart(series, series.map(daysOf)), "days"),
+      ),
       statisticsTable(series, open),
     );
   }

@@ -6,7 +6,7 @@ import { drawing, element } from "../elements.js";
 import { decimal, spinWords, term, text } from "./texts.js";
 
 // Laws of table tennis, metres: app/coach/flight_path.py.
-const TABLE = { long: 2.74, wide: 1.525, net: 0.1525 };
+export const TABLE = { long: 2.74, wide: 1.525, net: 0.1525 };
 const PARTS = [
   { value: "topspin_rps", negative: "backspin", positive: "topspin" },
   { value: "sidespin_rps", negative: "right_sidespin", positive: "left_sidespin" },
@@ -118,7 +118,7 @@ export class FlightDrawing {
     this.root.append(
       element("figure", {}, above, element("figcaption", {}, text("from_above"))),
       element("figure", {}, beside, element("figcaption", {}, text("from_side"))),
-      element("p.note", {}, this.words()),
+      element("p.note", {}, this.words(), " ", element("a", { href: "#table" }, text("mark_table"))),
     );
   }
 

@@ -1,5 +1,7 @@
 // The coach's page: its places, the header, the keys.
 
+/** @import { CoachShot } from "../messages.d.ts" */
+
 import { attempt, byId, element, notice } from "../elements.js";
 import { Comparison } from "./comparison.js";
 import { Live } from "./live.js";
@@ -7,6 +9,7 @@ import { Protocols } from "./protocols.js";
 import { ShotFilter, ShotList } from "./shot_list.js";
 import { Shots } from "./shots.js";
 import { pairView, ShotView } from "./shot_view.js";
+import { TableMarking } from "./table_marking.js";
 import { choose, chosen, loadTexts, text } from "./texts.js";
 
 const PLACES = ["shots", "compare", "tests", "live"];
@@ -35,6 +38,7 @@ class Page {
     this.comparison = new Comparison(this);
     this.protocols = new Protocols(this);
     this.live = new Live(this);
+    this.tableMarking = new TableMarking(this);
   }
 
   async begin() {
@@ -60,6 +64,12 @@ class Page {
 
   go = (/** @type {string} */ place) => {
     location.hash = place;
+  };
+
+  /** Opens a shot of whatever session. @param {CoachShot} shot */
+  openShot = async (shot) => {
+    if (shot.session !== this.shots.session) await this.#switchTo(shot.session);
+    this.go(`shot/${shot.id}`);
   };
 
   /** Ids in the order of the list. */
@@ -90,6 +100,7 @@ class Page {
     if (name === "compare") return this.comparison.show();
     if (name === "tests") return this.protocols.show();
     if (name === "live") return this.live.show();
+    if (name === "table") return this.tableMarking.show();
     return this.list.show();
   }
 
@@ -97,7 +108,7 @@ class Page {
   async #refresh() {
     const [name] = this.place.split("/");
     this.#header(name);
-    if (name === "live" || isTyping()) return;
+    if (name === "live" || name === "table" || isTyping()) return;
     if (name !== "shot") {
       const focused = document.activeElement?.getAttribute("aria-label");
       const scroll = scrollY;
@@ -141,7 +152,7 @@ class Page {
         name: "session",
         "aria-label": text("session"),
         title: text("session"),
-        onchange: () => attempt(() => this.#openSession(session.value)),
+        onchange: () => attempt(() => this.#showSession(session.value)),
       },
       this.sessions.map((one) => element("option", { value: one, selected: one === this.shots.session }, one)),
     );
@@ -166,7 +177,7 @@ class Page {
         text("analyzing", analysis),
       )
       : null;
-    const current = name === "shot" || name === "pair" ? "shots" : name;
+    const current = PLACES.includes(name) ? name : "shots";
     const link = (/** @type {string} */ place) =>
       element(
         "a",
@@ -189,15 +200,20 @@ class Page {
         onclick: () => notice(text("keys"), "info", 12),
       }, "?"),
     );
-    document.title = `Spinscope – ${text(PLACES.includes(current) ? current : "shots")}`;
+    document.title = `Spinscope – ${text(current)}`;
   }
 
   /** @param {string} name */
-  async #openSession(name) {
-    localStorage.setItem("spinscope.coach.session", name);
-    await this.shots.open(name);
+  async #showSession(name) {
+    await this.#switchTo(name);
     this.go("shots");
     await this.show();
+  }
+
+  /** @param {string} session */
+  async #switchTo(session) {
+    localStorage.setItem("spinscope.coach.session", session);
+    await this.shots.open(session);
   }
 
   #key(/** @type {KeyboardEvent} */ event) {

@@ -1,12 +1,14 @@
 // Tests that can be repeated: a drill by a player on a day, with counts, best, middle, spread, beside the last time.
 
 /** @import { CoachShot } from "../messages.d.ts" */
+/** @import { Series } from "./charts.js" */
 /** @import { Shots } from "./shots.js" */
 
 import { attempt, element } from "../elements.js";
+import { legendMark, placementChart } from "./charts.js";
 import { seriesOf } from "./comparison.js";
 import { nameInputs, nameWords, takeNames, valuesOf } from "./shot_list.js";
-import { dayOf, kindWords, speedWords, spinWords, term, text } from "./texts.js";
+import { dayOf, mainKind, speedWords, spinWords, term, text } from "./texts.js";
 
 const TARGET = 10; // balls of a test, as coaches ask for
 const PROTOCOLS = ["maximum topspin", "backspin rally", "serves"];
@@ -22,11 +24,11 @@ export class Protocols {
   async show() {
     const drilled = this.shots.list.filter((shot) => shot.drill !== null);
     const key = (/** @type {CoachShot} */ shot) => JSON.stringify([shot.drill, shot.player, dayOf(shot)]);
-    const series = await seriesOf(this.shots, drilled, key);
+    const [series, landings] = await Promise.all([seriesOf(drilled, key), this.shots.landings()]);
     const drills = valuesOf(drilled, "drill");
     this.root.replaceChildren(
       this.#start(),
-      ...drills.map((drill) => this.#drill(drill, series.filter((one) => one.shots[0].drill === drill))),
+      ...drills.map((drill) => this.#drill(drill, series.filter((one) => one.shots[0].drill === drill), landings)),
       drills.length
         ? element("button.print", { onclick: () => print() }, text("print"))
         : element("p.note", {}, text("no_tests")),
@@ -78,9 +80,9 @@ export class Protocols {
     );
   }
 
-  /** @param {string} drill @param {import("./charts.js").Series[]} series */
-  #drill(drill, series) {
-    const head = ["player", "day", "count", "median", "deviation", "best", "speed", "last_time"].map((key) =>
+  /** @param {string} drill @param {Series[]} series @param {Record<number, number[]>} landings */
+  #drill(drill, series, landings) {
+    const head = ["player", "day", "count", "kind", "median", "deviation", "best", "speed", "last_time"].map((key) =>
       element("th", { scope: "col" }, key === "median" || key === "deviation" ? term(key) : text(key))
     );
     const rows = series.map((one) => {
@@ -101,6 +103,7 @@ export class Protocols {
           {},
           String(statistics.count) + (statistics.unseen ? ` (+${statistics.unseen} ${text("not_seen")})` : ""),
         ),
+        element("td", {}, kindCounts(one.shots)),
         element("td", {}, element("strong", {}, spinWords(statistics.median_rps))),
         element("td", {}, spinWords(statistics.spread_rps)),
         element(
@@ -122,20 +125,38 @@ export class Protocols {
         ),
       );
     });
-    const kinds = [...new Set(series.flatMap(({ shots }) => shots.map((shot) => kindWords(shot.kind.slice(0, 1)))))]
-      .filter(Boolean);
+    const players = [...Map.groupBy(series, ({ shots: [first] }) => nameWords(first.player) || text("none")).entries()]
+      .map(([name, own]) => ({ name, shots: own.flatMap(({ shots }) => shots) }));
+    const placement = placementChart(players, landings, (shot) => this.go(`shot/${shot.id}`));
     return element(
       "div.card",
       {},
       element("h3", {}, `${text("protocol")}: ${nameWords(drill)}`),
-      element("p.note", {}, kinds.join(", ")),
       element(
         "div.scroll",
         { tabIndex: 0 },
         element("table.statistics", {}, element("thead", {}, element("tr", {}, head)), element("tbody", {}, rows)),
       ),
+      placement &&
+        element(
+          "figure.placement",
+          {},
+          element(
+            "figcaption",
+            {},
+            text("placement"),
+            ": ",
+            players.map(({ name }, i) => [legendMark(i), ` ${name} `]).flat(),
+          ),
+          placement,
+        ),
     );
   }
 }
+
+/** How many shots of each kind: "backspin 4, left sidespin 2". @param {CoachShot[]} shots */
+const kindCounts = (shots) =>
+  [...Map.groupBy(shots.filter((shot) => shot.kind.length), mainKind).entries()]
+    .sort(([, a], [, b]) => b.length - a.length).map(([kind, own]) => `${text(kind ?? "")} ${own.length}`).join(", ");
 
 const today = () => dayOf(/** @type {CoachShot} */ ({ recorded_s: Date.now() / 1000 }));

@@ -376,13 +376,15 @@ export class ShotList {
     }, text("undo"));
     const gone = this.shots.deletedCount;
     const deleted = gone ? element("span.note", {}, text("deleted", { count: gone })) : null;
-    const download = element(
-      "a.button",
-      { href: this.shots.path("shots.csv"), download: "shots.csv" },
-      text("download_csv"),
+    const downloads = ["csv", "parquet"].map((kind) =>
+      element(
+        "a.button",
+        { href: this.shots.path(`shots.${kind}`), download: `${this.shots.session}.${kind}` },
+        text(`download_${kind}`),
+      )
     );
     if (!ids.length) {
-      this.actions.replaceChildren(...[undo, download, deleted].filter((one) => one !== null));
+      this.actions.replaceChildren(...[undo, ...downloads, deleted].filter((one) => one !== null));
       return;
     }
     const inputs = nameInputs(this.shots, {});

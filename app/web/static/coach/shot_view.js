@@ -3,7 +3,7 @@
 /** @import { CoachShot, ShotDetail } from "../messages.d.ts" */
 /** @import { Shots } from "./shots.js" */
 
-import { attempt, download, element, notice } from "../elements.js";
+import { attempt, element } from "../elements.js";
 import { clock, componentBars, FlightDrawing, proofDiscs } from "./drawings.js";
 import { nameCode, nameInputs, nameWords } from "./shot_list.js";
 import {
@@ -218,7 +218,7 @@ export class ShotView {
       element("span.note", {}, `${timeWords(shot, true)} ${nameWords(shot.player)}`),
       shot.spin_rps === null
         ? ""
-        : element("button", { onclick: () => attempt(() => this.#video(id)) }, text("download_video")),
+        : element("button", { onclick: () => attempt(() => this.#saveVideo(id)) }, text("download_video")),
     );
     const picture = element("div.stage");
     if (shot.spin_rps === null) {
@@ -293,15 +293,8 @@ export class ShotView {
   }
 
   /** @param {number} id */
-  async #video(id) {
-    const note = notice(text("video_soon"), "info", 0);
-    try {
-      const response = await fetch(this.shots.path(`shots/${id}/video.mp4?${wordsQuery()}`));
-      if (!response.ok) throw new Error((await response.json()).error);
-      download(`shot-${id}.mp4`, await response.arrayBuffer(), "video/mp4");
-    } finally {
-      note.remove();
-    }
+  #saveVideo(id) {
+    return this.shots.save(`shots/${id}/video.mp4?${wordsQuery()}`, `shot-${id}.mp4`);
   }
 
   /** Before and after a bounce side by side. @param {CoachShot} shot */

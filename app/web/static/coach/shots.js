@@ -1,6 +1,10 @@
 // The shots of the open session, kept up to date with the server, and the changes that can be undone.
 
 /** @import { AnalysisState, CoachGets, CoachPosts, CoachShot, Names, ShotDetail } from "../messages.d.ts" */
+/** @import { Landings, Statistics, StatisticsRequest, TableMarks } from "../messages.d.ts" */
+
+import { download, notice } from "../elements.js";
+import { text } from "./texts.js";
 
 const JSON_HEADERS = { "content-type": "application/json" };
 
@@ -10,6 +14,14 @@ async function answered(response) {
   const { error } = await response.json().catch(() => ({ error: response.statusText }));
   throw new Error(error);
 }
+
+/** @param {string} path @param {any} content */
+const posted = async (path, content) =>
+  answered(await fetch(path, { method: "POST", headers: JSON_HEADERS, body: JSON.stringify(content) }));
+
+/** Those that are not deleted, in order of time. @param {Iterable<CoachShot>} shots */
+const inOrder = (shots) =>
+  [...shots].filter((shot) => !shot.deleted).sort((a, b) => a.recorded_s - b.recorded_s || a.id - b.id);
 
 // Events: `change` when shots, names or the work in the background have changed, `new` with a shot that has just ended,
 // `lost` and `back` with the connection.
@@ -25,7 +37,7 @@ export class Shots extends EventTarget {
   #changed = Promise.resolve();
   /** @type {EventSource | null} */
   #stream = null;
-  /** @type {Map<number, {revision: number, detail: Promise<ShotDetail>}>} */
+  /** @type {Map<number, Promise<ShotDetail>>} of the present revision */
   #details = new Map();
   session = "";
   /** @type {AnalysisState} */
@@ -56,10 +68,17 @@ export class Shots extends EventTarget {
     return `/api/coach/${encodeURIComponent(this.session)}/${rest}`;
   }
 
-  /** All that are not deleted, in order of time. */
   get list() {
-    return [...this.#all.values()].filter((shot) => !shot.deleted)
-      .sort((a, b) => a.recorded_s - b.recorded_s || a.id - b.id);
+    return inOrder(this.#all.values());
+  }
+
+  /** The shots of other sessions, too, as they are now. @param {string[]} sessions */
+  async ofSessions(sessions) {
+    const others = sessions.filter((name) => name !== this.session);
+    const answers = await Promise.all(
+      others.map(async (name) => answered(await fetch(`/api/coach/${encodeURIComponent(name)}/shots`))),
+    );
+    return inOrder([...this.#all.values(), ...answers.flatMap(({ shots }) => shots)]);
   }
 
   get deletedCount() {
@@ -96,6 +115,7 @@ export class Shots extends EventTarget {
     const answer = await answered(await fetch(this.path(`shots?since=${this.#revision}`)));
     if (session !== this.session) return;
     const before = JSON.stringify([this.analysis, this.now]);
+    if (answer.revision !== this.#revision) this.#details.clear();
     this.#revision = answer.revision;
     this.analysis = answer.analysis;
     this.now = answer.now;
@@ -106,14 +126,33 @@ export class Shots extends EventTarget {
     if (!isFirst) { for (const shot of fresh) this.dispatchEvent(new CustomEvent("new", { detail: shot })); }
   }
 
-  /** @param {number} id */
+  /** @param {number} id @returns {Promise<ShotDetail>} */
   detail(id) {
-    const revision = this.#all.get(id)?.revision ?? -1;
-    const kept = this.#details.get(id);
-    if (kept?.revision === revision) return kept.detail;
-    const detail = fetch(this.path(`shots/${id}`)).then(answered);
-    this.#details.set(id, { revision, detail });
+    const detail = this.#details.get(id) ?? fetch(this.path(`shots/${id}`)).then(answered);
+    this.#details.set(id, detail);
     return detail;
+  }
+
+  /** Saves a file that takes the server some time to make. @param {string} rest @param {string} name */
+  async save(rest, name) {
+    const note = notice(text("file_soon"), "info", 0);
+    try {
+      const response = await fetch(this.path(rest));
+      if (!response.ok) await answered(response); // throws the reason
+      download(name, await response.blob(), "");
+    } finally {
+      note.remove();
+    }
+  }
+
+  /** @returns {Promise<Landings["landings"]>} */
+  async landings() {
+    return (await answered(await fetch(this.path("landings")))).landings;
+  }
+
+  /** @returns {Promise<TableMarks>} */
+  async tableMarks() {
+    return answered(await fetch(this.path("table")));
   }
 
   /**
@@ -122,10 +161,13 @@ export class Shots extends EventTarget {
    * @param {CoachPosts[P]["sent"]} content
    * @returns {Promise<CoachPosts[P]["answered"]>}
    */
-  async post(rest, content) {
-    return answered(
-      await fetch(this.path(rest), { method: "POST", headers: JSON_HEADERS, body: JSON.stringify(content) }),
-    );
+  post(rest, content) {
+    return posted(this.path(rest), content);
+  }
+
+  /** @param {StatisticsRequest} request @returns {Promise<Statistics>} */
+  static statistics(request) {
+    return posted("/api/coach/statistics", request);
   }
 
   /**

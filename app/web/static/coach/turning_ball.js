@@ -4,6 +4,7 @@
 
 const BALL_SHARE = 0.7; // of the canvas's half side
 const MOST_PX = 400; // painted; the browser enlarges it: 20 pictures a second by software on two cores
+const SMOOTH = 4; // as in app/coach/ball_picture.py
 const AXIS_LENGTH = 1.38; // in ball radii
 const LIGHT = [-0.35, 0.6, 0.72]; // from above, as in a hall
 const WHITE = [252, 250, 244], INK = [34, 48, 110];
@@ -37,17 +38,17 @@ export function rotation(axis, angle) {
   ];
 }
 
-/** Ink of a texture in base64, 0 to 255 by pixel, and the texture's side. @param {string} base64 */
+/** Ink of a texture in base64, 0 to 255, interpolated to SMOOTH pixels each way, and its side. @param {string} base64 */
 async function inkOf(base64) {
   const image = new Image();
   image.src = `data:image/png;base64,${base64}`;
   await image.decode();
   const canvas = document.createElement("canvas");
-  canvas.width = canvas.height = image.width;
+  const side = canvas.width = canvas.height = SMOOTH * image.width;
   const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d", { willReadFrequently: true }));
-  context.drawImage(image, 0, 0);
-  const { data } = context.getImageData(0, 0, image.width, image.width);
-  return { ink: data.filter((_, i) => i % 4 === 0), side: image.width };
+  context.drawImage(image, 0, 0, side, side);
+  const { data } = context.getImageData(0, 0, side, side);
+  return { ink: data.filter((_, i) => i % 4 === 0), side };
 }
 
 export class TurningBall {
