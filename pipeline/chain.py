@@ -452,12 +452,13 @@ class Chain:
             kept = {shot: self._columns.get((keys[name], shot)) for shot in last}
         return all(one is not None and one.first + len(one.results) > last[shot] for shot, one in kept.items())
 
-    def _keep_budget(self, in_use: set[Hashable]) -> None:
+    def _keep_budget(self, run: _Run) -> None:
+        """Drop columns that the run does not use until the others are within the budget."""
         with self._lock:
             total = sum(column.bytes for column in self._columns.values())
             if total <= self._budget_bytes and len(self._columns) <= self._max_columns:
                 return  # comparing the keys of all columns would take longer than a quick tick
-            for key in sorted(self._columns.keys() - in_use, key=lambda k: self._columns[k].last_use):
+            for key in sorted(self._columns.keys() - run.columns_in_use, key=lambda k: self._columns[k].last_use):
                 if total <= self._budget_bytes and len(self._columns) <= self._max_columns:
                     break
                 total -= self._columns.pop(key).bytes
@@ -572,7 +573,7 @@ class _Run:
         for (_, results), flying in zip(rows, balls, strict=True):
             yield self.tick(of_ball, results, flying)
         self.let_go_of_ended_shots()
-        self._chain._keep_budget(self.columns_in_use)
+        self._chain._keep_budget(self)
 
     def let_go_of_ended_shots(self) -> None:
         """Let the budget have the columns of shots that are over, and drop those whose results are not kept."""

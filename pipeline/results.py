@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Literal
 
 import numpy as np
@@ -183,6 +184,10 @@ def nbytes(result: Any) -> int:
         return sum(nbytes(item) for item in result)
     if isinstance(result, dict):
         return sum(nbytes(item) for item in result.values())
-    if dataclasses.is_dataclass(result) and not isinstance(result, type):
-        return sum(nbytes(getattr(result, field.name)) for field in dataclasses.fields(result))
-    return 0
+    return sum(nbytes(getattr(result, name)) for name in _field_names(result.__class__))
+
+
+@cache
+def _field_names(kind: type) -> tuple[str, ...]:
+    """Names of a dataclass's fields, none of another type's."""
+    return tuple(field.name for field in dataclasses.fields(kind)) if dataclasses.is_dataclass(kind) else ()
