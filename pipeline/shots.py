@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from .camera import Camera
 from .chain import EARLIER_US, BallTick, Tick
 from .errors import ParameterError
+from .registry import distrust_reason, trusted_method
 from .results import ReadOnlyArrays, SpinEstimate, Truth, spin_errors
 from .spin.combined.result import CombinedResult
 from .spin.trajectory.motion import FittedMotion
@@ -292,7 +293,7 @@ class _FlyingShot:
         methods = tuple(last.estimates)
         spins = rows[:, _SPINS].reshape(len(rows), len(methods), 12)
         counted = rows[:, _LOGO_EVENTS]
-        trajectory = last.results.get("trajectory")
+        trajectory, doubt = last.results.get("trajectory"), last.evidence.doubt or end.doubt
         return Shot(
             start_us=first.start_us,
             end_us=end.end_us,
@@ -302,8 +303,8 @@ class _FlyingShot:
             measured=rows[:, _MEASURED] > 0,
             logo_events=None if np.isnan(counted).all() else int(np.nansum(counted)),
             estimates=last.estimates,
-            best=last.best,
-            best_reason=last.best_reason,
+            best=trusted_method(last.estimates, doubt),
+            best_reason=distrust_reason(last.estimates, doubt),
             began_by=first.began_by,
             ended_by=end.ended_by,
             number=end.shot,

@@ -49,6 +49,8 @@ class TrackEvidence:
     differences, sum_squares : int, float
         Number of third differences of such centres in radii, and the sum of their squares. A flight has next to none:
         it is a parabola, and perspective changes slowly.
+    of_track : str, optional
+        What the tracker has against one free flight (`BallTrack.doubt`).
     """
 
     is_fixed: bool = False
@@ -62,13 +64,14 @@ class TrackEvidence:
     recent: tuple[Place, ...] = ()
     differences: int = 0
     sum_squares: float = 0.0
+    of_track: str | None = None
 
     def with_tick(self, ball: BallTrack) -> TrackEvidence:
         """The evidence one tick later."""
         circle = ball.measured
         if circle is None:
             is_fixed = not ball.mean[2:4].any()
-            return replace(self, is_fixed=is_fixed, ticks=self.ticks + 1, in_row=0, recent=())
+            return replace(self, is_fixed=is_fixed, ticks=self.ticks + 1, in_row=0, recent=(), of_track=ball.doubt)
         first, since_us = self.first or circle, self.row_since_us if self.in_row else ball.t_us
         places = self.recent
         if not places or ball.t_us - places[-1][0] > SPACING_US - 1.0:
@@ -85,6 +88,7 @@ class TrackEvidence:
             recent=places[-3:],
             differences=self.differences + (square_px2 is not None),
             sum_squares=self.sum_squares + (square_px2 or 0.0) / circle.radius_px**2,
+            of_track=ball.doubt,
         )
 
     @property
@@ -106,7 +110,7 @@ class TrackEvidence:
             )
         if self.scatter > LARGEST_SCATTER:
             return f"the track is no flight: its circles scatter by {self.scatter:.2f} radii about a smooth path"
-        return None
+        return self.of_track
 
     @property
     def scatter(self) -> float:

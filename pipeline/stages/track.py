@@ -84,6 +84,9 @@ COMING_IN, SLOW_M_S, WATCH_US = 5.0, 3.5, 20_000
 HELD_US = 15_000
 # A ball that was outside the view, or the recording not yet begun, so long ago was not there before it was found.
 BEFORE_US = 30_000
+# What speaks against one free flight, in words for people.
+CONTACT_UNCERTAIN = "the camera shakes so much that it is uncertain when, and whether, the ball touched something"
+MAY_ROLL = "the ball is slow and was seen for too short a time to tell whether it flies or rolls"
 # Circles measured after a contact until it is announced; fewer would not tell when it was. At a shot's end, the one
 # there is.
 AFTER_CONTACT, AFTER_CONTACT_AT_END = 3, 1
@@ -185,8 +188,10 @@ def _step_flying(
     contacts, earlier = _announce_contacts(parameters, state)
     for ball in state.balls:
         if ball.is_shot:
-            is_shadow = any(ball.is_shadow_of(other) for other in state.balls)
-            ball.is_shot = not is_shadow and not ball.rolls(state.measuring)
+            is_shadow, rolls = any(ball.is_shadow_of(other) for other in state.balls), ball.rolls(state.measuring)
+            ball.is_shot = not is_shadow and rolls is not True
+            if ball.doubt != CONTACT_UNCERTAIN:  # which stays
+                ball.doubt = MAY_ROLL if rolls is None else None
     state.balls.sort(key=lambda ball: not ball.is_shot)
     balls = tuple(_ball_track(parameters, ball, packet.end_us, earlier.get(ball.shot, ())) for ball in state.balls)
     status: Status = "coasting"
@@ -237,9 +242,12 @@ def _doubles(balls: list[TrackedBall]) -> list[TrackedBall]:
 def _end(parameters: TrackParameters, state: TrackState, ball: TrackedBall, end_us: int, ended_by: EndedBy) -> ShotEnd:
     """End of a shot, at a contact if one came so late that the ball was hardly seen after it."""
     contact = _contact(parameters, state, ball, AFTER_CONTACT_AT_END)
-    return (
-        ShotEnd(ball.shot, end_us, ended_by) if contact is None else ShotEnd(ball.shot, contact.time_us, contact.kind)
-    )
+    return ShotEnd(ball.shot, end_us, ended_by) if contact is None else _end_at(contact, ball)
+
+
+def _end_at(contact: Contact, ball: TrackedBall) -> ShotEnd:
+    doubt = None if contact.is_certain else CONTACT_UNCERTAIN
+    return ShotEnd(ball.shot, contact.earliest_us, contact.kind, doubt)
 
 
 def _contact(parameters: TrackParameters, state: TrackState, ball: TrackedBall, circles_after: int) -> Contact | None:
@@ -256,9 +264,10 @@ def _announce_contacts(
         contact = None if ball.measured is None else _contact(parameters, state, ball, AFTER_CONTACT)
         if contact is None:
             continue
+        ended.append(_end_at(contact, ball))
         after = ball.after(contact, state.measuring, state.shots)
+        after.doubt = ended[-1].doubt
         tracks = [_ball_track(parameters, after, point.end_us) for point in after.follow(ball.path, state.measuring)]
-        ended.append(ShotEnd(ball.shot, contact.time_us, contact.kind))
         earlier[after.shot] = tuple(tracks[:-1])
         state.balls[place] = after
         state.shots += 1
@@ -294,7 +303,8 @@ def _search(
     if state.balls and len(events) >= FEW_EVENTS:
         routes = (ROUTES[packet.end_us // LOOK_US % 2],)
     camera, limits = state.context.camera, state.limits
-    hough, found, excluded = look(surface, events, packet.end_us, camera, limits, state.last_us, most, routes)
+    expected = tuple(_circle_at(packet.end_us, since_us, sighting) for since_us, sighting in state.pending)
+    hough, found, excluded = look(surface, events, packet.end_us, camera, limits, state.last_us, most, routes, expected)
     if not (state.balls or found or excluded):
         excluded = removed_by_filter(state.context, packet, len(events), surface, limits)
     state.excluded = None if state.balls else excluded or state.excluded
@@ -314,6 +324,12 @@ def _search(
             hough = circle
     state.pending += [one for one in pending if packet.end_us - one[0] < HELD_US]
     return hough, state.pending[0][1] if state.pending else None
+
+
+def _circle_at(end_us: int, since_us: int, sighting: Sighting) -> Circle:
+    """The circle at which an outline sighted then must be now."""
+    x, y, _, _, radius = moved(sighting.ring, end_us - since_us).tolist()
+    return Circle(x, y, radius, sighting.score)
 
 
 def _wait_us(parameters: TrackParameters, state: TrackState, sighting: Sighting) -> int:
@@ -384,6 +400,7 @@ def _ball_track(
         ball.began_by,
         ball.is_shot,
         earlier,
+        ball.doubt,
     )
 
 

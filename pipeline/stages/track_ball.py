@@ -21,7 +21,7 @@ from .track_kalman import OBSERVED, OBSERVED_BLOCK, BallFilter
 from .track_outline import FREE, LEAST_ARC, Edge, Sighting, measure
 from .track_path import PathPoint
 from .track_result import BeganBy
-from .track_rolling import JUDGED_US, ROLLING_M_S, rolls
+from .track_rolling import JUDGED_US, ROLLING_M_S, SLOWEST_FLIGHT_M_S, rolls
 
 Floats = NDArray[np.float64]
 
@@ -120,6 +120,8 @@ class TrackedBall:
         The shot's ticks of the last JUDGED_US.
     is_shot : bool
         Whether it is taken for a flight: until it is seen to roll, or to be another's shadow.
+    doubt : str, optional
+        What speaks against one free flight so far, in words for people.
     contrast, clutter : float
         Of its outline when it was last measured (see `Sighting`).
     part : int
@@ -134,6 +136,7 @@ class TrackedBall:
     seen: Floats
     path: list[PathPoint] = field(default_factory=list)
     is_shot: bool = True
+    doubt: str | None = None
     contrast: float = 0.0
     clutter: float = 0.0
     part: int = HALF_AHEAD
@@ -148,11 +151,11 @@ class TrackedBall:
 
     def after(self, contact: Contact, measuring: Measuring, shot: int) -> TrackedBall:
         """The ball's next shot, at the end of the first tick after a contact, by the path since."""
-        first_us = next(point.end_us for point in self.path if point.end_us > contact.time_us)
+        first_us = next(point.end_us for point in self.path if point.end_us > contact.latest_us)
         state = contact.path.state(first_us)
         new = measuring.filter_at(state, AFTER_CONTACT_COVARIANCE)
         return TrackedBall(
-            shot, contact.time_us, contact.kind, new, first_us, state, contrast=self.contrast, part=self.part
+            shot, contact.latest_us, contact.kind, new, first_us, state, contrast=self.contrast, part=self.part
         )
 
     def follow(self, path: list[PathPoint], measuring: Measuring) -> Iterator[PathPoint]:
@@ -170,10 +173,13 @@ class TrackedBall:
             self._add(replace(point, circle=circle))
             yield point
 
-    def rolls(self, measuring: Measuring) -> bool:
-        """Whether it is seen to roll."""
-        is_slow = self.speed_m_s(measuring.ball_radius_m) < ROLLING_M_S
-        return is_slow and rolls(self.path, measuring.camera, measuring.ball_radius_m, measuring.contour_us)
+    def rolls(self, measuring: Measuring) -> bool | None:
+        """Whether it rolls; None where that cannot be told of a ball that is hardly fast enough for a flight."""
+        speed_m_s = self.speed_m_s(measuring.ball_radius_m)
+        if speed_m_s >= ROLLING_M_S:
+            return False
+        seen = rolls(self.path, measuring.camera, measuring.ball_radius_m, measuring.contour_us)
+        return False if seen is None and speed_m_s >= SLOWEST_FLIGHT_M_S else seen
 
     def speed_m_s(self, ball_radius_m: float) -> float:
         """Speed across the view."""

@@ -8,7 +8,7 @@ Through the radius it sees a bounce from above that hardly changes the velocity 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -31,6 +31,8 @@ Floats = NDArray[np.float64]
 
 # The change test looks for a hinge between the last circles of a path, over which one cubic describes any flight.
 TESTED_US, RECENT_CIRCLES = 100_000, 8
+# Two circles on one side of a hinge, and one more that tells a jump from an acceleration.
+FEWEST_CIRCLES = 3
 # Errors of the outline's edge ahead and of the circle's radius from tick to tick that the test must bear, in clutter.
 EDGE_STD_PX, RADIUS_STD_PX = 0.1, 0.15
 ERRORS_PX2 = np.array([EDGE_STD_PX, EDGE_STD_PX, RADIUS_STD_PX]) ** 2
@@ -39,8 +41,13 @@ ERRORS_PX2 = np.array([EDGE_STD_PX, EDGE_STD_PX, RADIUS_STD_PX]) ** 2
 LEAST_GAIN = 60.0
 # And the jump of velocity: a table turns a fall from 15 mm round by this.
 LEAST_JUMP_M_S = 1.0
+# A camera may shake by more than stated: before one that shakes by 2 px 5 of 30 simulated flights without a contact
+# show one by what is stated, none by this many times as much.
+STRONGER = 2.0
 # Steps of the hinge's time: of the test, and of its refinement.
 STEP_US, FINE_STEP_US, REFINED_US = 2000, 250, 8000
+# The instant is good to so much, and what else it may have been lies within a cost so much higher (3 sigma).
+INSTANT_US, DOUBTED_COST = 2000, 9.0
 # A table's friction is at most this share of its push (0.25 to 0.5 published for rubber-free contact).
 MOST_FRICTION = 0.6
 # And its push at most turns round a fall from 3 m.
@@ -55,15 +62,23 @@ class Contact:
     Attributes
     ----------
     time_us : int
-        When it was (file time).
+        When it was most likely (file time).
+    earliest_us, latest_us : int
+        Ends of the shots before and after it, INSTANT_US inside the span in which it may have been; both are time_us
+        where that span is short. What lies between them may be of either shot.
     kind : str
         bounce or hit.
+    is_certain : bool
+        Whether it is no shaking of the camera.
     path : HingedPath
         The ball's path in space before and after it.
     """
 
     time_us: int
+    earliest_us: int
+    latest_us: int
     kind: Kind
+    is_certain: bool
     path: HingedPath
 
 
@@ -80,28 +95,51 @@ def find_contact(
         Circles that must have been measured after the contact.
     """
     points = independent_points(path, TESTED_US, straddled_us)
-    # Two circles on one side of the hinge and as many more as tell a jump from an acceleration.
-    if len(points) < 3 + least_after:
+    if len(points) < FEWEST_CIRCLES + least_after:
         return None
-    fit = _PathFit(points, camera, ball_radius_m)
-    if fit.smooth_cost < LEAST_GAIN:
-        return None  # no hinge can gain more
-    last_us = points[-1].end_us
-    first_us = points[max(1, len(points) - RECENT_CIRCLES)].end_us
-    hinges_us = np.arange(first_us + 1, last_us, STEP_US, dtype=np.float64)
-    gains = fit.gains(hinges_us)
-    coarse_us, gain = float(hinges_us[np.argmax(gains)]), float(gains.max())
+    hinges_us, gains = _gains_of_hinges(points, camera, ball_radius_m)
+    if not hinges_us.size:
+        return None
+    coarse_us, gain, last_us = float(hinges_us[np.argmax(gains)]), float(gains.max()), points[-1].end_us
     if gain < LEAST_GAIN or coarse_us > min(points[-least_after].end_us, last_us - straddled_us):
         return None  # or not yet
     places = Places.of(points, (coarse_us, coarse_us + straddled_us), camera, ball_radius_m)
-    from_us, to_us = max(coarse_us - REFINED_US, points[0].end_us), min(coarse_us + REFINED_US, last_us)
+    likely_us = hinges_us[gains > gain - DOUBTED_COST]
+    from_us, to_us = max(likely_us[0] - REFINED_US, points[0].end_us), min(likely_us[-1] + REFINED_US, last_us)
     times_us = np.arange(from_us, to_us, FINE_STEP_US)
-    refined = HingedPath(places, float(times_us[np.argmin(places.costs(times_us))]), camera, ball_radius_m)
+    costs = places.costs(times_us)
+    refined = HingedPath(places, float(times_us[np.argmin(costs)]), camera, ball_radius_m)
     before, after = refined.velocity_m_s(refined.hinge_us - 1), refined.velocity_m_s(refined.hinge_us)
     if np.linalg.norm(after - before) < LEAST_JUMP_M_S:
         return None
     kind = _kind(before, after, refined.unsure_m_s, np.array(camera.up))
-    return Contact(round(refined.hinge_us), kind, refined)
+    possible_us = times_us[costs < costs.min() + DOUBTED_COST * refined.roughness]
+    time_us = round(refined.hinge_us)
+    earliest_us = min(time_us, round(possible_us[0]) + INSTANT_US)
+    latest_us = max(time_us, min(round(possible_us[-1]) - INSTANT_US, last_us - straddled_us))
+    return Contact(time_us, earliest_us, latest_us, kind, _is_certain(points, camera, ball_radius_m), refined)
+
+
+def _is_certain(points: list[PathPoint], camera: Camera, ball_radius_m: float) -> bool:
+    """Whether a camera that shakes STRONGER times as much as stated would not explain the bend of a path either."""
+    if not any(point.shake_px for point in points):
+        return True
+    shaken = [replace(point, shake_px=STRONGER * point.shake_px) for point in points]
+    _, gains = _gains_of_hinges(shaken, camera, ball_radius_m)
+    return bool(np.any(gains >= LEAST_GAIN))
+
+
+def _gains_of_hinges(points: list[PathPoint], camera: Camera, ball_radius_m: float) -> tuple[Floats, Floats]:
+    """Times (m,) of hinges between the last circles of a path, and their gains (m,); empty where none can gain enough.
+
+    The points have circles.
+    """
+    fit = _PathFit(points, camera, ball_radius_m)
+    if fit.smooth_cost < LEAST_GAIN:
+        return np.empty(0), np.empty(0)  # no hinge can gain more
+    first_us = points[max(1, len(points) - RECENT_CIRCLES)].end_us
+    hinges_us = np.arange(first_us + 1, points[-1].end_us, STEP_US, dtype=np.float64)
+    return hinges_us, fit.gains(hinges_us)
 
 
 class _PathFit:

@@ -134,6 +134,13 @@ class HingedPath:
         The places.
     hinge_us : float
         Time of the hinge.
+
+    Attributes
+    ----------
+    roughness : float
+        Variance of the places about it over that on clean scenes, 1 at least.
+    unsure_m_s : (3,) float64
+        2 sigma of the jump of velocity along its least known direction.
     """
 
     def __init__(self, places: Places, hinge_us: float, camera: Camera, ball_radius_m: float) -> None:
@@ -143,8 +150,8 @@ class HingedPath:
         spread = np.linalg.inv(normals[0])
         self._coefficients = (spread @ moments[0]).reshape(6, 3)
         cost = float(places.costs(np.array([hinge_us]))[0])
-        rough = max(1.0, cost / max(1, 3 * places.times_us.size - 12))  # beyond the clean scene's errors
-        variances, directions = np.linalg.eigh(rough * spread[12:15, 12:15])
+        self.roughness = max(1.0, cost / max(1, 3 * places.times_us.size - 12))
+        variances, directions = np.linalg.eigh(self.roughness * spread[12:15, 12:15])
         self.unsure_m_s: Floats = 2.0 * math.sqrt(variances[-1]) * directions[:, -1]
 
     def velocity_m_s(self, time_us: float) -> Floats:

@@ -36,7 +36,7 @@ class BallTrack(ReadOnlyArrays):
     measured : Circle, optional
         The refined circle that entered the filter, None if none did: the ball is coasting.
     start_us : int
-        Start of the shot (file time), at a contact to within 2 ms.
+        Start of the shot (file time); at a contact to within 2 ms, or later where the contact is less certain.
     began_by : str
         How the shot began: entered, bounce, hit, start (of the recording) or found (in the middle of the view).
     is_shot : bool
@@ -45,6 +45,8 @@ class BallTrack(ReadOnlyArrays):
     earlier : tuple of BallTrack
         States at the ends of the ticks since start_us before this one, oldest first: a contact is known only some
         ticks later. Given in the one tick in which the shot is announced, else empty.
+    doubt : str, optional
+        What speaks against one free flight so far, in words for people; None where nothing does.
     """
 
     shot: int
@@ -57,6 +59,7 @@ class BallTrack(ReadOnlyArrays):
     began_by: BeganBy
     is_shot: bool = True
     earlier: tuple[BallTrack, ...] = ()
+    doubt: str | None = None
 
     def centre_px(
         self, event_t_us: NDArray[np.int64] | NDArray[np.float64]
@@ -75,15 +78,18 @@ class ShotEnd:
     shot : int
         Number of the shot.
     end_us : int
-        When it ended (file time), at a contact to within 2 ms; before the tick's start where it is known late. No
-        result of the shot from ticks that end later counts.
+        When it ended (file time); at a contact to within 2 ms, or sooner where the contact is less certain; before
+        the tick's start where it is known late. No result of the shot from ticks that end later counts.
     ended_by : str
         left (across the border), bounce, hit, end (of the recording) or lost.
+    doubt : str, optional
+        What speaks against this end, and so against one free flight before it, in words for people.
     """
 
     shot: int
     end_us: int
     ended_by: EndedBy
+    doubt: str | None = None
 
 
 NO_STATE, NO_COVARIANCE = np.full(5, np.nan), np.full((5, 5), np.nan)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain
 from typing import Literal
 
 import numpy as np
@@ -50,15 +51,19 @@ def look(
     last_us: NDArray[np.uint16],
     most: int,
     routes: tuple[Route, ...] = ROUTES,
+    expected: tuple[Circle, ...] = (),
 ) -> tuple[Circle | None, Found, str | None]:
     """The best Hough circle anywhere; those that move like a ball; which setting excludes one, if none is left.
 
     Trusted ones come first, then the faster ones. The paper's surface is searched first. Where it shows no ball, the
     contour events that a neighbour supports: in low contrast an outline gives one event a pixel, of which STC lets
     nothing pass. For that, last_us is of `support_times` and used again and again.
+
+    Outlines are also looked for at `expected` circles, where those seen before must be now: in low contrast the Hough
+    transform finds one in every second tick.
     """
     stated = limits.radius_min_px, limits.radius_max_px
-    searching = _Searching(end_us, camera, limits, most)
+    searching = _Searching(end_us, camera, limits, most, expected)
     first: Circle | None = None
     found: Found = []
     excluded: str | None = None
@@ -115,6 +120,7 @@ class _Searching:
     camera: Camera
     limits: Limits
     most: int
+    expected: tuple[Circle, ...]
 
     def circles(
         self, surface: SurfaceResult, events: EventBatch, radii_px: tuple[float, float], *, signed: bool
@@ -123,7 +129,9 @@ class _Searching:
         tried: list[Circle] = []
         found: Found = []
         excluded: str | None = None
-        for circle in candidates(surface, events, *radii_px, self.most):
+        by_hough = candidates(surface, events, *radii_px, self.most)
+        first = next(by_hough, None)
+        for circle in chain([] if first is None else [first], by_hough, self.expected):
             if any(np.hypot(circle.x_px - s.ring[0], circle.y_px - s.ring[1]) < s.ring[4] for s, _ in found):
                 continue
             if any(_is_same(circle, other) for other in tried):
@@ -138,7 +146,7 @@ class _Searching:
             elif sighting.trusted or sighting.explained:
                 excluded = excluded or reason
         found.sort(key=lambda one: (one[0].trusted, one[0].speed_px_s), reverse=True)
-        return tried[0] if tried else None, found, excluded
+        return first, found, excluded
 
     def _sighting(self, circle: Circle, events: EventBatch, *, signed: bool) -> Sighting | None:
         """The outline behind a circle that may be a ball's, None if there is none."""

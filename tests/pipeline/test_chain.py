@@ -49,6 +49,7 @@ class ToyBall:
     earlier: tuple[ToyBall, ...] = ()
     mean: NDArray[np.float64] = field(default_factory=lambda: np.ones(5), compare=False)
     measured: None = None
+    doubt: None = None
 
 
 @dataclass(frozen=True)

@@ -94,6 +94,17 @@ def test_a_contact_that_is_known_late_ends_one_shot_and_begins_the_next() -> Non
     assert after.number == 1
 
 
+def test_no_answer_is_trusted_of_a_shot_whose_end_is_doubted() -> None:
+    flying = [ball(number, 0) for number in range(3)]
+    for one in flying:
+        one.evidence = SimpleNamespace(doubt=None)
+    ticks = [tick(number, one) for number, one in enumerate(flying)]
+    for doubt in ("it may have bounced", None):
+        (shot,) = gathered(*ticks, tick(3, ended=(ShotEnd(0, 15_000, "bounce", doubt),))).shots
+        assert shot.best is None
+        assert (shot.best_reason == doubt) == (doubt is not None)
+
+
 def test_a_ball_in_flight_at_the_end_and_one_that_goes_unexplained() -> None:
     assert [shot.ended_by for shot in gathered(tick(0, 0), tick(1, 0)).shots] == ["end"]
     assert [shot.ended_by for shot in gathered(tick(0, 0), tick(1, 0), tick(2)).shots] == ["lost"]

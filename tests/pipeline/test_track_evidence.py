@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -42,6 +43,16 @@ def flight(count: int, noise_px: float = 0.1, tick_s: float = 0.005) -> list[tup
 @pytest.mark.parametrize(("count", "tick_us"), [(3, 5000), (20, 5000), (11, 1000), (100, 1000), (3, 10_000)])
 def test_a_flight_is_not_doubted(count: int, tick_us: int) -> None:
     assert evidence_of(flight(count, tick_s=tick_us * 1e-6), tick_us).doubt is None
+
+
+def test_what_the_tracker_doubts_now_is_doubted() -> None:
+    *places, (x, y) = flight(21)
+    circle = Circle(x, y, RADIUS_PX, 1.0)
+    last = BallTrack(0, 1.1e6, 40.0, np.ones(5), np.eye(5), circle, 0, "found", doubt="it may roll")
+    evidence = evidence_of(places).with_tick(last)
+    assert evidence.doubt == "it may roll"
+    assert evidence.with_tick(replace(last, measured=None)).doubt == "it may roll"
+    assert evidence.with_tick(replace(last, doubt=None)).doubt is None
 
 
 def test_a_flight_seen_through_vibration_and_from_behind_an_arm_is_not_doubted() -> None:

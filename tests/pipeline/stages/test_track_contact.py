@@ -189,11 +189,40 @@ def test_a_known_vibration_is_no_contact_and_hides_none() -> None:
         found = 0
         for seed in range(5100, 5120):
             way, camera = scene(seed)
-            found += (
-                first_contact(shaken(path_of(way, camera, rng_of(seed)), rng_of(seed), 0.5, known_px), camera)
-                is not None
-            )
+            path = shaken(path_of(way, camera, rng_of(seed)), rng_of(seed), 0.5, known_px)
+            found += first_contact(path, camera) is not None
         assert found >= least
+
+
+def test_a_contact_that_a_stronger_vibration_explains_is_uncertain() -> None:
+    """Before a camera that shakes by 1 px, more than is known: all that flights show; none before one that is still."""
+    known_px, false = TrackParameters().shake_px, 0
+    for seed in range(5000, 5020):
+        path = path_of(flown(flight(kind=KINDS[seed % 6], speed_m_s=7.0, seed=seed)), ABOVE, rng_of(seed))
+        contact = first_contact(shaken(path, rng_of(seed), 1.0, known_px), ABOVE)
+        false += contact is not None
+        assert contact is None or not contact.is_certain
+    assert false > 0
+    for seed in range(5100, 5105):
+        for scene in (bounce_above, hit):
+            way, camera = scene(seed)
+            contact = first_contact(path_of(way, camera, rng_of(seed)), camera)
+            assert contact is not None and contact.is_certain
+
+
+def test_what_is_before_and_after_an_uncertain_contact_is_of_one_shot() -> None:
+    """Before a camera that shakes by 0.5 px; one that stands still leaves nothing out."""
+    known_px = TrackParameters().shake_px
+    for scene in (bounce_above, bounce_side, hit):
+        for seed in range(5200, 5210):
+            way, camera = scene(seed)
+            path, at_us = path_of(way, camera, rng_of(seed)), contact_s(way) * 1e6
+            clear = first_contact(path, camera)
+            assert clear is not None and clear.latest_us - clear.earliest_us <= 500
+            unclear = first_contact(shaken(path, rng_of(seed), 0.5, known_px), camera)
+            if unclear is not None and unclear.is_certain:
+                assert unclear.earliest_us <= unclear.time_us <= unclear.latest_us
+                assert unclear.earliest_us - 4000 < at_us < unclear.latest_us + 4000
 
 
 def rng_of(seed: int) -> np.random.Generator:

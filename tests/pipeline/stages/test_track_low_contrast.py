@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.stages import track_search
 from spinscope.pipeline.stages.track import TrackParameters
 from spinscope.pipeline.stages.track_background import background_moves
 from spinscope.pipeline.stages.track_search import support_times
@@ -33,6 +34,18 @@ def test_a_ball_of_which_only_the_lower_side_shows_is_found_and_followed(bright:
         x, y, vx, _, radius = result.mean
         assert abs(x - (500.0 + 5e-3 * result.t_us)) < 1.0 and abs(y - 360.0) < 1.0
         assert abs(radius - 18.0) < 1.0 and abs(vx - 5000.0) < 250.0
+
+
+def test_a_circle_seen_once_is_looked_for_where_it_must_be_next(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The Hough transform finds it in the first tick alone."""
+    of_hough = track_search.candidates
+    monkeypatch.setattr(
+        track_search,
+        "candidates",
+        lambda surface, events, *rest: of_hough(surface, events[events.t_us < 5000], *rest),
+    )
+    results = run(inputs(lower_arcs(0.35, False), surface_mode="off"), IDEAL, PLACE)
+    assert [result.status for result in results[:2]] == ["starting", "tracking"]
 
 
 def test_too_small_an_arc_is_no_ball() -> None:

@@ -39,7 +39,7 @@ def number_seen_to_roll(count: int, up: Up, *, rolling: bool, tick_us: int = 500
     number = 0
     for seed in range(9200, 9230):
         path, camera = path_of_slow_ball(up, seed, rolling=rolling, tick_us=tick_us)
-        number += rolls(path[:count], camera, 0.02, CONTOUR_US)
+        number += rolls(path[:count], camera, 0.02, CONTOUR_US) is True
     return number
 
 
@@ -48,6 +48,17 @@ def test_a_ball_that_rolls_is_told_from_one_that_flies(up: Up, known_after: int)
     """From the side within 0.1 s. Before that is known nothing is said, and of a flight never."""
     assert number_seen_to_roll(known_after, up, rolling=True) >= 24
     assert not any(number_seen_to_roll(count, up, rolling=False) for count in (3, 4, 6, 9, 13, 17, 20, 30, 48))
+
+
+def test_what_cannot_be_told_yet_is_said() -> None:
+    """From the side most slow balls are known to fly, or to roll, within 0.1 s; of none is the other said."""
+    told: dict[bool, list[bool | None]] = {}
+    for rolling in (False, True):
+        paths = [path_of_slow_ball(SIDE, seed, rolling=rolling) for seed in range(9200, 9230)]
+        assert all(rolls(path[:3], camera, 0.02, CONTOUR_US) is None for path, camera in paths)
+        told[rolling] = [rolls(path[:20], camera, 0.02, CONTOUR_US) for path, camera in paths]
+    assert told[False].count(False) >= 27 and True not in told[False]
+    assert told[True].count(True) >= 24 and False not in told[True]
 
 
 def test_circles_that_share_events_tell_no_more() -> None:
