@@ -165,7 +165,7 @@ FORMATS = [
         "pipeline/recording_folders.py",
         "these = [path for path in below if path.absolute() not in not_these]",
         "these = list(below)",
-        "tests/app/test_batch.py -k truth",
+        "tests/app/test_batch.py -k found_once",
     ),
     Mutant("pipeline/truth_table.py", 'text = text.replace(",", ".")', "pass", "tests/pipeline/test_truth_table.py"),
 ]

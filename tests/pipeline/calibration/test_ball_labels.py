@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from spinscope.app.cli import cli
-from spinscope.pipeline.calibration.ball_labels import BallLabels, ball_labels
+from spinscope.pipeline.calibration.ball_labels import EXPOSURE_US, LAG_PX, BallLabels, _Blob, _labels, ball_labels
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.evaluation import TaskContext, evaluate_real
 from spinscope.pipeline.evaluation.suites import SUITES
@@ -96,3 +96,14 @@ def test_nothing_is_labelled_where_no_ball_flies(made: SimulatedRecording, tmp_p
         (tmp_path / "bad.csv").write_text(text)
         with pytest.raises(RecordingError, match="labels"):
             BallLabels.read(tmp_path / "bad.csv")
+
+
+def test_labels_of_a_ball_that_speeds_up_are_its_places_in_the_middle_of_the_exposure() -> None:
+    t_us, velocity, acceleration = 2500.0 * np.arange(12), np.array([0.004, -0.001]), np.array([1e-8, 2e-8])
+    places = t_us[:, None] * velocity + t_us[:, None] ** 2 * acceleration / 2
+    speeds = velocity + t_us[:, None] * acceleration
+    directions = speeds / np.linalg.norm(speeds, axis=1)[:, None]
+    middles = places + acceleration * EXPOSURE_US**2 / 8 - LAG_PX * directions
+    blobs = [_Blob(*row, 40.0, 20.0) for row in zip(t_us.tolist(), middles, directions, strict=True)]
+    found = _labels(blobs, 1)
+    assert np.stack([found.x_px, found.y_px], axis=1) == pytest.approx(places, abs=0.005)

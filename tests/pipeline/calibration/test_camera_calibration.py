@@ -68,6 +68,8 @@ def test_a_blinking_board_tells_the_camera(made: SimulatedBoard, tmp_path: Path)
     assert (tmp_path / "camera.png").read_bytes().startswith(b"\x89PNG")
     camera = Camera.of(preset(tmp_path / "camera.toml").camera, *SIZE)
     assert camera.focal_px == pytest.approx(TRUE.focal_px, rel=0.006)
+    principal_px = camera.principal_x_px, camera.principal_y_px
+    assert principal_px == pytest.approx((TRUE.principal_x_px, TRUE.principal_y_px), abs=10.0)
     assert corner_error_px(camera) < 0.6  # of 14 views; see below
 
 
