@@ -73,23 +73,24 @@ SUMMARY = "/summary"
 COACH = "/coach"
 COMPARISON = "/compare"
 
-ON: Colour = (239, 83, 80)
-OFF: Colour = (66, 145, 245)
+# Colours of series, of ON and OFF, and of the spin methods are told apart by red-green-blind eyes, too: a test.
+ON: Colour = (210, 30, 60)
+OFF: Colour = (120, 180, 255)
 ON_REMOVED: Colour = (122, 62, 60)
 OFF_REMOVED: Colour = (44, 77, 122)
 OFF_FLICKER: Colour = (112, 96, 24)
 ON_FLICKER: Colour = (168, 148, 44)
-HOUGH_COLOUR: Colour = (255, 213, 79)
-MEASURED_COLOUR: Colour = (255, 138, 50)
-KALMAN_COLOUR: Colour = (76, 217, 100)
-TRUTH_COLOUR: Colour = (214, 120, 255)
+HOUGH_COLOUR: Colour = (255, 255, 105)
+MEASURED_COLOUR: Colour = (240, 120, 60)
+KALMAN_COLOUR: Colour = (15, 225, 120)
+TRUTH_COLOUR: Colour = (165, 105, 255)
 MASK_COLOUR: Colour = (130, 140, 150)
-PATH_COLOUR: Colour = (76, 217, 100)
+PATH_COLOUR = KALMAN_COLOUR
 OTHERS_COLOUR: Colour = (200, 206, 212)
 CONTACT_COLOUR: Colour = (255, 112, 167)
 RING_COLOUR: Colour = (255, 213, 79)
 DOUBTED_COLOUR: Colour = (150, 143, 122)  # of an answer that is shown and not trusted: the ring's, pale
-RATE_COLOUR: Colour = (174, 213, 129)
+RATE_COLOUR: Colour = (210, 255, 195)
 BACKGROUND: Colour = (16, 16, 16)
 STATUS_COLOURS: dict[str, Colour] = {
     "searching": (96, 105, 115),

@@ -381,6 +381,6 @@ STAGE = SpinMethod(
     start=start,
     step=step,
     absent=absent,
-    colour=(38, 198, 218),
+    colour=(60, 195, 210),
     is_trusted=is_trusted,
 )

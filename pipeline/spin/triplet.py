@@ -167,5 +167,5 @@ STAGE = SpinMethod(
     start=start,
     step=step,
     absent=absent,
-    colour=(255, 167, 38),
+    colour=(255, 165, 0),
 )

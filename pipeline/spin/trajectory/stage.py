@@ -209,7 +209,7 @@ STAGE = SpinMethod(
     start=start,
     step=step,
     absent=absent,
-    colour=(171, 71, 188),
+    colour=(165, 60, 165),
     is_trusted=is_trusted,
     is_last_resort=True,
 )
