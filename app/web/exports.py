@@ -7,6 +7,7 @@ import io
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -14,8 +15,10 @@ from typing import Any
 import cv2
 import numpy as np
 
+from spinscope.app.table_files import write_table
 from spinscope.app.viewer import save
 from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.result_rows import tick_columns, tick_rows
 from spinscope.pipeline.session import Result
 
 
@@ -49,14 +52,13 @@ def spins_csv(result: Result) -> str:
     return _csv(rows)
 
 
-def track_csv(result: Result) -> str:
-    """CSV with a row for each shot and tick."""
-    rows = []
-    for number, shot in enumerate(result.to_dict()["shots"]):
-        track = shot["track"]
-        for index in range(len(track["t_us"])):
-            rows.append({"shot": number + 1, **{name: column[index] for name, column in track.items()}})
-    return _csv(rows)
+def series(result: Result, suffix: str) -> bytes:
+    """Table with a row for each shot and tick, as `spinscope analyze --series` writes it; `suffix` is the format's."""
+    name = result.session.recording.path.name
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / f"series{suffix}"
+        write_table(path, tick_columns(), ({"recording": name, **row} for row in tick_rows(result)))
+        return path.read_bytes()
 
 
 def as_rrd(result: Result) -> bytes:
@@ -100,5 +102,11 @@ EXPORTS = {
     "run.rrd": Export("Recording with layout (.rrd)", as_rrd, "application/octet-stream", "rrd"),
     "results.json": Export("Results (JSON)", as_json, "application/json", "json"),
     "spins.csv": Export("Spin of every method (CSV)", spins_csv, "text/csv", "spins.csv"),
-    "track.csv": Export("Track (CSV)", track_csv, "text/csv", "track.csv"),
+    "series.csv": Export("Series of every tick (CSV)", partial(series, suffix=".csv"), "text/csv", "series.csv"),
+    "series.parquet": Export(
+        "Series of every tick (Parquet)",
+        partial(series, suffix=".parquet"),
+        "application/vnd.apache.parquet",
+        "series.parquet",
+    ),
 }

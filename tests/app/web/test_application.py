@@ -14,6 +14,7 @@ from typing import Any
 import httpx
 import pytest
 from click.testing import CliRunner
+from pyarrow import parquet
 from rerun.chunk import RrdReader
 
 from spinscope.app.cli import cli
@@ -313,8 +314,10 @@ def test_results_go_out_as_tables_and_as_a_recording(client: Client, tmp_path: P
     client.run()
     spins = list(csv.DictReader(io.StringIO(client.http.get(client.path("export/spins.csv")).text)))
     assert {row["method"] for row in spins} >= {"triplet", "normal_flow"}
-    track = list(csv.DictReader(io.StringIO(client.http.get(client.path("export/track.csv")).text)))
-    assert len(track) > 10 and float(track[0]["radius_px"]) > 5
+    series = list(csv.DictReader(io.StringIO(client.http.get(client.path("export/series.csv")).text)))
+    assert len(series) > 10 and float(series[0]["radius_px"]) > 5 and float(series[-1]["contrast_magnitude_rps"]) > 1
+    columns = parquet.read_table(io.BytesIO(client.http.get(client.path("export/series.parquet")).content))
+    assert columns.column("radius_px").to_pylist() == [float(row["radius_px"]) for row in series]
     answer = client.http.get(client.path("export/run.rrd"))
     assert 'filename="flight_fast_top.rrd"' in answer.headers["content-disposition"]
     path = tmp_path / "run.rrd"
