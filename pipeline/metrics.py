@@ -69,6 +69,7 @@ class ShotMetrics:
     end_us: int
     logo_events: int
     speed_m_s: float | None = _metric("Speed", "m/s", "Mean speed of the ball over the shot with the most logo events.")
+    radius_px: float | None = _metric("Radius", "px", "Median radius of the ball over that shot.")
     best: str | None
     best_reason: str | None
     kind: str | None
@@ -171,6 +172,7 @@ def _shot(session: Session, shot: Shot) -> ShotMetrics:
         end_us=shot.end_us,
         logo_events=shot.logo_events or 0,
         speed_m_s=None if velocity is None else _finite(float(np.linalg.norm(velocity))),
+        radius_px=_finite(float(np.median(shot.state[:, 4]))) if len(shot.state) else None,
         best=shot.best,
         best_reason=shot.best_reason,
         kind=kind.name if kind else None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
@@ -20,6 +21,9 @@ from .clip_run import MOST_FRAMES_BYTES, run_clip
 MOST_POINTS = 101
 # From this ratio of the ends on, a range is spread by equal ratios; from 0, by the cube, which is as fine near 0.
 LOGARITHMIC_FROM = 100
+
+# Distances from the outline inwards: beyond the radius nothing of the ball is left.
+INSIDE_THE_BALL = ("logo.pad_px", "logo.fixed_pad_px", "logo.rim_pad_px", "logo.fixed_rim_pad_px")
 
 Value = bool | int | float | str
 Scale = Literal["linear", "logarithmic", "cubic", "none"]
@@ -65,6 +69,14 @@ def declaration(parameters: Parameters, name: str) -> Tunable:
     if found.kind == "numbers":
         raise ParameterError(f"{name} is a list of numbers: choose a parameter with one value")
     return found
+
+
+def sensible_highs(metrics: RunMetrics) -> dict[str, float]:
+    """Upper ends, below the declared ones, of ranges that make sense for the ball that a run saw."""
+    shot = metrics.main_shot
+    if shot is None or shot.radius_px is None:
+        return {}
+    return dict.fromkeys(INSIDE_THE_BALL, max(math.floor(shot.radius_px) - 1.0, 0.0))
 
 
 def scale_of(declared: Tunable) -> Scale:

@@ -90,8 +90,11 @@ def _arrows(run: ViewedRun) -> list[Chunk]:
         spins = np.nan_to_num(run.true_spins_rps) * run.has_ball[:, None]
         chunks += _arrow(run, f"{at.SPIN_ARROWS}/truth", list(spins), at.TRUTH_COLOUR, 0.02)
     shown = [shown_estimate(tick) for tick in run.ticks]
-    vectors, trusted = [vector_of(estimate) for estimate, _ in shown], [is_trusted for _, is_trusted in shown]
-    return [*chunks, *_arrow(run, at.SPIN_SHOWN, vectors, at.RING_COLOUR, 0.06, trusted)]
+    notes = [
+        ", not trusted" if not is_trusted else "" if row in run.final_shots else ", so far"
+        for row, (_, is_trusted) in enumerate(shown)
+    ]
+    return [*chunks, *_arrow(run, at.SPIN_SHOWN, [vector_of(one) for one, _ in shown], at.RING_COLOUR, 0.06, notes)]
 
 
 def _arrow(
@@ -100,22 +103,19 @@ def _arrow(
     vectors: list[Floats],
     colour: at.Colour,
     thickness: float,
-    trusted: list[bool] | None = None,
+    notes: list[str] | None = None,
 ) -> list[Chunk]:
-    """Arrow along a spin at every tick; where it is not trusted pale, and labelled so."""
+    """Arrow along a spin at every tick, labelled with a note on each; where it is not trusted pale."""
     spins = np.array(vectors).reshape(-1, 3)
     magnitudes = np.linalg.norm(spins, axis=1)
     known = magnitudes > 0
-    sures = np.array(trusted)[known] if trusted is not None else np.ones(int(known.sum()), bool)
+    said = [note for note, is_known in zip(notes or [""] * len(spins), known, strict=True) if is_known]
     axes = spins[known] / magnitudes[known, None]
     columns = rr.Arrows3D.columns(
         origins=axes * run.ball_radius_m,
         vectors=axes * (magnitudes[known, None] * RPS_M),
-        labels=[
-            f"{magnitude:.1f} rps{'' if sure else ', not trusted'}"
-            for magnitude, sure in zip(magnitudes[known], sures, strict=True)
-        ],
-        colors=[colour if sure else at.DOUBTED_COLOUR for sure in sures],
+        labels=[f"{magnitude:.1f} rps{note}" for magnitude, note in zip(magnitudes[known], said, strict=True)],
+        colors=[at.DOUBTED_COLOUR if "not trusted" in note else colour for note in said],
     )
     look = {"radii": thickness * run.ball_radius_m, "show_labels": entity == at.SPIN_SHOWN}
     return [styled(entity, rr.Arrows3D, **look), columns_at(entity, run.times_us, columns, [0, *known.astype(int)])]

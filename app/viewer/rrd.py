@@ -32,7 +32,7 @@ def rrd_bytes(chunks: Sequence[Chunk], recording_id: str) -> bytes:
         return path.read_bytes()
 
 
-def layout_bytes(run: ViewedRun, tab: str, *, compare: bool = True) -> bytes:
+def layout_bytes(run: ViewedRun, tab: str, *, compare: bool = True, is_narrow: bool = False) -> bytes:
     """Blueprint of the page's viewer.
 
     Parameters
@@ -43,9 +43,11 @@ def layout_bytes(run: ViewedRun, tab: str, *, compare: bool = True) -> bytes:
         Label of the view in front; the first one when there is none of that label.
     compare : bool
         Whether there are the views of two runs.
+    is_narrow : bool
+        See `blueprint`.
     """
     layout = next((view.name for view in VIEWS if view.label == tab), "")
     with TemporaryDirectory() as folder:
         path = Path(folder) / "page.rbl"
-        blueprint(run, layout, compare=compare, is_lasting=True).save(at.APPLICATION, path)
+        blueprint(run, layout, compare=compare, is_lasting=True, is_narrow=is_narrow).save(at.APPLICATION, path)
         return path.read_bytes()

@@ -50,7 +50,7 @@ def summary_chunks(run: ViewedRun) -> list[Chunk]:
         else:
             text = result if shot is not None else state.lines("so far")
         texts.append("\n".join(text))
-        cards.append(state.card() if tick.track.has_ball else cards[-1])
+        cards.append(state.card("so far" if shot is None else "whole shot") if tick.track.has_ball else cards[-1])
     return [
         columns_at(at.SUMMARY, run.times_us, rr.TextDocument.columns(text=texts)),
         styled(at.SUMMARY, rr.TextDocument, media_type="text/markdown"),
@@ -128,8 +128,8 @@ class _TickState:
                 lines += [f"{method.label}: magnitude {off:.1f} rps and axis {angle:.1f}° from the truth.", ""]
         return lines
 
-    def card(self) -> Card:
-        """Spin, speed and kind, each in big letters with a line in small ones."""
+    def card(self, span: str) -> Card:
+        """Spin with the span of time that it is of, speed and kind, each in big letters with a line in small ones."""
         velocity = self.velocity_m_s
         speed = None if velocity is None else float(np.linalg.norm(velocity))
         big = "In place" if self.run.fixed else "-" if speed is None else f"{km_h(speed):.0f} km/h"
@@ -144,7 +144,7 @@ class _TickState:
         margin = "" if std is None else f" ± {rpm(std):.0f}"
         more = kind.sentence.removeprefix(kind.name).strip(" ,")
         return (
-            (f"{magnitude:.0f} rps", f"{rpm(magnitude):.0f}{margin} rpm"),
+            (f"{magnitude:.0f} rps", f"{rpm(magnitude):.0f}{margin} rpm, {span}"),
             speed_lines,
             (kind.name.capitalize(), more.strip("()") if more.startswith("(") else more),
         )

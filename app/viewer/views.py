@@ -33,6 +33,8 @@ class View:
         What it shows, in one sentence.
     panes : callable
         `panes(run) -> Container`: its panes, side by side and below each other.
+    narrow_panes : callable, optional
+        The same in fewer columns, for a viewer in which the titles of many would be cut.
     compares : bool
         Whether it shows two runs beside each other: for the page, where a second run can be pinned.
     """
@@ -41,6 +43,7 @@ class View:
     label: str
     help: str
     panes: Callable[[ViewedRun], rrb.Container]
+    narrow_panes: Callable[[ViewedRun], rrb.Container] | None = None
     compares: bool = False
 
 
@@ -49,7 +52,9 @@ def views(*, compare: bool = False) -> tuple[View, ...]:
     return tuple(view for view in VIEWS if compare or not view.compares)
 
 
-def blueprint(run: ViewedRun, layout: str, *, compare: bool = False, is_lasting: bool = False) -> rrb.Blueprint:
+def blueprint(
+    run: ViewedRun, layout: str, *, compare: bool = False, is_lasting: bool = False, is_narrow: bool = False
+) -> rrb.Blueprint:
     """All tabs over a run, in slow motion and paused.
 
     Parameters
@@ -63,9 +68,11 @@ def blueprint(run: ViewedRun, layout: str, *, compare: bool = False, is_lasting:
     is_lasting : bool
         Whether other recordings are to be shown with it: all of each is played, for the viewer forgets the selection.
         Otherwise the followed shot, by default the first, is played over and over.
+    is_narrow : bool
+        Whether the viewer has no room for many columns.
     """
     shown = views(compare=compare)
-    tabs = [view.panes(run) for view in shown]
+    tabs = [(view.narrow_panes if is_narrow and view.narrow_panes else view.panes)(run) for view in shown]
     for tab, view in zip(tabs, shown, strict=True):
         tab.name = view.label
     front = next((i for i, view in enumerate(shown) if view.name == layout), 0)
@@ -104,12 +111,25 @@ def _all(run: ViewedRun) -> rrb.Container:
         ),
         rrb.Horizontal(
             plots.RATE_PLOT.view(run, legend=False),
-            plots.MAGNITUDE_PLOT.view(run),
+            plots.MAGNITUDE_PLOT.view(run, legend=False),
             panes.ball(run),
             panes.text(at.SUMMARY, "Summary"),
             column_shares=[4, 4, 3, 5],
         ),
         row_shares=[4, 4, 5],
+    )
+
+
+def _all_narrow(run: ViewedRun) -> rrb.Container:
+    state = rrb.Tabs(*(plot.view(run) for plot in plots.STATE_PLOTS), active_tab=0)
+    magnitude = plots.MAGNITUDE_PLOT.view(run, legend=False)
+    return rrb.Vertical(
+        rrb.Horizontal(panes.events(run), panes.surface(run), panes.close_up(run)),
+        rrb.Horizontal(panes.logo_events(run), panes.flow(run), panes.derotated_logo()),
+        rrb.Horizontal(panes.flight(run), panes.ball(run), panes.text(at.SUMMARY, "Summary")),
+        rrb.Horizontal(
+            rrb.Vertical(panes.status(), state, row_shares=[4, 5]), plots.RATE_PLOT.view(run, legend=False), magnitude
+        ),
     )
 
 
@@ -160,7 +180,7 @@ def _coach(run: ViewedRun) -> rrb.Container:
 
 VIEWS: Registry[View] = Registry("view")
 for _view in (
-    View(name="all", label="All stages", help="Every stage side by side.", panes=_all),
+    View(name="all", label="All stages", help="Every stage side by side.", panes=_all, narrow_panes=_all_narrow),
     View(name="tracker", label="Tracker", help="Circles on the surface, state and residuals.", panes=_tracker),
     View(name="logo", label="Logo and flow", help="Logo events, their flow and their rate.", panes=_logo),
     View(

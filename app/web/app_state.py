@@ -9,13 +9,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from spinscope.app.viewer.drawing_cache import DrawingCache
-from spinscope.pipeline.errors import ParameterError, RecordingError
-from spinscope.pipeline.recordings import is_recording
+from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.recordings.recording import file_identity
 from spinscope.pipeline.session import Choices, Progress
 
 from .client_session import ClientSession
 from .live_schemas import LiveSource
 from .open_recording import VIEW_FRAMES_BYTES, OpenRecording
+from .recording_folder import RecordingFolder
+from .recording_summary import summarize
+from .schemas import RecordingSummary
 from .shot_detection_job import ShotDetectionJob
 
 RECORDINGS_KEPT = 2  # each holds up to 110 MB of events
@@ -29,7 +32,7 @@ class AppState:
     Parameters
     ----------
     path : Path
-        Recording that was asked for; others of its folder may be opened from the page.
+        Recording that was asked for; others of its folder and below may be opened from the page.
     choices : Choices
         What was chosen on the command line.
     tools : bool
@@ -43,6 +46,8 @@ class AppState:
 
     Attributes
     ----------
+    folder : RecordingFolder
+        Recordings that may be opened.
     sessions : dict
         Open sessions by id.
     """
@@ -58,19 +63,21 @@ class AppState:
         live: LiveSource | None = None,
     ) -> None:
         self.path = path.absolute()
-        self.folder = self.path.parent
+        self.folder = RecordingFolder(self.path.parent)
         self.tools, self.layout, self.followed, self.live = tools, layout, followed, live
         self.drawings = DrawingCache()
         self._choices = choices
         self._recordings: OrderedDict[Path, OpenRecording] = OrderedDict()
         self._detections: dict[Path, ShotDetectionJob] = {}
+        self._summaries: dict[str, RecordingSummary] = {}
+        self._summarizing = threading.Lock()
         self._scratch: TemporaryDirectory[str] | None = None
         self.sessions: dict[str, ClientSession] = {}
         self._lock = threading.Lock()
 
     def recording(self, name: str | None = None, on_progress: Progress | None = None) -> OpenRecording:
         """The recording of that name in the folder, opened when it is not yet; raises SpinscopeError."""
-        path = self.path if name is None else self._inside(name)
+        path = self.path if name is None else self.folder.path(name)
         with self._lock:
             recording = self._recordings.pop(path, None)
             if recording is None:
@@ -84,10 +91,20 @@ class AppState:
                     detection.close()
             return recording
 
-    def recording_names(self) -> list[str]:
-        """Names of the recordings in the folder."""
-        found = {path.name for path in self.folder.iterdir() if is_recording(path)}
-        return sorted(found | {self.path.name})
+    def summary(self, name: str) -> RecordingSummary:
+        """Summary of a recording of the folder, one at a time and once for each content; raises RecordingError."""
+        path = self.folder.path(name)
+        with self._summarizing:
+            identity = file_identity(path)
+            if identity not in self._summaries:
+                choices = self._choices if path == self.path else self._choices.for_others
+                self._summaries[identity] = summarize(path, choices, self._make_way)
+            return self._summaries[identity]
+
+    def _make_way(self, share: float, text: str) -> None:
+        """Progress of work in the background: it waits while somebody waits for a picture."""
+        for recording in list(self._recordings.values()):
+            recording.make_way()
 
     def open_session(self, name: str | None) -> ClientSession:
         """Open a session on a recording; raises SpinscopeError."""
@@ -147,12 +164,7 @@ class AppState:
         for session in sessions:
             session.join(2.0)
         self.drawings.close()
+        self.folder.close()
         if self._scratch is not None:
             self._scratch.cleanup()
             self._scratch = None
-
-    def _inside(self, name: str) -> Path:
-        path = self.folder / name
-        if not name or Path(name).name != name or not path.is_file():
-            raise RecordingError(f"there is no recording {name!r} in the opened folder: choose one of its files")
-        return path

@@ -20,9 +20,11 @@ from .app_state import AppState
 from .assets import STATIC, chart_script, viewer_script, viewer_version, viewer_wasm
 from .client_session import ClientSession
 from .error_answers import add_error_handlers
+from .folder_routes import add_folder_routes
 from .live_routes import add_live_routes
 from .opening import opening, recording_description
-from .schemas import Done, Opening, OpenRequest, Reopened, RunRequest
+from .publisher import preview_message
+from .schemas import Done, Opening, OpenRequest, PreviewMessage, Reopened, RunRequest
 from .security import SecurityMiddleware
 from .tool_routes import add_tool_routes
 
@@ -67,7 +69,8 @@ def application(state: AppState, token: str | None = None, hosts: Collection[str
         session = await run_in_threadpool(state.open_session, request.recording)
         return await run_in_threadpool(opening, state, session)
 
-    _add_session_routes(app, session_of)
+    _add_session_routes(app, state, session_of)
+    add_folder_routes(app, state)
     add_tool_routes(app, state, session_of)
     add_live_routes(app, state.live)
     return app
@@ -95,11 +98,11 @@ def _add_assets(app: FastAPI) -> None:
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
 
 
-def _add_session_routes(app: FastAPI, session_of: SessionOf) -> None:
+def _add_session_routes(app: FastAPI, state: AppState, session_of: SessionOf) -> None:
     @app.get("/api/sessions/{session_id}/recording")
     async def recording(session_id: str) -> Reopened:
         opened = session_of(session_id).runner.recording
-        info = await run_in_threadpool(recording_description, opened)
+        info = await run_in_threadpool(recording_description, opened, state.folder.name_of(opened.original))
         return Reopened(recording=info, biases=bias_state(opened.session.recording))
 
     @app.post("/api/sessions/{session_id}/run", status_code=202)
@@ -126,12 +129,20 @@ def _add_session_routes(app: FastAPI, session_of: SessionOf) -> None:
             raise HTTPException(404, "a newer picture has taken this one's place")
         return Response(found, media_type="application/octet-stream", headers=NO_STORE)
 
-    @app.get("/api/sessions/{session_id}/layout")
-    async def layout(session_id: str, tab: str = "", tools: bool = True) -> Response:
+    @app.get("/api/sessions/{session_id}/preview")
+    async def preview(session_id: str, t_us: float) -> PreviewMessage:
         result = session_of(session_id).runner.result
         if result is None:
             raise HTTPException(409, "nothing has been computed yet")
-        made = await run_in_threadpool(layout_bytes, ViewedRun.of(result), tab, compare=tools)
+        ticks = [tick for tick in result.ticks if tick.packet.end_us <= t_us] or result.ticks[:1]
+        return await run_in_threadpool(preview_message, ticks, 0, is_whole=True)
+
+    @app.get("/api/sessions/{session_id}/layout")
+    async def layout(session_id: str, tab: str = "", tools: bool = True, narrow: bool = False) -> Response:
+        result = session_of(session_id).runner.result
+        if result is None:
+            raise HTTPException(409, "nothing has been computed yet")
+        made = await run_in_threadpool(layout_bytes, ViewedRun.of(result), tab, compare=tools, is_narrow=narrow)
         return Response(made, media_type="application/octet-stream", headers=NO_STORE)
 
 

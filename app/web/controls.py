@@ -20,6 +20,23 @@ ESSENTIALS = (
     "flow.expected_spin_rps",
     "track.tick_us",
 )
+# Entries of the glossary (static/glossary.md) that explain a section, by its group or title.
+TERMS = {
+    "Essentials": ("STC", "TRAIL", "EROS", "pad", "t_acc", "tick"),
+    "filter": ("STC", "TRAIL", "STC-cut-TRAIL", "flicker"),
+    "surface": ("EROS", "TOS", "time surface", "accumulated frame"),
+    "Cleaning": ("cleaning",),
+    "track": ("track", "Hough circle", "Kalman filter", "fixed ball", "shot"),
+    "logo": ("logo", "pad", "ball frame"),
+    "rate": ("event rate", "t_acc"),
+    "flow": ("t_acc", "triplet", "Triplet Matching", "normal flow", "aperture problem"),
+    "spin": ("spin axis", "Triplet Matching", "normal flow", "trusted", "refused"),
+    "contrast": ("contrast maximisation", "derotated"),
+    "trajectory": ("trajectory",),
+    "combined": ("combined", "witness", "trusted"),
+    "camera": ("camera", "camera frame"),
+    "ball": ("logo", "fixed ball"),
+}
 # Fields that have a section of their own, after their group's.
 OWN_SECTIONS = {"surface": {"Cleaning": ("cleaning",)}}
 # Parameters of the set-up and not of the method: a preset leaves it alone unless it names it itself.
@@ -33,7 +50,7 @@ SETUP = {
 def sections() -> list[SectionInfo]:
     """Groups of controls: the essentials, all others stage by stage, and then the set-up."""
     parameters, of_stages = Parameters(), {stage.group for stage in STAGES}
-    made = [SectionInfo(title="Essentials", is_setup=False, is_open=True, controls=_essentials(parameters))]
+    made = [SectionInfo(title="Essentials", terms=TERMS["Essentials"], is_open=True, controls=_essentials(parameters))]
     for group in sorted(parameters.as_dict(), key=lambda name: name not in of_stages):
         declared, own = parameters.group(group).tunables(), OWN_SECTIONS.get(group, {})
         named = {field for fields in own.values() for field in fields}
@@ -42,8 +59,8 @@ def sections() -> list[SectionInfo]:
         title = STAGES[group].label if group in STAGES else group.capitalize()
         for heading, fields in {title: rest, **own}.items():
             controls = [_control(group, field, declared[field]) for field in fields]
-            is_setup = group not in of_stages
-            made.append(SectionInfo(title=heading, is_setup=is_setup, is_open=False, controls=controls))
+            terms = TERMS.get(heading) or TERMS[group]
+            made.append(SectionInfo(title=heading, terms=terms, is_open=False, controls=controls))
     return made
 
 
@@ -67,6 +84,7 @@ def setup_of(parameters: Parameters) -> dict[str, dict[str, Any]]:
 
 
 def _control(group: str, field: str, declared: Tunable) -> ControlInfo:
+    setup = SETUP.get(group, ())
     return ControlInfo(
         name=f"{group}.{field}",
         label=field.removesuffix(_suffix(declared.unit)).replace("_", " "),
@@ -81,6 +99,7 @@ def _control(group: str, field: str, declared: Tunable) -> ControlInfo:
         help=declared.help,
         allowed=declared.allowed,
         scale=scale_of(declared),
+        is_setup=setup is None or field in setup,
     )
 
 

@@ -108,16 +108,8 @@ class OpenRecording:
         return end_us - start_us > self.longest_us
 
     def clip(self, start_us: int, end_us: int) -> Session:
-        """The part [start_us, end_us) as a session of its own; raises ParameterError when it is none, or too long."""
-        first, last = self.window_us
-        if not first <= start_us < end_us <= last:
-            raise ParameterError(
-                f"the clip {start_us} to {end_us} us is no part of the recording: {first} to {last} us"
-            )
-        if end_us - start_us > self.longest_us:
-            raise ParameterError(
-                f"the clip {start_us} to {end_us} us is longer than {self.longest_us / 1e6:.2f} s: choose a shorter one"
-            )
+        """The part [start_us, end_us) as a session of its own; raises ParameterError, see `check_clip`."""
+        self.check_clip(start_us, end_us)
         with self._lock:
             key = start_us, end_us
             clip = self._clips.pop(key, None)
@@ -127,6 +119,18 @@ class OpenRecording:
             while len(self._clips) > CLIPS_KEPT:
                 self._clips.popitem(last=False)
             return clip
+
+    def check_clip(self, start_us: int, end_us: int) -> None:
+        """Raise ParameterError where [start_us, end_us) is no part of the recording, or too long."""
+        first, last = self.window_us
+        if not first <= start_us < end_us <= last:
+            raise ParameterError(
+                f"the clip {start_us} to {end_us} us is no part of the recording: {first} to {last} us"
+            )
+        if end_us - start_us > self.longest_us:
+            raise ParameterError(
+                f"the clip {start_us} to {end_us} us is longer than {self.longest_us / 1e6:.2f} s: choose a shorter one"
+            )
 
     def first_clip_us(self) -> tuple[int, int]:
         """First clip to work on: all of a short recording, the busiest part of a long one, which mostly is a shot."""

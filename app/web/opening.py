@@ -33,8 +33,7 @@ def opening(state: AppState, session: ClientSession) -> Opening:
         tools=state.tools,
         tab=VIEWS[state.layout].label,
         followed=state.followed,
-        recording=recording_description(recording),
-        recordings=state.recording_names(),
+        recording=recording_description(recording, state.folder.name_of(recording.original)),
         sections=sections(),
         stages=[
             *(Choice(name=stage.name, label=stage.label, help=stage.help) for stage in STAGES if stage.name in run),
@@ -60,13 +59,13 @@ def opening(state: AppState, session: ClientSession) -> Opening:
     )
 
 
-def recording_description(recording: OpenRecording) -> RecordingDescription:
-    """The recording as the page describes it."""
+def recording_description(recording: OpenRecording, name: str) -> RecordingDescription:
+    """The recording as the page describes it, under the name by which it is opened."""
     session = recording.session
     counts, edges_us = recording.rate(RATE_BINS)
     start_us, end_us = recording.window_us
     return RecordingDescription(
-        name=recording.original.name,
+        name=name,
         events=session.source.event_count,
         width_px=session.source.width_px,
         height_px=session.source.height_px,

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import base64
 import threading
 import time
 from collections import OrderedDict
+from collections.abc import Sequence
 from typing import Any, Literal
 
+from spinscope.app.tuning.parameter_sweep import sensible_highs
 from spinscope.app.viewer.comparison import compared, note_with_a, note_without_a
 from spinscope.app.viewer.drawing_cache import DrawingCache
+from spinscope.app.viewer.preview import preview, preview_words
 from spinscope.app.viewer.rrd import rrd_bytes
 from spinscope.app.viewer.run import ViewedRun
+from spinscope.pipeline.chain import Tick
 from spinscope.pipeline.metrics import RunMetrics
 from spinscope.pipeline.registry import STAGES
 from spinscope.pipeline.session import Result
@@ -18,7 +23,7 @@ from spinscope.pipeline.session import Result
 from .message_queue import MessageQueue
 from .open_recording import OpenRecording
 from .presets import differences
-from .schemas import Picture, RunMessage, RunRequest
+from .schemas import Picture, PreviewMessage, RunMessage, RunRequest
 
 # A client learns of a run's progress this often, and not at all of one that is over at once: every change of the page
 # has the browser put the whole picture together anew, in the very time in which it is waited for.
@@ -27,6 +32,13 @@ PICTURES_KEPT = 3
 DRAWING = "drawing"  # counted beside the stages
 
 State = Literal["loading", "computing", "drawing", "partial", "done", "failed"]
+
+
+def preview_message(ticks: Sequence[Tick], serial: int, *, is_whole: bool) -> PreviewMessage:
+    """Message of the preview at the end of the last tick; `is_whole` where the slow methods have run, too."""
+    picture = f"data:image/png;base64,{base64.b64encode(preview(ticks)).decode()}"
+    words = preview_words(ticks[-1], is_whole=is_whole)
+    return PreviewMessage(serial=serial, t_us=ticks[-1].packet.end_us, picture=picture, words=words)
 
 
 class RunReport:
@@ -45,6 +57,10 @@ class RunReport:
         with self._lock:
             for stage, more in seconds.items():
                 self._seconds[stage] += more
+
+    def show(self, ticks: Sequence[Tick]) -> None:
+        """Show the client a preview of what is known at the end of these ticks."""
+        self._queue.put(preview_message(ticks, self.serial, is_whole=False))
 
     def tell(self, state: State, share: float = 0.0, *, force: bool = False, **content: Any) -> None:
         """Tell the client, unless it was told of this state a moment ago."""
@@ -119,7 +135,9 @@ class Publisher:
         is_whole = len(b.ticks) == b.session.chain.tick_count(b.session.parameters)
         content: dict[str, Any] = {}
         if is_whole:
-            content |= {"metrics": RunMetrics.of(b), "costs_ms": recording.costs_ms(b.session, b.session.parameters)}
+            metrics = RunMetrics.of(b)
+            costs_ms = recording.costs_ms(b.session, b.session.parameters)
+            content |= {"metrics": metrics, "costs_ms": costs_ms, "highs": sensible_highs(metrics)}
         if a is not None:
             content |= {
                 "pinned_metrics": RunMetrics.of(a),

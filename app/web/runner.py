@@ -94,14 +94,21 @@ class Runner:
         is_fast_first = request.interactive and not all(chain.knows(parameters, stage) for stage in chain.stages)
         whole = None if is_fast_first else self._slow.submit(self._whole, clip, request, report)
         ticks: list[Tick] = []
+        is_previewed = not request.interactive and playhead_us is not None  # the page has the picture soon
         for tick in self._ticks(clip, parameters, request, report, quick_stages()):
             ticks.append(tick)
+            if not is_previewed and playhead_us is not None and tick.packet.end_us >= playhead_us:
+                is_previewed = True
+                report.show(ticks)
             if playhead_us is not None and tick.packet.end_us >= playhead_us and len(ticks) >= TIMED_TICKS:
                 playhead_us = None
                 rest_s = (time.perf_counter() - began_s) / len(ticks) * (count - len(ticks))
                 if rest_s > REST_WORTH_WAITING_S:
                     self._show(Result.of(session, ticks), a, request, report, partial=True)
         early = Result.of(session, ticks)
+        if not is_previewed:
+            opening_us = ViewedRun.of(early, request.followed).opening_us
+            report.show([tick for tick in ticks if tick.packet.end_us <= opening_us] or ticks[:1])
         if is_fast_first:
             self._show(early, a, request, report, partial=True)
         else:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from spinscope.app.tuning.bias_sweep import BiasState, BiasSweep, Resimulation
-from spinscope.app.tuning.optimization import Optimization
+from spinscope.app.tuning.optimization import MOST_CLIPS, Optimization
 from spinscope.app.tuning.parameter_sweep import ParameterSweep, Scale
 from spinscope.pipeline.metrics import RunMetrics
 from spinscope.pipeline.registry import Parameters
@@ -15,6 +16,7 @@ from spinscope.pipeline.registry import Parameters
 Values = dict[str, dict[str, Any]]
 TEXT_MOST = 100_000
 Microseconds = Annotated[int, Field(ge=-(2**62), le=2**62)]
+Span = Annotated[list[Microseconds], Field(min_length=2, max_length=2)]
 
 
 if TYPE_CHECKING:
@@ -32,7 +34,7 @@ class Request(BaseModel):
 class OpenRequest(Request):
     """Open a session on a recording of the folder; None for the one the program was started with."""
 
-    recording: str | None = Field(default=None, max_length=255)
+    recording: str | None = Field(default=None, max_length=1000)
 
 
 class RunRequest(Request):
@@ -76,11 +78,13 @@ class SweepRequest(SettingsRequest):
 
 
 class OptimizationRequest(SettingsRequest):
-    """Optimize some parameters."""
+    """Optimize some parameters for the clip, or for several clips of the recording, or for several recordings."""
 
     names: list[str] = Field(max_length=20)
     objective: str = Field(max_length=20)
     trials: int = 40
+    clips_us: list[Span] = Field(default=[], max_length=MOST_CLIPS)
+    recordings: list[str] = Field(default=[], max_length=MOST_CLIPS)
 
 
 class CancelRequest(Request):
@@ -162,7 +166,7 @@ class RecordingDescription(Response):
 
 
 class ControlInfo(Response):
-    """Declaration of one parameter, as its control needs it."""
+    """Declaration of one parameter, as its control needs it; `is_setup` where it belongs to the set-up."""
 
     name: str
     label: str
@@ -177,13 +181,14 @@ class ControlInfo(Response):
     help: str
     allowed: str
     scale: Scale
+    is_setup: bool
 
 
 class SectionInfo(Response):
-    """A group of controls; `is_setup` where it belongs to the set-up, `is_open` where it is unfolded at first."""
+    """A group of controls; `terms` of the glossary explain it, `is_open` where it is unfolded at first."""
 
     title: str
-    is_setup: bool
+    terms: Sequence[str]
     is_open: bool
     controls: list[ControlInfo]
 
@@ -200,7 +205,6 @@ class Opening(Response):
     tab: str
     followed: int | None
     recording: RecordingDescription
-    recordings: list[str]
     sections: list[SectionInfo]
     stages: list[Choice]
     methods: list[MethodInfo]
@@ -216,6 +220,42 @@ class Opening(Response):
     renamed: dict[str, str]
     biases: BiasState
     is_live: bool
+
+
+class ListedRecording(Response):
+    """A recording of a folder, or a dropped one; `name` opens it."""
+
+    name: str
+    size_bytes: int
+
+
+class FolderListing(Response):
+    """Subfolders and recordings of `folder`, a path within the folder `root` of the machine."""
+
+    root: str
+    folder: str
+    folders: list[str]
+    recordings: list[ListedRecording]
+
+
+class RecordingSummary(Response):
+    """What a recording holds, or `error`; without `shots` where it is too long to be searched for them in passing.
+
+    `spin` tells of the shot with the most logo events, or why there is none; `picture` is the address of a PNG.
+    """
+
+    events: int | None = None
+    duration_us: int | None = None
+    picture: str | None = None
+    shots: int | None = None
+    spin: str | None = None
+    error: str | None = None
+
+
+class Dropped(Response):
+    """The name that opens a dropped file."""
+
+    name: str
 
 
 class Reopened(Response):
@@ -281,6 +321,8 @@ class RunMessage(Message):
         What each stage of B and A took when it was computed, perhaps for an earlier request.
     differences : list
         (stage.field, value of A, value of B) of all that differs.
+    highs : dict
+        Upper ends of ranges that make sense for the ball of B, below the declared ones.
     """
 
     kind: Literal["run"] = "run"
@@ -296,6 +338,17 @@ class RunMessage(Message):
     pinned_metrics: RunMetrics | None = None
     pinned_costs_ms: dict[str, float] | None = None
     differences: list[tuple[str, Any, Any]] = []
+    highs: dict[str, float] = {}
+
+
+class PreviewMessage(Message):
+    """Preview of a run at a time, before its picture: the address of a PNG, and the answer in words."""
+
+    kind: Literal["preview"] = "preview"
+    serial: int
+    t_us: int
+    picture: str
+    words: str
 
 
 class ShotsMessage(Message):
@@ -343,4 +396,6 @@ class BiasSweepMessage(JobMessage):
     content: BiasSweep | None = None
 
 
-ServerMessage = RunMessage | ShotsMessage | SweepMessage | OptimizationMessage | BiasesMessage | BiasSweepMessage
+ServerMessage = (
+    RunMessage | PreviewMessage | ShotsMessage | SweepMessage | OptimizationMessage | BiasesMessage | BiasSweepMessage
+)

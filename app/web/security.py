@@ -18,6 +18,7 @@ Receive = Callable[[], Awaitable[Message]]
 Send = Callable[[Message], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
+DROP_PATH = "/api/drop"  # files dropped onto the page: streamed, and bounded by who keeps them
 BODY_BYTES = 256 * 1024  # a preset of every parameter is 4 kB
 BODY_S = 10.0  # for the whole body: a client that trickles it holds no connection for ever
 OWN_HOSTS = ("127.0.0.1", "localhost")
@@ -66,6 +67,9 @@ class SecurityMiddleware:
         refusal = self._stranger(headers, given) or _refusal(scope, headers)
         if refusal is not None:
             await _answer(send, *refusal)
+            return
+        if scope["path"] == DROP_PATH:
+            await self._app(scope, _in_time(receive), _with_headers(send, None))
             return
         try:
             async with asyncio.timeout(BODY_S):
@@ -132,8 +136,12 @@ def _refusal(scope: Scope, headers: dict[str, str]) -> tuple[int, str] | None:
     if site not in ("same-origin", "none") and not is_visit:
         return 403, "requests from other origins are refused"
     if scope["method"] == "POST":
-        if headers.get("content-type", "").partition(";")[0].strip() != "application/json":
-            return 415, "the request is not application/json"
+        # Both are kinds that a form of another page cannot send.
+        kind = "application/octet-stream" if scope["path"] == DROP_PATH else "application/json"
+        if headers.get("content-type", "").partition(";")[0].strip() != kind:
+            return 415, f"the request is not {kind}"
+        if scope["path"] == DROP_PATH:
+            return None
         length = headers.get("content-length", "0")
         if not length.isdecimal() or int(length) > BODY_BYTES:
             return 413, f"the request is longer than {BODY_BYTES // 1024} kB"
@@ -154,6 +162,19 @@ async def _body(receive: Receive) -> bytes | None:
             return None
         if not message.get("more_body", False):
             return b"".join(parts)
+
+
+def _in_time(receive: Receive) -> Receive:
+    """Return a receiver that takes a client for gone which sends nothing for long."""
+
+    async def received() -> Message:
+        try:
+            async with asyncio.timeout(BODY_S):
+                return await receive()
+        except TimeoutError:
+            return {"type": "http.disconnect"}
+
+    return received
 
 
 def _replay(body: bytes, receive: Receive) -> Receive:

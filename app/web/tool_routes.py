@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -21,16 +22,18 @@ from spinscope.pipeline.stages.fixed_ball import find_fixed_ball
 from . import exports, presets, schemas
 from .app_state import AppState
 from .client_session import ClientSession
+from .controls import setup_of
 from .jobs import Job
-from .open_recording import OpenRecording
+from .open_recording import COLUMNS_KEPT, OpenRecording
 
+TUNED_BYTES = 400_000_000  # results kept of all clips that are tuned at once
 SessionOf = Callable[[str], ClientSession]
 
 
 def add_tool_routes(app: FastAPI, state: AppState, session_of: SessionOf) -> None:
     """Add the routes of all tools."""
     _add_presets(app, session_of)
-    _add_sweeps(app, session_of)
+    _add_sweeps(app, state, session_of)
     _add_ball(app, session_of)
     _add_exports(app, session_of)
     _add_biases(app, state, session_of)
@@ -72,7 +75,7 @@ def _add_presets(app: FastAPI, session_of: SessionOf) -> None:
         )
 
 
-def _add_sweeps(app: FastAPI, session_of: SessionOf) -> None:
+def _add_sweeps(app: FastAPI, state: AppState, session_of: SessionOf) -> None:
     @app.post("/api/sessions/{session_id}/sweep", status_code=202)
     async def start_sweep(session_id: str, request: schemas.SweepRequest) -> schemas.Done:
         session = session_of(session_id)
@@ -89,12 +92,21 @@ def _add_sweeps(app: FastAPI, session_of: SessionOf) -> None:
     @app.post("/api/sessions/{session_id}/optimization", status_code=202)
     async def start_optimization(session_id: str, request: schemas.OptimizationRequest) -> schemas.Done:
         session = session_of(session_id)
-        clip, parameters = _clip_of(session, request)
+        shown = optimization.TunedClip(*_clip_of(session, request))
         wanted = request.names, request.objective, request.trials
-        optimization.check_request(clip, parameters, *wanted)
+        optimization.check_request(shown, *wanted)
+        for start_us, end_us in request.clips_us:
+            session.runner.recording.check_clip(start_us, end_us)
 
         def work(job: Job) -> optimization.Optimization:
-            return optimization.optimize(clip, parameters, *wanted, job.report, job.check)
+            skipped: list[str] = []
+            clips = _tuned_clips(state, session.runner.recording, request, shown, skipped.append)
+
+            def report(found: optimization.Optimization) -> None:
+                job.report(dataclasses.replace(found, skipped=skipped))
+
+            found = optimization.optimize(clips, *wanted, report, job.check)
+            return dataclasses.replace(found, skipped=skipped)
 
         session.start(schemas.OptimizationMessage, work)
         return schemas.Done()
@@ -103,6 +115,45 @@ def _add_sweeps(app: FastAPI, session_of: SessionOf) -> None:
     async def cancel(session_id: str, request: schemas.CancelRequest) -> schemas.Done:
         session_of(session_id).cancel(request.kind)
         return schemas.Done()
+
+
+def _tuned_clips(
+    state: AppState,
+    recording: OpenRecording,
+    request: schemas.OptimizationRequest,
+    shown: optimization.TunedClip,
+    on_skip: Callable[[str], None],
+) -> list[optimization.TunedClip]:
+    """Clips that an optimization is for; those of other recordings in their own set-up.
+
+    `on_skip` is told of each recording that cannot be read, or lacks the truth that the objective needs.
+    """
+    count = max(len(request.clips_us) + len(request.recordings), 1)
+    budget_bytes = TUNED_BYTES // count
+
+    def part(session: Session, start_us: int, end_us: int) -> Session:
+        return session.clip(start_us, end_us, budget_bytes=budget_bytes, max_columns=COLUMNS_KEPT)
+
+    clips = [
+        optimization.TunedClip(part(recording.session, start_us, end_us), shown.parameters)
+        for start_us, end_us in request.clips_us
+    ]
+    for name in request.recordings:
+        path = state.folder.path(name)
+        if path == recording.original:
+            clips.append(shown)
+            continue
+        try:
+            other = OpenRecording.open(path, recording.choices.for_others)
+        except SpinscopeError as error:
+            on_skip(str(error))
+            continue
+        if request.objective == "truth" and other.session.truth is None:
+            on_skip(f"{name} carries no truth")
+            continue
+        own = request.parameters.with_values(setup_of(other.session.parameters))
+        clips.append(optimization.TunedClip(part(other.session, *other.first_clip_us()), own))
+    return clips or [shown]
 
 
 def _add_ball(app: FastAPI, session_of: SessionOf) -> None:

@@ -75,7 +75,7 @@ export class Ball {
     });
     const words = element("p", {}, "Click the centre of the ball, then its edge. The wheel zooms, Esc closes.");
     const frame = element("div.frame", {}, image);
-    const dialog = element("dialog.pick", {}, words, frame);
+    const dialog = element("dialog.pick", { "aria-label": "Circle of the ball" }, words, frame);
     document.body.append(dialog);
     dialog.addEventListener("close", () => dialog.remove());
     let zoom = 1;

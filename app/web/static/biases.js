@@ -110,6 +110,11 @@ export class Biases extends EventTarget {
     return this.#resimulate();
   }
 
+  // Whether the present values are those of a link, which names what differs from the recording's own.
+  agrees(/** @type {Record<string, number>} */ values) {
+    return JSON.stringify({ ...this.state.values, ...values }) === JSON.stringify(this.values);
+  }
+
   // The server was started anew and knows the recording as it is on disk.
   restore() {
     if (JSON.stringify(this.values) !== JSON.stringify(this.state.values)) this.#resimulate();

@@ -1,8 +1,10 @@
 // Charts by plotly.js, which is loaded when the first one is shown.
 
+import { download } from "./elements.js";
+
 const FONT = { family: "system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif", size: 10, color: "#93a0ac" };
 const HEIGHT = 170;
-const CONFIG = { displayModeBar: false, responsive: true };
+const PRINTED = { width: 640, height: 400, ink: "#222222", ground: "#ffffff", grid: "#dddddd" };
 /** @type {Promise<any> | null} */
 let loading = null;
 
@@ -22,7 +24,7 @@ function plotly() {
 }
 
 /** @typedef {{x: any, y: number | null | undefined, std?: number | null, label?: string, value?: any}} Point */
-/** @typedef {{name?: string, colour: string, points: Point[]}} Series */
+/** @typedef {{name?: string, colour: string, points: Point[], lines?: boolean}} Series */
 /**
  * @typedef {object} ChartSpec
  * @property {string} title
@@ -63,11 +65,29 @@ export class Chart {
     const traces = series.map((one) => trace(one, at, range, Boolean(onpick)));
     if (refused.length) traces.push(refusals(refused, at, range, spec));
     const library = await plotly();
-    await library.react(this.node, traces, layout(spec, at, range, [...shown, ...refused]), CONFIG);
+    await library.react(this.node, traces, layout(spec, at, range, [...shown, ...refused]), {
+      responsive: true,
+      displaylogo: false,
+      modeBarButtons: [[{ name: "Save as SVG", icon: library.Icons.camera, click: printed }]],
+    });
     if (first) {
       this.node.on("plotly_click", (/** @type {any} */ { points: [point] }) => this.onpick?.(point.customdata));
     }
   }
+}
+
+// Saves a chart as SVG in the colours of a printed page.
+async function printed(/** @type {any} */ { data, layout }) {
+  const { width, height, ink, ground, grid } = PRINTED;
+  const axis = { gridcolor: grid, linecolor: ink };
+  const colours = { paper_bgcolor: ground, plot_bgcolor: ground, font: { ...layout.font, color: ink } };
+  const title = { ...layout.title, font: { ...layout.title.font, color: ink } };
+  const [xaxis, yaxis] = [layout.xaxis, layout.yaxis].map((one) => ({ ...one, ...axis }));
+  const library = await plotly();
+  const figure = { data, layout: { ...layout, ...colours, title, xaxis, yaxis } };
+  const url = await library.toImage(figure, { format: "svg", width, height });
+  const name = layout.title.text.toLowerCase().replaceAll(/\W+/g, "_");
+  download(`${name}.svg`, decodeURIComponent(url.slice(url.indexOf(",") + 1)), "image/svg+xml");
 }
 
 // Whether any of the series has something to show.
@@ -80,7 +100,7 @@ export const hasPoints = (/** @type {Series[]} */ series) =>
  * @param {[number, number] | null} range
  * @param {boolean} canPick
  */
-function trace({ name, colour, points }, at, range, canPick) {
+function trace({ name, colour, points, lines = true }, at, range, canPick) {
   const good = points.filter(({ y }) => Number.isFinite(y));
   const above = (/** @type {any} */ y) => range !== null && y > range[1];
   const below = (/** @type {any} */ y) => range !== null && y < range[0];
@@ -98,7 +118,7 @@ function trace({ name, colour, points }, at, range, canPick) {
       }`
     ),
     hoverinfo: "text+name",
-    mode: "lines+markers",
+    mode: lines ? "lines+markers" : "markers",
     line: { color: colour, width: 1.5 },
     marker: {
       color: colour,
@@ -126,7 +146,7 @@ function refusals(refused, at, range, { series }) {
     hoverinfo: "text+name",
     showlegend: false,
     mode: "markers",
-    marker: { color: "#ef5350", size: 7, symbol: "x-thin-open" },
+    marker: { color: "#ff6b63", size: 7, symbol: "x-thin-open" },
   };
 }
 

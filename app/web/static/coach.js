@@ -51,7 +51,8 @@ export class Coach {
 
   // The spin and its kind on a line of their own, what else is known below.
   #say() {
-    const [first, ...others] = (this.results.sentence ?? "No shot").split(", ");
+    const { sentence } = this.results;
+    const [first, ...others] = sentence ? [...sentence.split(", "), "whole shot"] : ["No shot"];
     this.sentence.replaceChildren(element("strong", {}, first), element("span", {}, others.join(", ")));
   }
 }

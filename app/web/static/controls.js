@@ -1,9 +1,10 @@
 // Sliders, number boxes, switches and choices, made from the parameters' declarations.
 
-/** @import { ControlInfo, SectionInfo } from "./messages.d.ts" */
+/** @import { Choice, ControlInfo, SectionInfo } from "./messages.d.ts" */
 /** @import { Settings } from "./settings.js" */
 
-import { element, notice } from "./elements.js";
+import { attempt, element, notice } from "./elements.js";
+import { explain } from "./glossary.js";
 
 const STEPS = 1000; // positions of a slider over its whole range
 
@@ -26,8 +27,14 @@ export class Controls {
   /** @type {any[] | null} sections that were open before the search */
   #open = null;
 
-  constructor(/** @type {any} */ parent, /** @type {SectionInfo[]} */ sections, /** @type {Settings} */ settings) {
+  /**
+   * @param {any} parent
+   * @param {{sections: SectionInfo[], stages: Choice[]}} opening
+   * @param {Settings} settings
+   */
+  constructor(parent, { sections, stages }, settings) {
     this.settings = settings;
+    this.help = new Map(stages.map(({ label, help }) => [label, help]));
     const search = { type: "search", id: "search", placeholder: "Search settings", "aria-label": "Search settings" };
     this.search = element("input", { ...search, oninput: () => this.#find() });
     this.changed = element("div", {
@@ -84,14 +91,21 @@ export class Controls {
     if (!words.length) this.#open = null;
   }
 
+  // Upper ends that make sense for the ball that is seen; what is typed may go beyond, up to what is allowed.
+  take(/** @type {Record<string, number>} */ highs) {
+    for (const [name, high] of Object.entries(highs)) this.controls.get(name)?.limit(high);
+  }
+
   differs(/** @type {string} */ name) {
     return JSON.stringify(this.settings.get(name)) !== JSON.stringify(this.settings.presetValue(name));
   }
 
-  #section(/** @type {SectionInfo} */ { title, is_open, controls }) {
+  #section(/** @type {SectionInfo} */ { title, terms, is_open, controls }) {
     const mark = element("span.mark");
     const body = element("div.body");
-    const made = element("details.section", { open: is_open }, element("summary", {}, title, mark), body);
+    const onclick = () => attempt(() => explain(title, this.help.get(title), terms));
+    const help = element("button.help", { onclick, title: "What this is", "aria-label": `What ${title} is` }, "?");
+    const made = element("details.section", { open: is_open }, element("summary", {}, title, mark), help, body);
     made.dataset.title = title;
     for (const description of controls) {
       const control = new Control(description, this);
@@ -118,6 +132,7 @@ class Control {
     this.scale = info.scale;
     this.low = info.low ?? -Infinity;
     this.high = info.high ?? Infinity;
+    this.top = this.high; // upper end of the slider
     this.step = info.step ?? 1;
     this.controls = controls;
     this.settings = controls.settings;
@@ -134,6 +149,11 @@ class Control {
     const label = element("label", { htmlFor: id }, text);
     this.row = element("div.control", { title: this.title }, label, ...this.#inputs(id), this.reset);
     this.row.dataset.name = this.name;
+  }
+
+  limit(/** @type {number} */ high) {
+    this.top = Math.min(Math.max(high, this.low + this.step), this.high);
+    this.refresh();
   }
 
   get value() {
@@ -155,7 +175,7 @@ class Control {
     else if (document.activeElement !== this.box || this.kind === "choice") this.box.value = this.#text(value);
     if (this.slider && !this.dragging) {
       const known = value ?? this.low;
-      this.slider.value = Math.round(STEPS * SCALES[this.scale][0](known, this.low, this.high));
+      this.slider.value = Math.round(STEPS * SCALES[this.scale][0](known, this.low, this.top));
       this.slider.classList.toggle("unset", value === null);
     }
     if (this.slider) this.slider.setAttribute("aria-valuetext", `${this.#text(value)} ${this.info.unit}`);
@@ -196,7 +216,7 @@ class Control {
 
   #dragged() {
     this.dragging = true;
-    const value = this.#rounded(SCALES[this.scale][1](this.slider.value / STEPS, this.low, this.high));
+    const value = this.#rounded(SCALES[this.scale][1](this.slider.value / STEPS, this.low, this.top));
     this.box.value = this.#text(value);
     this.settings.set(this.name, value, false);
   }

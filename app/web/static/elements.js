@@ -58,17 +58,29 @@ export function number(value, digits = 4) {
 export const milliseconds = (/** @type {number} */ ms) =>
   ms < 9.95 ? `${ms.toFixed(1)} ms` : ms < 999.5 ? `${ms.toFixed(0)} ms` : `${(ms / 1000).toFixed(1)} s`;
 
+const MOST_NOTICES = 5; // beyond them the oldest make room; the list of notices has them all
+
 /**
+ * Tells something: an error or a warning until it is closed, news for some seconds. Event of the document: `notice`.
  * @param {string} text
  * @param {"error" | "warning" | "info"} kind
  * @param {number} seconds 0 for as long as nobody closes it
  */
-export function notice(text, kind = "error", seconds = 8) {
-  const made = element(`div.notice.${kind}`, { title: "Click to close", onclick: () => made.remove() }, text);
+export function notice(text, kind = "error", seconds = kind === "info" ? 8 : 0) {
+  const close = () => made.remove();
+  const button = element("button", { "aria-label": "Close", onclick: close }, "×");
+  const made = element(
+    `div.notice.${kind}`,
+    { title: "Click to close", onclick: close },
+    element("span", {}, text),
+    button,
+  );
   const list = byId("notices");
-  for (const other of [...list.children]) if (other.textContent === text) other.remove();
+  for (const other of [...list.children]) if (other.firstChild.textContent === text) other.remove();
   list.append(made);
-  if (seconds) setTimeout(() => made.remove(), 1000 * seconds);
+  while (list.children.length > MOST_NOTICES) list.firstChild.remove();
+  if (seconds) setTimeout(close, 1000 * seconds);
+  document.dispatchEvent(new CustomEvent("notice", { detail: { text, kind } }));
   return made;
 }
 
@@ -82,6 +94,26 @@ export async function attempt(work) {
   } catch (error) {
     notice(/** @type {Error} */ (error).message);
   }
+}
+
+/**
+ * Asks a question with some answers; null where it is closed without one.
+ * @param {string} question
+ * @param {Record<string, string>} answers labels by what is returned
+ * @returns {Promise<string | null>}
+ */
+export function ask(question, answers) {
+  const buttons = Object.entries(answers).map(([value, label]) => element("button", { value }, label));
+  const form = element("form", { method: "dialog" }, element("p", {}, question), element("div.row", {}, ...buttons));
+  const dialog = element("dialog.ask", { "aria-label": "Question" }, form);
+  document.body.append(dialog);
+  dialog.showModal();
+  return new Promise((resolve) =>
+    dialog.addEventListener("close", () => {
+      dialog.remove();
+      resolve(dialog.returnValue || null);
+    })
+  );
 }
 
 export const pause = (/** @type {number} */ ms) => new Promise((resolve) => setTimeout(resolve, ms));

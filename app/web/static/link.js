@@ -1,4 +1,4 @@
-// The page's address: recording, what differs from how it was opened, biases, clip, playhead and tab.
+// The page's address: recording, preset, what differs from how it was opened, biases, clip, shot, playhead and tab.
 
 import { notice } from "./elements.js";
 
@@ -9,18 +9,18 @@ import { notice } from "./elements.js";
  * @typedef {object} Linked
  * @property {{recording: string}} connection
  * @property {Settings} settings
- * @property {{playhead_us: number | null, tab: () => Promise<string | null>}} viewer
+ * @property {{playhead_us: number | null, front: string | null}} viewer
  * @property {{followed: number | null}} runner
  * @property {Opening} opening
  * @property {{values: Record<string, number>} | null} biases
  */
 
-export async function linkOf(
-  /** @type {Linked} */ { connection, settings, viewer, runner, opening, biases },
-  withTab = false,
-) {
+const OF_THE_VIEW = ["t", "tab", "shot"]; // what changes without a step in the browser's history
+
+export function linkOf(/** @type {Linked} */ { connection, settings, viewer, runner, opening, biases }) {
   const words = new URLSearchParams();
   words.set("recording", connection.recording);
+  if (settings.preset.name !== "opened") words.set("preset", settings.preset.name);
   for (const text of assignments(settings.parameters, opening.presets.opened)) words.append("set", text);
   if (settings.pinned) {
     words.set("pinned", "1");
@@ -32,8 +32,42 @@ export async function linkOf(
   if (time !== null) words.set("t", String(Math.round(time)));
   const changed = Object.entries(biases?.values ?? {}).filter(([name, value]) => value !== opening.biases.values[name]);
   for (const [name, value] of changed) words.append("bias", `${name}:${value}`);
-  if (withTab) words.set("tab", (await viewer.tab()) ?? "");
+  if (viewer.front !== null) words.set("tab", viewer.front);
   return `#${words}`;
+}
+
+/**
+ * The part of a link that the browser's way back leads through: settings, clip and recording.
+ * @param {string} hash
+ */
+export function settingsOf(hash) {
+  const words = new URLSearchParams(hash.slice(1));
+  for (const name of OF_THE_VIEW) words.delete(name);
+  return words.toString();
+}
+
+/**
+ * The link to another recording in the same tab, with some settings.
+ * @param {Linked} app
+ * @param {string} recording
+ * @param {string[]} carried assignments
+ */
+export function linkTo({ settings, viewer }, recording, carried) {
+  const words = new URLSearchParams({ recording });
+  if (carried.length && settings.preset.name !== "opened") words.set("preset", settings.preset.name);
+  for (const text of carried) words.append("set", text);
+  if (viewer.front !== null) words.set("tab", viewer.front);
+  return `#${words}`;
+}
+
+/**
+ * Assignments of the settings that differ from how the recording was opened, without its set-up.
+ * @param {Linked} app
+ */
+export function carriedSettings({ settings, opening }) {
+  const controls = opening.sections.flatMap((section) => section.controls);
+  const setup = new Set(controls.filter(({ is_setup }) => is_setup).map(({ name }) => name));
+  return assignments(settings.parameters, opening.presets.opened).filter((text) => !setup.has(text.split("=")[0]));
 }
 
 export function linked() {
@@ -45,6 +79,7 @@ export function linked() {
     clip: clip && /** @type {[number, number]} */ ([Number(clip[1]), Number(clip[2])]),
     time_us: Number(words.get("t")) || null,
     tab: words.get("tab"),
+    preset: words.get("preset") ?? "opened",
     followed: Number(words.get("shot")) || null,
     biases: Object.fromEntries(biases.map(([name, value]) => [name, Number(value)])),
     parameters: (/** @type {Opening} */ opening) => applied(opening, words.getAll("set")),
@@ -67,7 +102,7 @@ function applied(/** @type {Opening} */ { presets, renamed }, /** @type {string[
     if (given in renamed) notice(`${given} is now called ${renamed[given]}`, "info", 12);
     const [group, name] = (renamed[given] ?? given ?? "").split(".");
     if (!Object.hasOwn(values, group) || !Object.hasOwn(values[group], name)) {
-      notice(`The address sets ${text.slice(0, 80)}, which is no setting: it is left out.`, "warning", 0);
+      notice(`The address sets ${text.slice(0, 80)}, which is no setting: it is left out.`, "warning");
       continue;
     }
     try {

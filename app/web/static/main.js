@@ -8,15 +8,21 @@ import { Bar } from "./bar.js";
 import { Biases } from "./biases.js";
 import { Coach } from "./coach.js";
 import { Controls } from "./controls.js";
-import { byId, element, notice } from "./elements.js";
-import { linked, linkOf } from "./link.js";
+import { ask, byId, element, notice } from "./elements.js";
+import { Keyboard } from "./keyboard.js";
+import { carriedSettings, linked, linkOf, linkTo, settingsOf } from "./link.js";
 import { Live } from "./live.js";
+import { Notices } from "./notices.js";
 import { Optimization } from "./optimization.js";
 import { Overview } from "./overview.js";
+import { startPanels } from "./panels.js";
+import { Preview } from "./preview.js";
+import { Recordings } from "./recordings.js";
 import { Results } from "./results.js";
 import { Saving } from "./saving.js";
 import { Connection, Refused, RunRequests } from "./server.js";
 import { Settings } from "./settings.js";
+import { shortcuts } from "./shortcuts.js";
 import { Sweep } from "./sweep.js";
 import { Viewer } from "./viewer.js";
 
@@ -25,6 +31,7 @@ import { Viewer } from "./viewer.js";
 const REMEMBER_MS = 300;
 const REMEMBER_UNSEEN_MS = 3000;
 
+new Notices();
 const connection = new Connection();
 const settings = new Settings();
 const viewer = new Viewer();
@@ -39,7 +46,7 @@ async function start() {
     opening = await opened();
   } catch (error) {
     const refusal = error instanceof Refused && error.message;
-    notice(refusal || "The server does not answer: is `spinscope` still running?", "error", 0);
+    notice(refusal || "The server does not answer: is `spinscope` still running?");
     return;
   }
   app.opening = opening;
@@ -47,30 +54,50 @@ async function start() {
   document.body.classList.toggle("viewing", !hasTools);
   document.body.classList.toggle("long", opening.recording.is_long);
   const { recording, presets } = opening;
-  const values = presets.opened;
-  settings.start({
-    parameters: link.parameters(opening),
-    pinned: link.pinned(opening),
-    clip: link.clip ?? recording.clip_us,
-    preset: { name: "opened", values },
-  });
-  settings.fallback = { parameters: values, clip: recording.clip_us };
-  const tab = encodeURIComponent(link.tab ?? opening.tab);
-  const first = { layout: `layout?tab=${tab}&tools=${hasTools}`, time_us: link.time_us };
+  settings.start(snapshot(link));
+  settings.fallback = { parameters: presets.opened, clip: recording.clip_us };
+  const first = { tab: link.tab ?? opening.tab, hasTools, time_us: link.time_us };
   app.runner = new RunRequests(connection, settings, viewer, first);
   app.runner.followed = link.followed ?? opening.followed;
   app.overview = new Overview(byId("overview"), recording);
   app.bar = new Bar(byId("bar"), opening.stages);
+  new Preview(app);
   describe(recording);
   listen();
   if (hasTools) addTools(opening);
+  new Keyboard(shortcuts(app, hasTools));
   viewer.start(opening.viewer_version, byId("viewer")).catch((error) => {
     app.runner.isBlind = true; // the numbers are still there
     const others = "`spinscope view --native` or `--save FILE.rrd` work without WebAssembly and WebGL";
-    notice(`The viewer cannot run in this browser: ${error.message}; ${others}.`, "error", 0);
+    notice(`The viewer cannot run in this browser: ${error.message}; ${others}.`);
   });
   if (hasTools && Object.keys(link.biases).length) app.biases.take(link.biases);
   app.runner.request(true);
+}
+
+// The settings of a link to the opened recording.
+function snapshot(/** @type {ReturnType<typeof linked>} */ { parameters, pinned, clip, preset }) {
+  const { presets, recording } = app.opening;
+  const name = Object.hasOwn(presets, preset) ? preset : "opened";
+  return {
+    parameters: parameters(app.opening),
+    pinned: pinned(app.opening),
+    clip: clip ?? recording.clip_us,
+    preset: { name, values: presets[name] },
+  };
+}
+
+// Another link: pasted, or of the browser's way back.
+function follow() {
+  clearTimeout(later);
+  remembered = null; // what comes is no new step
+  const next = linked();
+  const isOther = next.recording !== null && next.recording !== connection.recording;
+  if (isOther || app.biases?.agrees(next.biases) === false) return location.reload();
+  settings.restore(snapshot(next));
+  if (next.tab !== null) viewer.bringToFront(next.tab);
+  if (next.time_us !== null) viewer.place(next.time_us);
+  app.runner.follow(next.followed ?? app.opening.followed);
 }
 
 // The recording of the link, or where that cannot be opened the one the program was started with.
@@ -90,7 +117,7 @@ function describe(/** @type {RecordingDescription} */ recording) {
   const length = seconds < 1 ? `${(1000 * seconds).toFixed(0)} ms` : `${seconds.toFixed(1)} s`;
   const size = `${recording.width_px} x ${recording.height_px}`;
   byId("about").textContent = `${recording.events.toLocaleString("en")} events, ${length}, ${size}`;
-  for (const warning of recording.warnings) notice(warning, "warning", 20);
+  for (const warning of recording.warnings) notice(warning, "warning");
 }
 
 function listen() {
@@ -104,8 +131,15 @@ function listen() {
     document.body.dataset.state = state;
     byId("progress").textContent = app.bar.status.textContent;
     if (detail.error) notice(detail.error);
-    if (["done", "failed"].includes(state)) document.body.dataset.done = String(detail.serial);
-    if (metrics) offerShots(metrics);
+    if (["done", "failed"].includes(state)) {
+      document.body.dataset.done = String(detail.serial);
+      rememberLater(app.runner.isBlind ? REMEMBER_MS : REMEMBER_UNSEEN_MS);
+    }
+    if (metrics) {
+      offerShots(metrics);
+      app.controls?.take(detail.highs);
+      app.sweep?.take(detail.highs);
+    }
     if (metrics && !app.opening.recording.is_long) {
       app.overview.show(settings.clip, metrics.shots.map(({ start_us, end_us }) => [start_us, end_us]));
     }
@@ -125,7 +159,7 @@ function listen() {
     document.body.classList.add("lost");
   });
   connection.addEventListener("outdated", () => {
-    notice("The server was started anew: open the address that it prints.", "warning", 0);
+    notice("The server was started anew: open the address that it prints.", "warning");
   });
   connection.addEventListener("back", () => {
     document.body.classList.remove("lost");
@@ -141,8 +175,9 @@ function listen() {
     chooseClip(from - margin_us, to + margin_us);
   });
   viewer.addEventListener("moved", (event) => overview.move(/** @type {CustomEvent} */ (event).detail));
+  for (const kind of ["moved", "turned"]) viewer.addEventListener(kind, () => rememberLater(REMEMBER_MS));
   globalThis.addEventListener("pagehide", () => connection.close());
-  globalThis.addEventListener("hashchange", () => location.reload()); // a link that was pasted, or the way back
+  globalThis.addEventListener("hashchange", follow);
 }
 
 // Where there are several shots: the ball that the detail views follow.
@@ -163,13 +198,11 @@ function offerShots(/** @type {RunMetrics} */ { shots }) {
 }
 
 function addTools(/** @type {Opening} */ opening) {
+  startPanels();
   const builtIn = Object.keys(opening.presets);
-  const { recordings, recording, presets } = opening;
-  const names = recordings.map((name) => element("option", { value: name, selected: name === recording.name }, name));
-  byId("recording").replaceChildren(...names);
-  byId("recording").onchange = (/** @type {any} */ { target }) => {
-    location.hash = new URLSearchParams({ recording: target.value }).toString();
-  };
+  const { recording, presets } = opening;
+  app.recordings = new Recordings(recording.name);
+  app.recordings.addEventListener("choose", (/** @type {CustomEvent} */ { detail }) => openOther(detail));
   const options = builtIn.map((name) => element("option", { value: name }, name === "opened" ? "as opened" : name));
   byId("preset").replaceChildren(...options);
   byId("preset").onchange = (/** @type {any} */ { target }) => settings.takePreset(target.value, presets[target.value]);
@@ -178,10 +211,13 @@ function addTools(/** @type {Opening} */ opening) {
   app.sweep = new Sweep(panel("Parameter sweep"), app);
   app.optimization = new Optimization(panel("Optimization"), app);
   app.ball = new Ball(panel("Fixed ball"), app);
-  app.biases = new Biases(panel("Biases"), app);
   app.coach = new Coach(app);
   new Saving(app, builtIn);
-  new Controls(byId("controls"), opening.sections, settings);
+  app.controls = new Controls(byId("controls"), opening, settings);
+  // The paper tunes them, too: after the essential parameters, open where a slider simulates the scene again.
+  const biases = panel("Biases", !opening.biases.locked);
+  byId("controls").querySelector(".section").after(biases.parentElement);
+  app.biases = new Biases(biases, app);
   app.runner.addEventListener("numbers", (/** @type {CustomEvent} */ { detail }) => app.results.show(detail));
   app.biases.addEventListener("taken", resimulated);
   /** @type {[string, () => void][]} */
@@ -194,9 +230,21 @@ function addTools(/** @type {Opening} */ opening) {
     ["discard", () => settings.unpin(true)],
   ];
   for (const [id, act] of buttons) byId(id).onclick = act;
-  document.addEventListener("keydown", shortcuts);
   settings.onChange(showButtons);
   showButtons();
+}
+
+// Asked once for the tab of the browser whether the settings go along to another recording.
+async function openOther(/** @type {string} */ name) {
+  const carried = carriedSettings(app);
+  let answer = sessionStorage.getItem("carry-settings");
+  if (carried.length && answer === null) {
+    const question = `Take the changed settings along, to this and other recordings? ${carried.join(", ")}`;
+    answer = await ask(question, { yes: "Take them along", no: "Open it with its own" });
+    if (answer === null) return;
+    sessionStorage.setItem("carry-settings", answer);
+  }
+  location.hash = linkTo(app, name, answer === "yes" ? carried : []);
 }
 
 function panel(/** @type {string} */ title, open = false) {
@@ -238,21 +286,21 @@ function showButtons() {
   byId("pin").textContent = pinned ? "Pin B as A" : "Pin as A";
 }
 
-function shortcuts(/** @type {KeyboardEvent} */ event) {
-  const typing = /** @type {HTMLElement} */ (event.target).matches?.("input[type=text], input[type=search], textarea");
-  if (!(event.ctrlKey || event.metaKey) || typing) return;
-  const key = event.key.toLowerCase();
-  if (key === "z" && !event.shiftKey) settings.undo();
-  else if ((key === "z" && event.shiftKey) || key === "y") settings.redo();
-  else return;
-  event.preventDefault();
-}
-
 /** @type {number | undefined} */
 let later = undefined;
 function rememberLater(/** @type {number} */ wait_ms) {
   clearTimeout(later);
-  later = setTimeout(async () => history.replaceState(null, "", await linkOf(app)), wait_ms);
+  later = setTimeout(remember, wait_ms);
+}
+
+/** @type {string | null} what the address said last */
+let remembered = null;
+function remember() {
+  if (app.runner.isWaiting) return; // what comes then is remembered
+  const link = linkOf(app);
+  const isStep = remembered !== null && settingsOf(remembered) !== settingsOf(link);
+  if (link !== location.hash) history[isStep ? "pushState" : "replaceState"](null, "", link);
+  remembered = link;
 }
 
 Object.assign(globalThis, { spinscope: app });

@@ -1,28 +1,46 @@
 // Optimization: parameters, an objective, and what was found so far.
 
-/** @import { Opening, Optimization as Found, OptimizationMessage } from "./messages.d.ts" */
+/** @import { HeldOut, Opening, Optimization as Found, OptimizationMessage, Trial } from "./messages.d.ts" */
 /** @import { Connection } from "./server.js" */
+/** @import { Overview } from "./overview.js" */
 /** @import { Settings, Values } from "./settings.js" */
 
 import { Chart } from "./chart.js";
 import { attempt, element, notice, number } from "./elements.js";
+import { get } from "./server.js";
+
+const MOST_CLIPS = 12; // that are tuned at once
+
+/**
+ * As many of all as can be tuned at once, evenly spread.
+ * @template T
+ * @param {T[]} all
+ */
+const spread = (all) =>
+  all.length <= MOST_CLIPS
+    ? all
+    : Array.from({ length: MOST_CLIPS }, (_, i) => all[Math.floor((i * all.length) / MOST_CLIPS)]);
 
 export class Optimization {
   /** @type {string[]} */
   #names = [];
   /** @type {Values | null} parameters before the optimization */
   #before = null;
-  #chart = new Chart();
+  #cost = new Chart();
+  #answers = new Chart();
+  #events = new Chart();
 
   /**
    * @param {any} parent
-   * @param {{connection: Connection, settings: Settings, opening: Opening}} app
+   * @param {{connection: Connection, settings: Settings, opening: Opening, overview: Overview}} app
    */
-  constructor(parent, { connection, settings, opening }) {
+  constructor(parent, { connection, settings, opening, overview }) {
     this.connection = connection;
+    this.recording = opening.recording;
+    this.overview = overview;
     this.settings = settings;
     this.colour = opening.colours.plain;
-    const fit = opening.sections.filter(({ is_setup }) => !is_setup).flatMap(({ controls }) => controls);
+    const fit = opening.sections.flatMap(({ controls }) => controls).filter(({ is_setup }) => !is_setup);
     const options = fit.filter(({ kind }) => kind !== "numbers")
       .map(({ name }) => element("option", { value: name }, name));
     const first = element("option", { value: "" }, "add a parameter ...");
@@ -31,6 +49,9 @@ export class Optimization {
     this.chips = element("div.chips");
     const objectives = opening.objectives.map(({ name, label }) => element("option", { value: name }, label));
     this.objective = element("select", { "aria-label": "Objective" }, ...objectives);
+    const where = { clip: "this clip", shots: "all shots", folder: "all recordings of the folder" };
+    const places = Object.entries(where).map(([value, label]) => element("option", { value }, label));
+    this.where = element("select", { "aria-label": "Tuned on" }, ...places);
     this.trials = element("input.number", { type: "text", value: "30", "aria-label": "trials" });
     this.start = element("button.primary", { onclick: () => attempt(() => this.#start()) }, "Optimize");
     const cancel = () => connection.post("cancel", { kind: "optimization" });
@@ -41,7 +62,7 @@ export class Optimization {
       element("div.row", {}, this.add),
       this.chips,
       element("div.row", {}, "minimise", this.objective),
-      element("div.row", {}, "in", this.trials, "trials"),
+      element("div.row", {}, "on", this.where, "in", this.trials, "trials"),
       element("div.row", {}, this.start, this.stop, this.progress),
       this.found,
     );
@@ -64,7 +85,23 @@ export class Optimization {
   async #start() {
     this.#before = structuredClone(this.settings.parameters);
     const wanted = { names: this.#names, objective: this.objective.value, trials: Number(this.trials.value) || 0 };
-    await this.connection.post("optimization", { ...wanted, ...this.settings.request });
+    const clips_us = this.where.value === "shots" ? this.#shots() : [];
+    const recordings = this.where.value === "folder" ? await this.#recordings() : [];
+    await this.connection.post("optimization", { ...wanted, ...this.settings.request, clips_us, recordings });
+  }
+
+  #shots() {
+    const { start_us, end_us, margin_us, longest_us } = this.recording;
+    return spread(this.overview.shots).map(([from, to]) => {
+      const start = Math.max(Math.round(from) - margin_us, start_us);
+      return [start, Math.min(Math.round(to) + margin_us, end_us, start + longest_us)];
+    });
+  }
+
+  async #recordings() {
+    const folder = this.recording.name.split("/").slice(0, -1).join("/");
+    const { recordings } = await get("/api/folder", { folder });
+    return spread(recordings.map(({ name }) => name));
   }
 
   #receive(/** @type {OptimizationMessage} */ { state, content, error }) {
@@ -73,29 +110,53 @@ export class Optimization {
     if (content?.trials.length) this.#show(content);
   }
 
-  #show(/** @type {Found} */ { trials, total, best, values }) {
+  #show(/** @type {Found} */ { trials, total, clips, best, values, held_out, skipped }) {
     this.progress.value = trials.length / total;
-    let least = Infinity;
-    const soFar = trials.map((cost, i) => ({ x: i + 1, y: least = Math.min(least, cost) }));
-    const each = trials.map((cost, i) => ({ x: i + 1, y: cost, label: `trial ${i + 1}` }));
-    const series = [
-      { name: "trial", colour: "#93a0ac", points: each },
-      { name: "lowest so far", colour: this.colour, points: soFar },
-    ];
-    attempt(() => this.#chart.draw({ title: "Objective", x: "trial", y: "", series, fromZero: true }));
+    const [first] = trials;
+    const label = (/** @type {Trial} */ { objection }, /** @type {number} */ i) =>
+      objection ? `trial ${i + 1}, never proposed: ${objection}` : `trial ${i + 1}`;
+    const cost = { title: "Objective", x: "trial", y: "", fromZero: true, series: this.#series(trials, label) };
+    const against = (/** @type {(trial: Trial) => number} */ share) =>
+      this.#series(trials, label, share).map((one) => ({ ...one, lines: false }));
+    const answers = against((trial) => 100 * trial.answers);
+    const events = against((trial) => trial.logo_events);
+    attempt(() => this.#cost.draw(cost));
+    attempt(() => this.#answers.draw({ title: "Objective against answers", x: "answers [%]", y: "", series: answers }));
+    attempt(() => this.#events.draw({ title: "Objective against evidence", x: "logo events", y: "", series: events }));
     const rows = Object.entries(values)
       .map(([name, value]) => element("tr", {}, element("th", {}, name), element("td", {}, number(value))));
     const take = element("button.primary", { onclick: () => this.#take(values) }, "Apply the best values");
     const undo = { onclick: () => this.#before && this.settings.setAll(this.#before), disabled: !this.#before };
     const back = element("button", undo, "Restore the previous values");
-    const text = `Lowest so far ${number(best, 3)}; the starting values gave ${number(trials[0], 3)}.`;
-    const table = element("table.numbers", {}, ...rows);
+    const refused = trials.filter(({ objection }) => objection).length;
+    const texts = [
+      `Lowest on ${clips === 1 ? "one clip" : `${clips} clips`} ${number(best, 3)}; ` +
+      `the starting values gave ${number(first.cost, 3)}.`,
+      refused ? `${refused} of ${trials.length} trials lost an answer or half of the logo events: not proposed.` : "",
+      trials.length === total ? heldOut(held_out) : "",
+      ...skipped.map((text) => `Left out: ${text}`),
+    ];
     this.found.replaceChildren(
-      this.#chart.node,
-      element("p.note", {}, text),
-      table,
+      ...texts.filter(Boolean).map((text) => element("p.note", {}, text)),
+      element("table.numbers", {}, ...rows),
       element("div.row", {}, take, back),
+      ...[this.#cost, this.#answers, this.#events].map(({ node }) => node),
     );
+  }
+
+  /**
+   * The trials that may be proposed and those that may not, over their numbers or over something else.
+   * @param {Trial[]} trials
+   * @param {(trial: Trial, i: number) => string} label
+   * @param {(trial: Trial, i: number) => number} x
+   */
+  #series(trials, label, x = (_, i) => i + 1) {
+    const points = trials.map((trial, i) => ({ x: x(trial, i), y: trial.cost, label: label(trial, i) }));
+    const of = (/** @type {boolean} */ isProposable) => points.filter((_, i) => !trials[i].objection === isProposable);
+    return [
+      { name: "trial", colour: this.colour, points: of(true) },
+      { name: "never proposed", colour: "#93a0ac", points: of(false), lines: false },
+    ];
   }
 
   #take(/** @type {Record<string, any>} */ values) {
@@ -107,4 +168,12 @@ export class Optimization {
     }
     this.settings.setAll(changes);
   }
+}
+
+function heldOut(/** @type {HeldOut | null} */ held) {
+  if (!held) return "No part was held out, or nothing better was found: check the values on another recording.";
+  const where = `On ${held.clips === 1 ? "one clip" : `${held.clips} clips`} held out`;
+  if (held.objection) return `${where} they fail (${held.objection}): nothing is proposed.`;
+  const verdict = held.after <= held.before ? "" : " They do worse where they were not tuned: do not trust them.";
+  return `${where}: ${number(held.after, 3)}, before ${number(held.before, 3)}.${verdict}`;
 }

@@ -14,10 +14,12 @@ export class Overview extends EventTarget {
   clip = [0, 0];
   /** @type {Span[]} */
   shots = [];
+  playhead_us = 0;
 
   constructor(/** @type {any} */ parent, /** @type {RecordingDescription} */ recording) {
     super();
-    this.svg = drawing("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "none" });
+    const role = { role: "slider", tabindex: 0, "aria-label": "Playhead" };
+    this.svg = drawing("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "none", ...role });
     this.chosen = drawing("rect", { class: "chosen", y: 0, height: HEIGHT });
     this.bands = drawing("g");
     this.drag = drawing("rect", { class: "drag", y: 0, height: HEIGHT, width: 0 });
@@ -35,6 +37,7 @@ export class Overview extends EventTarget {
     this.recording = recording;
     this.curve.replaceChildren(this.#curve());
     this.show(recording.clip_us, []);
+    this.move(null);
   }
 
   show(/** @type {Span} */ clip, /** @type {Span[]} */ shots, words = "") {
@@ -49,9 +52,30 @@ export class Overview extends EventTarget {
   }
 
   move(/** @type {number | null} */ time_us) {
-    const x = String(this.#x(time_us ?? this.recording.start_us));
+    const { start_us, end_us } = this.recording;
+    const at_us = time_us ?? start_us;
+    const x = String(this.#x(at_us));
+    this.playhead_us = at_us;
+    const values = {
+      valuemin: start_us,
+      valuemax: end_us,
+      valuenow: at_us,
+      valuetext: `${(at_us / 1000).toFixed(1)} ms`,
+    };
+    for (const [name, value] of Object.entries(values)) this.svg.setAttribute(`aria-${name}`, String(value));
     this.playhead.setAttribute("x1", x);
     this.playhead.setAttribute("x2", x);
+  }
+
+  // To the start of the shot before or after the present one; of a long recording, to work on it.
+  goToShot(/** @type {-1 | 1} */ direction) {
+    const [from_us, to_us] = this.clip;
+    const inside = this.shots.find(([start, end]) => from_us <= start && end <= to_us);
+    const here_us = this.recording.is_long ? inside?.[0] ?? from_us : this.playhead_us;
+    const shots = direction > 0 ? this.shots : [...this.shots].reverse();
+    const next = shots.find(([start]) => direction * (start - here_us) > 0);
+    if (next && this.recording.is_long) this.#tell("shot", next);
+    else if (next) this.#tell("seek", next[0]);
   }
 
   #x(/** @type {number} */ time_us) {

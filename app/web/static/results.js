@@ -46,8 +46,8 @@ export class Results extends EventTarget {
     const { run_metrics, shot_metrics, methods, estimate_metrics } = this.opening;
     const shots = both.map(mainShot);
     const rows = [
-      ...run_metrics.map((metric) => row(metric.label, both.map((one) => shown(one, metric)), metric.help)),
-      ...shot_metrics.map((metric) => row(metric.label, shots.map((shot) => shown(shot, metric)), metric.help)),
+      ...run_metrics.map((metric) => row(metric.label, compared(both, metric), metric.help)),
+      ...shot_metrics.map((metric) => row(metric.label, compared(shots, metric), metric.help)),
     ];
     const errors = estimate_metrics.filter(({ name }) => name.startsWith("error_"));
     for (
@@ -56,17 +56,21 @@ export class Results extends EventTarget {
       )
     ) {
       const estimates = shots.map((shot) => shot?.spin[name]);
-      const heading = element("th", { colSpan: 1 + both.length, style: `color: ${colour}`, title: help }, label);
+      const swatch = element("i.swatch", { style: `background: ${colour}` });
+      const heading = element("th", { colSpan: 2 * both.length, title: help }, swatch, label);
       rows.push(element("tr.method", {}, heading));
       const trusted = shots.map((shot) => shot?.best === name);
-      const spins = row("spin", estimates.map((e, i) => spin(e) + (trusted[i] ? " ✔ trusted" : "")), SPIN_HELP);
-      const axes = row("axis", estimates.map(axis), AXIS_HELP);
+      const magnitudes = estimates.map((e, i) => spin(e) + (trusted[i] ? " ✔ trusted" : ""));
+      const apart = estimates.length > 1;
+      const spins = row("spin", apart ? [...magnitudes, spinDifference(estimates)] : magnitudes, SPIN_HELP);
+      const directions = estimates.map(axis);
+      const axes = row("axis", apart ? [...directions, axisDifference(estimates)] : directions, AXIS_HELP);
       for (const one of [spins, axes]) {
         trusted.forEach((is, i) => one.cells[1 + i].classList.toggle("doubted", !is));
         rows.push(one);
       }
       for (const metric of errors) {
-        const values = estimates.map((estimate) => shown(estimate, metric));
+        const values = compared(estimates, metric);
         if (values.some((value) => value !== "–")) rows.push(row(metric.label.toLowerCase(), values, metric.help));
       }
     }
@@ -74,7 +78,10 @@ export class Results extends EventTarget {
     const counts = both.map(({ shots: all }) => (all.length > 1 ? `${all.length} shots, the largest` : ""));
     const columns = both.length > 1 ? ["A", "B"] : [""];
     const names = columns.map((c, i) => [c, counts[i]].filter(Boolean).join(": "));
-    return element("table.numbers", {}, names.some(Boolean) ? headings("Result", names) : null, ...rows);
+    if (both.length > 1) names.push("B − A");
+    const heading = headings("Whole shot", names);
+    heading.title = "All results here are of the whole shot; the pictures show what is known so far at the playhead.";
+    return element("table.numbers", {}, heading, ...rows);
   }
 }
 
@@ -107,6 +114,31 @@ function shown(/** @type {any} */ of, /** @type {MetricInfo} */ { name, unit }) 
   const value = of?.[name];
   if (value === null || value === undefined) return "–";
   return unit === "%" ? `${Math.round(100 * value)} %` : [number(value, 3), unit].filter(Boolean).join(" ");
+}
+
+/**
+ * A metric of A and B, and what B has more; of B alone by itself.
+ * @param {any[]} both
+ * @param {MetricInfo} metric
+ */
+function compared(both, metric) {
+  const values = both.map((one) => shown(one, metric));
+  if (both.length < 2) return values;
+  const [a, b] = both.map((one) => one?.[metric.name] ?? NaN);
+  const more = Number.isFinite(b - a) ? shown({ [metric.name]: b - a }, metric) : "–";
+  return [...values, more.replace("-", "−")];
+}
+
+function spinDifference(/** @type {(EstimateMetrics | undefined)[]} */ [a, b]) {
+  if (!a?.magnitude_rps || !b?.magnitude_rps) return "–";
+  return `${(b.magnitude_rps - a.magnitude_rps).toFixed(2).replace("-", "−")} rps`;
+}
+
+// Angle between the signed axes.
+function axisDifference(/** @type {(EstimateMetrics | undefined)[]} */ [a, b]) {
+  if (!a?.axis || !b?.axis) return "–";
+  const along = a.axis.reduce((sum, value, i) => sum + value * (b.axis?.[i] ?? 0), 0);
+  return `${((180 / Math.PI) * Math.acos(Math.min(Math.max(along, -1), 1))).toFixed(1)}° apart`;
 }
 
 function spin(/** @type {EstimateMetrics | undefined} */ estimate) {

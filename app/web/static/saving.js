@@ -35,7 +35,6 @@ export class Saving {
     const buttons = entries.map(([label, work]) => element("button", { onclick: act(work) }, label));
     menu.querySelector(".items").append(...buttons, this.file);
     document.addEventListener("pointerdown", (event) => menu.contains(event.target) || (menu.open = false));
-    document.addEventListener("keydown", ({ key }) => key === "Escape" && (menu.open = false));
   }
 
   #fetch(/** @type {string} */ name) {
@@ -48,13 +47,13 @@ export class Saving {
   }
 
   async #copyLink() {
-    await copied(new URL(await linkOf(this.app, true), location.href).toString(), "The link");
+    await copied(new URL(linkOf(this.app), location.href).toString(), "The link");
   }
 
   async #copyCommand() {
     const { command, needs } = await this.#written();
     await copied(command, "The command");
-    if (needs) notice(`It needs the biases as ${needs} beside it: Biases, Save .bias.`, "info", 12);
+    if (needs) notice(`It needs the biases as ${needs} beside it: Biases, Save .bias.`, "info", 0);
   }
 
   async #savePreset() {

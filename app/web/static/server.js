@@ -1,13 +1,14 @@
 // Requests to the server, the stream of its messages, and the run requests: from changed settings to the new picture.
 
-/** @import { Opening, Picture, Posts, RunMessage, ServerMessages, SessionGets, SessionPosts } from "./messages.d.ts" */
+/** @import { Dropped, Gets, Opening, Picture, Posts, RunMessage, ServerMessages, SessionGets, SessionPosts } from "./messages.d.ts" */
 /** @import { Settings } from "./settings.js" */
 /** @import { Viewer } from "./viewer.js" */
 
-import { notice, pause } from "./elements.js";
+import { byId, notice, pause } from "./elements.js";
 
 const REOPEN_MS = 700;
 const PATIENCE_MS = 5000; // as long as a picture takes to draw where there is no graphics card
+const NARROW_PX = 900; // a pane's buttons take 120 px of its title: a quarter of less leaves too few letters
 const NUMBERS_MS = 1000; // as long as numbers wait for their picture
 
 export class Refused extends Error {
@@ -38,6 +39,27 @@ export async function post(path, content) {
   const headers = { "content-type": "application/json" };
   const response = await answered(await fetch(path, { method: "POST", headers, body: JSON.stringify(content) }));
   return response.json();
+}
+
+/**
+ * @template {keyof Gets} P
+ * @param {P} path
+ * @param {Record<string, string>} query
+ * @returns {Promise<Gets[P]["answered"]>}
+ */
+export async function get(path, query) {
+  return (await answered(await fetch(`${path}?${new URLSearchParams(query)}`))).json();
+}
+
+/**
+ * Copies a file to the server.
+ * @param {File} file
+ * @returns {Promise<Dropped>}
+ */
+export async function upload(file) {
+  const headers = { "content-type": "application/octet-stream" };
+  const path = `/api/drop?${new URLSearchParams({ name: file.name })}`;
+  return (await answered(await fetch(path, { method: "POST", headers, body: file }))).json();
 }
 
 // The session on the server: opens it, listens to its messages, opens it anew when the server comes back.
@@ -140,6 +162,8 @@ export class RunRequests extends EventTarget {
   /** @type {number | null} number of the shot whose ball the detail views follow */
   followed = null;
   #hasLayout = false;
+  /** @type {string | null} what the ranges and panes of the layout were made for */
+  #layoutOf = null;
   #dirty = false;
   #settled = false;
   /** @type {string | null} what was requested last */
@@ -147,6 +171,7 @@ export class RunRequests extends EventTarget {
   #sending = false;
   #sentAt = 0;
   #running = false;
+  #isPreviewed = false;
   /** @type {number | undefined} */
   #timer = undefined;
   /** @type {string | null} the newest picture */
@@ -156,7 +181,7 @@ export class RunRequests extends EventTarget {
    * @param {Connection} connection
    * @param {Settings} settings
    * @param {Viewer} viewer
-   * @param {{layout: string, time_us: number | null}} start path of the layout, and where the playhead is at first
+   * @param {{tab: string, hasTools: boolean, time_us: number | null}} start tab in front and playhead at first
    */
   constructor(connection, settings, viewer, start) {
     super();
@@ -165,7 +190,13 @@ export class RunRequests extends EventTarget {
     this.viewer = viewer;
     this.start = start;
     connection.on("run", (message) => this.#receive(message));
+    connection.on("preview", ({ serial }) => this.#follow(serial));
     settings.onChange((settled) => this.#change(settled));
+  }
+
+  // Whether a picture is on its way.
+  get isWaiting() {
+    return this.#running && !this.isBlind;
   }
 
   follow(/** @type {number | null} */ shot) {
@@ -194,8 +225,10 @@ export class RunRequests extends EventTarget {
   #schedule() {
     clearTimeout(this.#timer);
     if (!this.#dirty || this.#sending) return;
-    // While a slider is dragged its last picture is awaited; a change that is meant to stay does not wait.
-    const wait_ms = this.#settled || !this.#running ? 0 : this.#sentAt + PATIENCE_MS - performance.now();
+    // While a slider is dragged its last preview is awaited; a change that is meant to stay does not wait.
+    const wait_ms = this.#settled || this.#isPreviewed || !this.#running
+      ? 0
+      : this.#sentAt + PATIENCE_MS - performance.now();
     if (wait_ms <= 0) this.#send();
     else this.#timer = setTimeout(() => this.#schedule(), wait_ms);
   }
@@ -204,6 +237,7 @@ export class RunRequests extends EventTarget {
     const interactive = !this.#settled;
     this.#dirty = this.#settled = false;
     this.#sending = this.#running = true;
+    this.#isPreviewed = false;
     this.#sentAt = performance.now();
     this.#last = this.#wanted;
     const playhead_us = this.viewer.playhead_us;
@@ -222,6 +256,13 @@ export class RunRequests extends EventTarget {
     }
   }
 
+  // A preview is enough to let a dragged slider go on: the viewer follows when it rests.
+  #follow(/** @type {number} */ serial) {
+    if (serial !== this.serial) return;
+    this.#isPreviewed = true;
+    this.#schedule();
+  }
+
   async #receive(/** @type {RunMessage} */ message) {
     const { serial, state, picture } = message;
     if (serial !== this.serial) return;
@@ -232,7 +273,7 @@ export class RunRequests extends EventTarget {
       this.#tell("numbers", message);
       return;
     }
-    const seen = this.#show(picture);
+    const seen = this.#show(picture, state === "done");
     // For any change of the page the browser composes all of it anew: numbers come with their picture.
     if (this.#hasLayout) await Promise.race([seen.catch(() => {}), pause(NUMBERS_MS)]);
     this.#tell("numbers", message);
@@ -242,15 +283,28 @@ export class RunRequests extends EventTarget {
   }
 
   /**
-   * Fetches and shows a picture; false where a newer one took its place.
+   * Fetches and shows a picture, of a run that is whole or not; false where a newer one took its place.
    * @param {Picture} picture
+   * @param {boolean} isWhole
    */
-  async #show(picture) {
+  async #show(picture, isWhole) {
     this.#latest = picture.id;
     try {
       const content = await this.connection.bytes(`pictures/${picture.id}`);
       if (this.#latest !== picture.id) return false;
-      if (!this.#hasLayout) await this.viewer.layout(await this.connection.bytes(this.start.layout));
+      // Ranges and panes of the layout are those of a clip, and of a ball in flight or in place.
+      const { ball, fixed_radius_px } = this.settings.parameters.track;
+      const narrow = byId("viewer").clientWidth < NARROW_PX;
+      const layoutOf = JSON.stringify([this.settings.clip, ball, fixed_radius_px, narrow]);
+      if (layoutOf !== this.#layoutOf && (isWhole || !this.#hasLayout)) {
+        const query = new URLSearchParams({
+          tab: this.viewer.front ?? this.start.tab,
+          tools: String(this.start.hasTools),
+          narrow: String(narrow),
+        });
+        await this.viewer.layout(await this.connection.bytes(`layout?${query}`));
+        this.#layoutOf = layoutOf;
+      }
       await this.viewer.show(content, picture.id, (!this.#hasLayout && this.start.time_us) || picture.opening_us);
       if (!this.#hasLayout) await this.viewer.tab(); // until the layout is there: before it, one of the viewer's own
       this.#hasLayout = true;

@@ -91,6 +91,12 @@ export class Settings extends EventTarget {
     this.#changed(true);
   }
 
+  // What a link says; undo leads back from it.
+  restore(/** @type {Snapshot} */ snapshot) {
+    Object.assign(this, copy(snapshot));
+    this.#changed(true);
+  }
+
   pin() {
     this.pinned = copy(this.parameters);
     this.#changed(true);

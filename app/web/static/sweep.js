@@ -15,6 +15,8 @@ export class Sweep {
   #charts = new Map();
   /** @type {Map<string, ControlInfo>} */
   #controls = new Map();
+  /** @type {Record<string, number>} */
+  #highs = {};
 
   /**
    * @param {any} parent
@@ -48,10 +50,21 @@ export class Sweep {
     settings.onChange((settled) => settled && this.#draw());
   }
 
+  // Upper ends that make sense for the ball that is seen.
+  take(/** @type {Record<string, number>} */ highs) {
+    const isAsOffered = this.high.value === String(this.#top);
+    this.#highs = highs;
+    if (isAsOffered) this.#range();
+  }
+
+  get #top() {
+    return this.#highs[this.which.value] ?? this.#controls.get(this.which.value)?.high ?? "";
+  }
+
   #range() {
     const { low, high, scale } = /** @type {ControlInfo} */ (this.#controls.get(this.which.value));
     this.low.value = low ?? "";
-    this.high.value = high ?? "";
+    this.high.value = this.#top;
     this.range.hidden = scale === "none" && low === null && high === null;
   }
 

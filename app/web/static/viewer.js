@@ -39,7 +39,9 @@ function keepPictures() {
 
 const storeOf = (/** @type {string} */ id) => `Recording:${APPLICATION}:${id}`;
 
-// Event: `moved` with the playhead's time in us.
+const CLICKED_MS = 300; // until a click on a tab has been painted
+
+// Events: `moved` with the playhead's time in us, `turned` to another tab.
 export class Viewer extends EventTarget {
   /** @type {any} */
   #viewer = null;
@@ -58,6 +60,9 @@ export class Viewer extends EventTarget {
   #time_ns = null;
   /** @type {PlayState} */
   #play = "paused";
+  /** @type {string | null} name of the tab in front */
+  front = null;
+  #isAlone = false;
 
   /**
    * Loads the viewer; whatever else is asked of it meanwhile waits.
@@ -77,9 +82,20 @@ export class Viewer extends EventTarget {
     const base_url = new URL(`/rerun/${version}/`, location.href).toString();
     const size = { width: "100%", height: "100%" };
     const plain = { hide_welcome_screen: true, notebook: true, allow_fullscreen: false, theme: "dark" };
+    const focused = /** @type {HTMLElement | null} */ (document.activeElement);
     await viewer.start(null, parent, { base_url, ...size, ...plain });
     await ready;
+    // The viewer's own field for what is typed into it, which is not to be seen and no stop of Tab.
+    for (const field of document.querySelectorAll("body > input")) {
+      field.setAttribute("aria-label", "Typing into the viewer");
+      field.setAttribute("tabindex", "-1");
+    }
+    viewer.canvas.blur(); // it takes the focus from whoever has begun to work
+    focused?.focus();
     this.#viewer = viewer;
+    viewer.canvas.tabIndex = 0;
+    viewer.canvas.setAttribute("role", "application");
+    viewer.canvas.setAttribute("aria-label", "Viewer of all stages; Tab and Escape leave it");
     this.#channel = viewer.open_channel("spinscope");
     this.#follow();
     for (const panel of ["top", "blueprint", "selection"]) viewer.override_panel_state(panel, "hidden");
@@ -107,6 +123,9 @@ export class Viewer extends EventTarget {
     told("time_update", ({ time }) => this.#moved(time));
     told("play", () => (this.#play = "playing"));
     told("pause", () => (this.#play = "paused"));
+    // It does not tell of its tabs.
+    const look = () => setTimeout(() => this.#isAlone || this.tab().catch(() => {}), CLICKED_MS);
+    this.#viewer.canvas.addEventListener("pointerup", look);
   }
 
   #moved(/** @type {number} */ time_ns) {
@@ -192,9 +211,15 @@ export class Viewer extends EventTarget {
     });
   }
 
+  // The playhead of a link: where the next recording is shown at, and the present one, too.
+  place(/** @type {number} */ time_us) {
+    this.#moved(Math.round(time_us * 1000));
+    return this.seek(time_us);
+  }
+
   seek(/** @type {number} */ time_us, /** @type {PlayState} */ play_state = "paused") {
     return this.#next(async () => {
-      if (this.#shown === null) return;
+      if (this.#shown === null) return this.#moved(Math.round(time_us * 1000)); // where the first recording is shown
       const duration_nanos = BigInt(Math.round(time_us * 1000));
       await this.#viewer.set_time({ recording: storeOf(this.#shown), timeline: TIMELINE, duration_nanos, play_state });
     });
@@ -202,6 +227,22 @@ export class Viewer extends EventTarget {
 
   play(/** @type {PlayState} */ play_state) {
     return this.#next(() => this.#viewer.set_time({ play_state }));
+  }
+
+  toggle() {
+    return this.play(this.#play === "playing" ? "paused" : "playing");
+  }
+
+  bringToFront(/** @type {string} */ title) {
+    return this.#next(async () => {
+      if (this.#shown === null) return;
+      const blueprint = await this.#layout();
+      const tab = tabs(blueprint).find((one) => one.title === title);
+      if (!tab || tab.front) return;
+      rootOf(blueprint).active_tab = tab.path;
+      await this.#take(blueprint);
+      this.#turned(title);
+    });
   }
 
   /**
@@ -216,6 +257,7 @@ export class Viewer extends EventTarget {
       const blueprint = await this.#layout();
       const tab = tabs(blueprint).find(({ title }) => title === name);
       if (!tab) return null;
+      this.#isAlone = true;
       await this.#take(only(blueprint, tab.id, left_out));
       this.#viewer.override_panel_state("time", "hidden");
       return blueprint;
@@ -226,6 +268,7 @@ export class Viewer extends EventTarget {
     return this.#next(async () => {
       this.#viewer.override_panel_state("time", null);
       if (blueprint) await this.#take(blueprint);
+      this.#isAlone = false;
     });
   }
 
@@ -250,7 +293,14 @@ export class Viewer extends EventTarget {
   // The name of the tab in front.
   async tab() {
     const blueprint = await this.#layout();
-    return tabs(blueprint).find(({ front }) => front)?.title ?? null;
+    this.#turned(tabs(blueprint).find(({ front }) => front)?.title ?? null);
+    return this.front;
+  }
+
+  #turned(/** @type {string | null} */ title) {
+    if (title === this.front) return;
+    this.front = title;
+    this.dispatchEvent(new CustomEvent("turned", { detail: title }));
   }
 
   // PNG of what is seen. The canvas keeps its picture until the browser has shown it: it is copied right after it
@@ -284,14 +334,15 @@ function rootOf(/** @type {Blueprint} */ blueprint) {
 /**
  * The tabs of the layout.
  * @param {Blueprint} blueprint
- * @returns {{id: string, title: string | undefined, front: boolean}[]}
+ * @returns {{id: string, path: string, title: string | undefined, front: boolean}[]}
  */
 function tabs(blueprint) {
   const root = rootOf(blueprint);
-  return (root.contents ?? []).map((/** @type {string} */ path) => {
+  // Of one view the viewer names it alone, not in a list.
+  return [root.contents ?? []].flat().map((/** @type {any} */ path) => {
     const id = path.split("/").pop();
     const title = blueprint[`/container/${id}`]?.ContainerBlueprint.display_name;
-    return { id, title, front: root.active_tab === path };
+    return { id, path, title, front: root.active_tab === path };
   });
 }
 

@@ -53,7 +53,9 @@ def test_the_shown_arrow_points_along_the_trusted_spin(flight: ViewedRun, logged
     estimate = tick.estimates[tick.best]
     (arrow,) = logged[entities.SPIN_SHOWN].at("vectors", tick.packet.end_us)
     np.testing.assert_allclose(np.array(arrow) / np.linalg.norm(arrow), estimate.axis, atol=1e-5)
-    assert logged[entities.SPIN_SHOWN].at("labels", tick.packet.end_us) == [f"{estimate.magnitude_rps:.1f} rps"]
+    (label,) = logged[entities.SPIN_SHOWN].at("labels", tick.packet.end_us)
+    is_final = flight.ticks.index(tick) in flight.final_shots
+    assert label == f"{estimate.magnitude_rps:.1f} rps{'' if is_final else ', so far'}"
     (ring,) = np.array(logged[entities.SPIN_RING].at("strips", tick.packet.end_us))
     sense = np.cross(ring[0], ring[1]) @ estimate.axis
     assert sense > 0  # the ring runs the way the ball turns
@@ -61,8 +63,8 @@ def test_the_shown_arrow_points_along_the_trusted_spin(flight: ViewedRun, logged
 
 def test_an_arrow_that_is_not_trusted_is_pale_and_says_so(flight: ViewedRun) -> None:
     vectors = [np.array([0.0, 0.0, 20.0])] * len(flight.ticks)
-    trusted = [row % 2 == 0 for row in range(len(flight.ticks))]
-    _, drawn = _arrow(flight, entities.SPIN_SHOWN, vectors, entities.RING_COLOUR, 0.06, trusted)
+    notes = ["" if row % 2 == 0 else ", not trusted" for row in range(len(flight.ticks))]
+    _, drawn = _arrow(flight, entities.SPIN_SHOWN, vectors, entities.RING_COLOUR, 0.06, notes)
     columns = drawn.to_record_batch().to_pydict()
     labels = next(value for name, value in columns.items() if name.endswith("labels"))
     colours = next(value for name, value in columns.items() if name.endswith("colors"))

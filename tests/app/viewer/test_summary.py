@@ -104,7 +104,7 @@ def test_doubt_and_warnings_are_said(flight: ViewedRun, tmp_path: Path) -> None:
     text = said(logged_by(doubtful, tmp_path), flight.ticks[12].packet.end_us)
     assert "no method is trusted" in text
     assert "seven hot pixels" in text
-    card = _TickState(doubtful, ticks[12], None, None).card()
+    card = _TickState(doubtful, ticks[12], None, None).card("so far")
     assert (card[0][0], card[2][0]) == ("-", "Spin not known"), "big numbers are trusted ones"
 
 

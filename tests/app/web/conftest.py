@@ -18,6 +18,8 @@ from spinscope.app.web.application import application
 from spinscope.app.web.server import listening_socket
 from spinscope.pipeline.session import Choices
 
+from .browser_tab import CHROMIUM, FLAGS, SIZE, Tab
+
 PATIENCE_S = 120.0  # the first run on a machine compiles the kernels
 
 
@@ -146,3 +148,33 @@ def client(tuner: Served) -> Iterator[Client]:
     made = tuner.open()
     yield made
     tuner.close(made)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """One chromium for all tests."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        made = playwright.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
+        yield made
+        made.close()
+
+
+@pytest.fixture(scope="module")
+def server(flight: Path) -> Iterator[Served]:
+    """A tuner of its own: the tests stop and start it."""
+    made = served(flight)
+    yield made
+    made.stop()
+
+
+@pytest.fixture(scope="module")
+def tab(browser: Any, server: Served) -> Iterator[Tab]:
+    """The page with its viewer, on the tracker's tab, which draws fastest."""
+    context = browser.new_context(viewport=SIZE)
+    made = Tab(context.new_page())
+    made.open(f"{server.address}#tab=Tracker")
+    made.settled("shown")
+    yield made
+    context.close()

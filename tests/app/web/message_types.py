@@ -43,10 +43,12 @@ def declarations() -> str:
     members = [f'  "{schemas[name]["properties"]["kind"]["const"]}": {name};' for name in kinds]
     parts.append("/** Messages of the server by their kind. */\nexport interface ServerMessages {\n")
     parts[-1] += "\n".join(members) + "\n}"
+    others = {path: one for path, one in api["paths"].items() if not path.startswith(SESSION)}
     parts += [
         _routes("SessionPosts", "post", api["paths"], SESSION),
         _routes("SessionGets", "get", api["paths"], SESSION),
-        _routes("Posts", "post", {path: one for path, one in api["paths"].items() if not path.startswith(SESSION)}, ""),
+        _routes("Posts", "post", others, ""),
+        _routes("Gets", "get", others, ""),
         _routes("CoachPosts", "post", coach["paths"], COACH),
         _routes("CoachGets", "get", coach["paths"], COACH),
     ]

@@ -309,6 +309,21 @@ def test_the_command_line_gives_the_same_numbers(client: Client) -> None:
     assert theirs["parameters"] == mine["parameters"]
 
 
+def test_a_preview_comes_before_the_picture_and_at_any_time_after(client: Client) -> None:
+    client.run({"logo": {"pad_px": 3.0}}, playhead_us=40_000.0, interactive=True)
+    pictured = [message["kind"] for message in client.messages if message.get("picture")]
+    assert pictured[0] == "preview" and "run" in pictured
+    shown = next(message for message in client.messages if message["kind"] == "preview")
+    assert 40_000 <= shown["t_us"] < 40_000 + 2 * 5000 and "rps so far" in shown["words"]
+    assert shown["picture"].startswith("data:image/png;base64,")
+    later = client.http.get(client.path("preview?t_us=60000.5")).json()
+    assert later["t_us"] <= 60_000 < later["t_us"] + 2 * 5000 and later["picture"] != shown["picture"]
+    assert (
+        client.http.get(client.path("preview?t_us=-1e9")).json()["t_us"]
+        <= 5000 + client.opening["recording"]["start_us"]
+    )
+
+
 def test_results_go_out_as_tables_and_as_a_recording(client: Client, tmp_path: Path) -> None:
     assert client.http.get(client.path("export/results.json")).status_code == 409
     client.run()

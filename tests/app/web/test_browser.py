@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,143 +14,10 @@ import pytest
 from spinscope.pipeline.registry import STAGES, default_stages, needed_stages
 from spinscope.pipeline.simulated_recordings import simulate_to_file
 
+from .browser_tab import SIZE, Tab, bare_tab, needs_browser, serious
 from .conftest import Served, served
 
-CHROMIUM = Path("/usr/bin/chromium")
-FLAGS = [
-    "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-dev-shm-usage",
-]
-SIZE = {"width": 1000, "height": 620}  # software drawing is slow: a small window
-PATIENCE_MS = 240_000  # a loaded machine draws a hundred times slower
-
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.skipif(not CHROMIUM.exists(), reason=f"there is no browser at {CHROMIUM}"),
-]
-
-
-class Tab:
-    """A tab with the page in it."""
-
-    def __init__(self, page: Any) -> None:
-        self.page = page
-        self.requests: list[str] = []
-        self.errors: list[str] = []
-        page.set_default_timeout(PATIENCE_MS)
-        page.on("request", lambda request: self.requests.append(request.url))
-        page.on("pageerror", lambda error: self.errors.append(str(error)))
-        page.add_init_script(
-            """window.violations = [];
-            document.addEventListener("securitypolicyviolation", ({ violatedDirective, blockedURI, sourceFile }) =>
-                window.violations.push(`${violatedDirective}: ${blockedURI} ${sourceFile}`));"""
-        )
-
-    def open(self, address: str) -> None:
-        self.page.goto(address)
-        self.page.wait_for_selector("body[data-done]", state="attached")
-
-    @property
-    def serial(self) -> int:
-        """The newest request that the page has sent."""
-        return int(self.page.evaluate("window.spinscope.runner.serial"))
-
-    def settled(self, what: str = "done") -> None:
-        """Wait until the newest request is done: computed (done) or to be seen (shown)."""
-        self.until(
-            f"document.body.dataset.{what} === String(window.spinscope.runner.serial)",
-            lambda: f"not {what}: {self.page.inner_text('#bar')} {self.page.inner_text('#notices')}",
-        )
-
-    def after(self, act: Any, what: str = "done") -> None:
-        """Do something that makes the page send a request, and wait until that is done."""
-        before = self.serial
-        act()
-        self.until(f"window.spinscope.runner.serial > {before}", lambda: "nothing was asked of the server")
-        self.settled(what)
-
-    def slide(self, name: str, key: str = "ArrowUp", what: str = "done") -> None:
-        """Press a key on a slider."""
-        slider = self.page.locator(f"[data-name='{name}'] input[type=range]")
-        slider.evaluate("(slider) => { slider.closest('details').open = true; }")
-        self.after(lambda: slider.press(key), what)
-
-    def until(self, holds: str, says: Callable[[], str] | None = None) -> None:
-        """Wait until an expression holds in the page; what is said where it never does."""
-        end = time.monotonic() + PATIENCE_MS / 1000
-        while not self.page.evaluate(holds):
-            assert time.monotonic() < end, says() if says else holds
-            self.page.wait_for_timeout(30)
-
-    def value(self, name: str) -> Any:
-        return self.page.evaluate(f"window.spinscope.settings.get('{name}')")
-
-    def computed(self) -> set[str]:
-        """The stages whose cells in the bar say that they ran."""
-        cells = self.page.locator("#bar .stage:not(.kept)")
-        return {cell.get_attribute("data-stage") for cell in cells.all()} - {"drawing"}
-
-    def where(self) -> dict[str, Any]:
-        """Playhead (us) and play state of the viewer."""
-        found: dict[str, Any] = self.page.evaluate(
-            """window.spinscope.viewer.api.get_state().then((state) => {
-                const found = state.recordings.find(({ store_id }) => store_id === state.active_store_id);
-                const { time } = found.current_time;
-                return { time: Number(typeof time === "object" ? time.value : time) / 1000, play: found.play_state };
-            })"""
-        )
-        return found
-
-    def panel(self, title: str) -> Any:
-        """A panel of the right side, opened."""
-        details = self.page.locator(f"#side details[data-title='{title}']")
-        if details.get_attribute("open") is None:
-            details.locator("> summary").click()
-        return details
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    """One chromium for all tests."""
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        made = playwright.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
-        yield made
-        made.close()
-
-
-@pytest.fixture(scope="module")
-def server(flight: Path) -> Iterator[Served]:
-    """A tuner of its own: the tests stop and start it."""
-    made = served(flight)
-    yield made
-    made.stop()
-
-
-@pytest.fixture(scope="module")
-def tab(browser: Any, server: Served) -> Iterator[Tab]:
-    """The page with its viewer, on the tracker's tab, which draws fastest."""
-    context = browser.new_context(viewport=SIZE)
-    made = Tab(context.new_page())
-    made.open(f"{server.address}#tab=Tracker")
-    made.settled("shown")
-    yield made
-    context.close()
-
-
-def bare_tab(browser: Any, address: str) -> Tab:
-    """A page without the viewer, whose program takes ten seconds to start in software."""
-    context = browser.new_context(viewport=SIZE)
-    made = Tab(context.new_page())
-    made.page.route(re.compile(r"re_viewer_bg\.wasm"), lambda route: route.abort())
-    made.open(address)
-    made.settled()
-    return made
-
+pytestmark = needs_browser
 
 SLIDERS = [
     "filter.threshold_us",
@@ -324,7 +190,8 @@ def test_a_and_b_beside_each_other(tab: Tab) -> None:
     text = tab.page.inner_text("#side details[data-title='Result']")
     assert "logo.pad_px" in text
     headings = tab.page.locator("#side tr.heading th").all_inner_texts()
-    assert "A" in headings and "B" in headings
+    assert "A" in headings and "B" in headings and "B − A" in headings
+    assert re.search(r"\d° apart", tab.page.inner_text("#side details[data-title='Result']"))
     changed = tab.value("logo.pad_px")
     tab.after(lambda: tab.page.click("#swap"))
     assert tab.value("logo.pad_px") != changed
@@ -370,6 +237,11 @@ def test_a_point_of_a_sweep_is_taken_by_a_click(tab: Tab) -> None:
     chart = panel.locator(".chart[aria-label='Logo events']")
     point = chart.locator(".point").last
 
+    with tab.page.expect_download() as saved:
+        chart.locator(".modebar-btn").click(force=True)
+    assert saved.value.suggested_filename == "logo_events.svg"
+    assert Path(saved.value.path()).read_text(encoding="utf-8").startswith("<svg")
+
     def click() -> None:
         point.scroll_into_view_if_needed()
         box = point.bounding_box()
@@ -407,11 +279,67 @@ def test_the_coach_sees_the_shot_alone(tab: Tab) -> None:
     tab.until(f"{views}.then((count) => count <= 3)")  # ball and flight; what was left out may be there, unseen
     assert tab.page.locator("#controls").is_hidden()
     said = " ".join(tab.page.inner_text("#sentence").split())
-    sentence = r"Topspin \d+ ±[\d.]+ rps \(\d+ rpm\) \d+ km/h, axis tilted \d+° from pure topspin"
+    sentence = r"Topspin \d+ ±[\d.]+ rps \(\d+ rpm\) \d+ km/h, axis tilted \d+° from pure topspin, whole shot"
     assert re.fullmatch(sentence, said), said
     tab.page.click("#leave")
     tab.page.wait_for_selector("#controls", state="visible")
     tab.until(f"{views}.then((count) => count > 3)")
+    assert tab.page.evaluate("window.spinscope.viewer.tab()") == "Tracker"
+
+
+def test_the_viewer_obeys_the_keys_of_the_page_and_lets_go_of_the_focus(tab: Tab) -> None:
+    page, tick_us = tab.page, tab.value("track.tick_us")
+    tab.settled("shown")
+    page.evaluate("window.spinscope.viewer.seek(40000)")
+    tab.until("window.spinscope.viewer.playhead_us === 40000")
+    canvas = page.locator("#viewer canvas")
+    assert canvas.get_attribute("role") == "application" and canvas.get_attribute("aria-label")
+    canvas.focus()
+    start_us, end_us = page.evaluate("window.spinscope.settings.clip")
+    shot_us = page.evaluate("window.spinscope.overview.shots[0][0]")
+    keys = {"ArrowRight": 40000 + tick_us, "ArrowLeft": 40000, "PageUp": shot_us, "End": end_us, "Home": start_us}
+    for key, there_us in keys.items():
+        page.keyboard.press(key)
+        tab.until(f"window.spinscope.viewer.playhead_us === {there_us}")
+    page.keyboard.press("4")
+    tab.until("window.spinscope.viewer.tab().then((title) => title === 'Spin')")
+    page.keyboard.press("2")
+    tab.until("window.spinscope.viewer.tab().then((title) => title === 'Tracker')")
+    page.keyboard.press("Escape")
+    strip = page.locator("#overview svg")
+    assert strip.evaluate("(strip) => strip === document.activeElement")
+    assert strip.get_attribute("aria-valuenow") == str(start_us)
+    page.keyboard.press("Tab")
+    assert canvas.evaluate("(canvas) => canvas === document.activeElement")
+    page.keyboard.press("Tab")
+    assert canvas.evaluate("(canvas) => canvas !== document.activeElement")
+    assert serious(page) == []
+    page.keyboard.press("f")
+    page.locator("header").wait_for(state="hidden")
+    page.keyboard.press("f")
+    page.locator("header").wait_for(state="visible")
+
+
+def test_a_pasted_link_turns_to_its_tab_and_time_and_back_leads_back(tab: Tab) -> None:
+    page = tab.page
+    tab.settled("shown")
+    page.evaluate("window.spinscope.viewer.place(40000)")
+    page.wait_for_url(re.compile(r"t=40000&tab=Tracker"))
+    page.evaluate("window.isSamePage = true; location.hash = 'tab=Spin&t=52000'")
+    tab.until("window.spinscope.viewer.front === 'Spin' && window.spinscope.viewer.playhead_us === 52000")
+    page.go_back()
+    tab.until("window.spinscope.viewer.front === 'Tracker' && window.spinscope.viewer.playhead_us === 40000")
+    assert page.evaluate("window.isSamePage")
+
+
+def test_the_panes_follow_a_ball_that_is_fixed_and_flies_again(tab: Tab) -> None:
+    """The layout is made anew for the mode, and the tab stays."""
+    tab.settled("shown")
+    asked = len([url for url in tab.requests if "/layout?" in url])
+    circle = {"ball": "fixed", "fixed_x_px": 600, "fixed_y_px": 300, "fixed_radius_px": 60}
+    tab.after(lambda: tab.page.evaluate("(track) => window.spinscope.settings.setAll({ track })", circle), "shown")
+    tab.after(lambda: tab.page.keyboard.press("z"), "shown")
+    assert len([url for url in tab.requests if "/layout?" in url]) == asked + 2
     assert tab.page.evaluate("window.spinscope.viewer.tab()") == "Tracker"
 
 
@@ -531,7 +459,7 @@ def test_a_simulated_scene_is_simulated_again_from_the_page(browser: Any, tmp_pa
         panel.locator(".chart .point").first.wait_for()
         panel.locator("progress").wait_for(state="hidden")
         assert panel.locator(".chart").count() == 2
-        tab.until("document.querySelectorAll('#side .chart .shapelayer path').length === 2")  # the present value
+        tab.until("document.querySelectorAll('.chart .shapelayer path').length === 2")  # the present value
         assert tab.page.evaluate("window.violations") == []
         tab.page.context.close()
     finally:

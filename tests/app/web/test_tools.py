@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,9 @@ import numpy as np
 import pytest
 
 from spinscope.app.tuning.bias_sweep import known_biases
-from spinscope.app.tuning.optimization import REFUSED, cost_of
+from spinscope.app.tuning.optimization import REFUSED, cost_of, objection_to
 from spinscope.app.tuning.parameter_sweep import scale_of, sweep_values
+from spinscope.app.web.assets import STATIC
 from spinscope.app.web.controls import ESSENTIALS, sections
 from spinscope.pipeline.biases import BiasParameters
 from spinscope.pipeline.errors import ParameterError
@@ -27,7 +29,7 @@ def test_every_parameter_has_one_control() -> None:
     names = [control.name for section in sections() for control in section.controls]
     wanted = [f"{group}.{field}" for group, fields in Parameters().as_dict().items() for field in fields]
     assert sorted(names) == sorted(wanted)
-    titles = [section.title for section in sections() if not section.is_setup]
+    titles = [section.title for section in sections() if not section.controls[-1].is_setup]
     assert titles[:4] == ["Essentials", "Filter", "Surface (EROS)", "Cleaning"]
     assert titles[-2:] == ["Trajectory", "Combined"]
 
@@ -37,6 +39,12 @@ def test_the_essentials_are_open_on_top_and_say_which_stage_they_are_of() -> Non
     assert first.is_open and not any(section.is_open for section in others)
     assert [control.name for control in first.controls] == list(ESSENTIALS)
     assert {control.label for control in first.controls} >= {"filter threshold", "surface k", "logo pad", "track tick"}
+
+
+def test_every_section_is_explained_by_entries_of_the_glossary() -> None:
+    terms = set(re.findall(r"^(\S.*)\n  ", (STATIC / "glossary.md").read_text(encoding="utf-8"), re.MULTILINE))
+    for section in sections():
+        assert section.terms and set(section.terms) <= terms, section.title
 
 
 @pytest.mark.parametrize("name", ["logo.pad_px", "filter.threshold_us", "surface.k_px", "track.coast_us"])
@@ -86,6 +94,7 @@ def test_a_sweep_can_be_cancelled(client: Client) -> None:
         {"names": ["camera.up"]},
         {"names": ["logo.pad_px"], "objective": "luck"},
         {"names": ["logo.pad_px"], "trials": 0},
+        {"names": ["logo.pad_px"], "clips_us": [[5, 1]]},
         {"names": ["track.fixed_x_px"] * 9},
     ],
 )
@@ -106,7 +115,9 @@ def test_an_optimization_never_ends_worse_than_it_began_and_tells_the_best_so_fa
     done = client.wait("optimization", lambda m: m["state"] in ("done", "failed"))
     assert done["state"] == "done", done
     found = done["content"]
-    assert len(found["trials"]) == 6 and found["best"] == min(found["trials"]) <= found["trials"][0]
+    allowed = [trial["cost"] for trial in found["trials"] if trial["objection"] is None]
+    assert len(found["trials"]) == 6 and found["best"] == min(allowed) <= found["trials"][0]["cost"]
+    assert found["clips"] == 1 and found["held_out"] is None
     values = {name.split(".")[0]: {} for name in names}
     for name, value in found["values"].items():
         stage, field = name.split(".")
@@ -115,12 +126,31 @@ def test_an_optimization_never_ends_worse_than_it_began_and_tells_the_best_so_fa
     assert shot["spin"][shot["best"]]["error_share"] == pytest.approx(found["best"])
 
 
+def test_several_recordings_are_tuned_at_once_and_one_is_held_out(client: Client) -> None:
+    names = ["flight_fast_top.h5", "flight_back.h5"]
+    request = {"parameters": {}, "names": ["flow.reach_px"], "objective": "truth", "trials": 3, "recordings": names}
+    assert client.post("optimization", **request).status_code == 202
+    found = client.wait("optimization", lambda m: m["state"] in ("done", "failed"))["content"]
+    assert found["clips"] == 1
+    held = found["held_out"]
+    assert held is None or (held["clips"] == 1 and held["after"] < 1)
+    is_proposed = held is not None and held["objection"] is None
+    assert is_proposed == (found["values"] != {"flow.reach_px": 3.0})
+
+
+def test_the_pad_ranges_up_to_the_ball_that_is_seen(client: Client) -> None:
+    done = client.run()
+    radius_px = done["metrics"]["shots"][0]["radius_px"]
+    assert radius_px - 2 <= done["highs"]["logo.pad_px"] <= radius_px
+
+
 def metrics_with(best: str | None, estimate: EstimateMetrics | None) -> RunMetrics:
     shot = ShotMetrics(
         start_us=0,
         end_us=1,
         logo_events=5,
         speed_m_s=None,
+        radius_px=None,
         best=best,
         best_reason=None,
         kind=None,
@@ -137,6 +167,27 @@ def metrics_with(best: str | None, estimate: EstimateMetrics | None) -> RunMetri
         no_shot_reason=None,
         up_doubt=None,
     )
+
+
+def test_what_loses_an_answer_or_half_of_the_evidence_is_objected_to() -> None:
+    estimate = EstimateMetrics(
+        status="ok",
+        reason=None,
+        magnitude_rps=50.0,
+        magnitude_std_rps=1.0,
+        axis=None,
+        axis_std_deg=None,
+        error_rps=None,
+        error_deg=None,
+        error_share=None,
+    )
+    good = metrics_with("triplet", estimate)
+    lost = metrics_with(None, dataclasses.replace(estimate, magnitude_rps=None))
+    less = dataclasses.replace(good, logo_events=2)
+    assert objection_to([good], [good]) is None and objection_to([good], [lost]) is None
+    assert "triplet" in (objection_to([good, lost], [good, good]) or "")
+    assert "2 logo events are left of 5" in (objection_to([less], [good]) or "")
+    assert objection_to([None], [good]) and objection_to([None], [None])
 
 
 def test_no_answer_is_the_worst_objective() -> None:
@@ -275,7 +326,8 @@ def test_the_window_of_the_opened_recording_is_not_asked_of_the_folders_others(s
     tuner = served(tmp_path / "flight_back.h5", choices=Choices(window_us=(97_000, 113_000)))
     try:
         page = tuner.open()
-        assert page.opening["recordings"] == ["flight_back.h5", "flight_fast_top.h5"]
+        listed = [one.name for one in tuner.state.folder.listing().recordings]
+        assert listed == ["flight_back.h5", "flight_fast_top.h5"]
         page.post("bias_sweep", biases={}, name="diff_on")
         done = page.wait("bias_sweep", lambda m: m["state"] == "done")
         assert [point.get("error") for point in done["content"]["points"]] == [None, None]

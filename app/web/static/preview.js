@@ -1,0 +1,65 @@
+// Preview at the playhead, drawn by the page itself: while a slider is dragged, until the viewer shows its first
+// picture, and where it cannot run.
+
+/** @import { PreviewMessage } from "./messages.d.ts" */
+/** @import { Connection, RunRequests } from "./server.js" */
+/** @import { Settings } from "./settings.js" */
+/** @import { Viewer } from "./viewer.js" */
+
+import { byId, element } from "./elements.js";
+
+const TITLES = ["Surface", "Logo events", "Flow", "Derotated logo"];
+
+export class Preview {
+  #isDragged = false;
+  #isAsking = false;
+  /** @type {number | null} time that is to be shown next */
+  #wanted_us = null;
+
+  /**
+   * @param {{connection: Connection, settings: Settings, runner: RunRequests, viewer: Viewer}} app
+   */
+  constructor({ connection, settings, runner, viewer }) {
+    this.connection = connection;
+    this.runner = runner;
+    this.image = element("img", { alt: `${TITLES.join(", ")} at the playhead` });
+    const titles = element("div.titles", {}, ...TITLES.map((title) => element("span", {}, title)));
+    this.words = element("figcaption");
+    this.node = element("figure", { id: "preview", hidden: true }, titles, this.image, this.words);
+    byId("middle").append(this.node);
+    connection.on("preview", (message) => message.serial === runner.serial && this.#show(message));
+    runner.addEventListener("shown", () => (this.node.hidden = true));
+    runner.addEventListener("numbers", (event) => {
+      const { state } = /** @type {CustomEvent} */ (event).detail;
+      if (state === "done" && viewer.playhead_us !== null) this.#scrub(viewer.playhead_us);
+    });
+    settings.onChange((settled) => (this.#isDragged = !settled));
+    viewer.addEventListener("moved", (event) => this.#scrub(/** @type {CustomEvent} */ (event).detail));
+  }
+
+  // Whether it stands in for the viewer.
+  get #isAlone() {
+    return this.runner.isBlind || !document.body.dataset.picture;
+  }
+
+  #show(/** @type {PreviewMessage} */ { picture, words, t_us }) {
+    if (!this.#isAlone && !this.#isDragged) return;
+    this.image.src = picture;
+    this.words.textContent = `${words}, at ${(t_us / 1000).toFixed(1)} ms`;
+    this.node.hidden = false;
+  }
+
+  // One request after the other, always for the newest time.
+  async #scrub(/** @type {number} */ time_us) {
+    this.#wanted_us = time_us;
+    if (this.#isAsking || !this.#isAlone) return;
+    this.#isAsking = true;
+    while (this.#wanted_us !== null && this.#isAlone) {
+      const path = /** @type {"preview"} */ (`preview?t_us=${this.#wanted_us}`);
+      this.#wanted_us = null;
+      const found = await this.connection.get(path).catch(() => null); // nothing is computed yet, or it is gone
+      if (found) this.#show(found);
+    }
+    this.#isAsking = false;
+  }
+}

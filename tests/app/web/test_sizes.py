@@ -1,0 +1,54 @@
+"""The page on screens of several sizes: nothing is cut, panels fold and stay so; without the viewer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from .browser_tab import Tab, bare_tab, needs_browser
+from .conftest import Served
+
+pytestmark = needs_browser
+# Of laptops, of screens on desks, of one at a zoom of 150 %, of a tablet upright.
+SIZES = [(1280, 800), (1366, 768), (1920, 1080), (2560, 1440), (911, 512), (820, 1180)]
+
+
+@pytest.fixture(scope="module")
+def bare(browser: Any, server: Served) -> Iterator[Tab]:
+    """The page without the viewer's picture."""
+    made = bare_tab(browser, server.address)
+    yield made
+    made.page.context.close()
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_all_of_the_page_is_inside_the_window(bare: Tab, size: tuple[int, int]) -> None:
+    width, height = size
+    bare.page.set_viewport_size({"width": width, "height": height})
+    for part in ("header", "header > *:visible", "#controls", "#middle", "#viewer", "#bar", "#side"):
+        for found in bare.page.locator(part).all():
+            box = found.bounding_box()
+            assert box is not None and box["x"] >= 0 and box["y"] >= 0, part
+            assert box["x"] + box["width"] <= width + 1 and box["y"] + box["height"] <= height + 1, part
+    viewer = bare.page.locator("#viewer").bounding_box()
+    assert viewer["width"] >= min(0.63 * width, 1200) and viewer["height"] >= 0.45 * height
+    overflow = "(one) => one.scrollWidth - one.clientWidth"
+    assert bare.page.locator("#controls").evaluate(overflow) <= 0 and bare.page.locator("#side").evaluate(overflow) <= 0
+
+
+def test_folded_panels_make_room_and_stay_folded(bare: Tab) -> None:
+    page = bare.page
+    page.set_viewport_size({"width": 1280, "height": 800})
+    for key, panel in (("[", "#controls"), ("]", "#side")):
+        page.keyboard.press(key)
+        assert page.locator(panel).is_hidden()
+    assert page.locator("#viewer").bounding_box()["width"] == 1280
+    page.reload()
+    page.wait_for_selector("body[data-done]", state="attached")
+    assert page.locator("#controls").is_hidden() and page.locator("#side").is_hidden()
+    page.click("#fold-controls")
+    page.click("#fold-side")
+    assert page.locator("#controls").is_visible() and page.locator("#side").is_visible()
+    assert page.locator("#fold-side").get_attribute("aria-pressed") == "true"
