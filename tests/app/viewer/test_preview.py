@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import cv2
 import numpy as np
 
 from spinscope.app.viewer import entities
 from spinscope.app.viewer.preview import SIDE_PX, TITLES, _turned, preview, preview_words
 from spinscope.app.viewer.run import ViewedRun
+from spinscope.pipeline.chain import Tick
 
 
 def panes(content: bytes) -> list[np.ndarray]:
@@ -34,7 +37,9 @@ def test_every_pane_shows_the_ball(flight: ViewedRun) -> None:
 
 
 def test_without_a_ball_it_is_black_and_says_why(flight: ViewedRun) -> None:
-    before = next(tick for tick in flight.ticks if not tick.track.has_ball)
+    seen = flight.ticks[0]
+    lost = dataclasses.replace(seen.track, status="lost", reason="no circle", balls=())
+    before = Tick({**seen.results, "track": lost}, seen.packet, ())
     assert not np.concatenate(panes(preview([before]))).any()
     assert preview_words(before, is_whole=True).startswith("No ball")
 
