@@ -6,9 +6,9 @@ export type BiasRange = { low: number; high: number; default: number; help: stri
 /** Biases to simulate the scene with, or to write to a file. */
 export type BiasRequest = { biases: Record<string, number> };
 /** Biases of a recording. */
-export type BiasState = { values: Record<string, number>; known: boolean; locked: string | null; calibrated: boolean; ranges: Record<string, BiasRange>; swept: SweptBias[] };
-/** The points of a sweep so far: simulated over one bias (`name`), or of recordings whose biases are known. */
-export type BiasSweep = { name: string | null; total: number; points: BiasSweepPoint[] };
+export type BiasState = { values: Record<string, number>; known: boolean; locked: string | null; calibrated: boolean; ranges: Record<string, BiasRange>; swept: SweptBias[]; of_camera: boolean };
+/** The points of a sweep so far: over one bias (`name`), or of recordings whose biases are known. */
+export type BiasSweep = { name: string | null; total: number; points: BiasSweepPoint[]; proposal: string | null };
 /** Progress of a bias sweep. */
 export type BiasSweepMessage = { kind: "bias_sweep"; state: "running" | "done" | "cancelled" | "failed"; error: string | null; content: BiasSweep | null };
 /** Event rates with one setting, of the whole sensor; only `error` where a recording could not be used. */
@@ -26,7 +26,7 @@ export type CancelRequest = { kind: "sweep" | "optimization" | "biases" | "bias_
 /** Anything that the page offers by name. */
 export type Choice = { name: string; label: string; help: string };
 /** One shot of a session: its columns, and what follows from them. */
-export type CoachShot = { id: number; revision: number; recording: string; shot: number; start_us: number; end_us: number; recorded_s: number; began_by: string; ended_by: string; speed_m_s: number | null; spin_rps: number | null; spin_std_rps: number | null; axis_std_deg: number | null; topspin_rps: number | null; sidespin_rps: number | null; corkscrew_rps: number | null; told_by: "logo" | "rhythm" | "flight" | null; reason: string | null; has_picture: boolean; player: string | null; wing: string | null; stroke: string | null; drill: string | null; marked: boolean; deleted: boolean; kind: string[]; effect: number | null; effect_word: "spinny" | "neutral" | "speedy" | null; confidence: "sure" | "good" | "rough" | null; clock_hours: number | null; corkscrew_share: number | null };
+export type CoachShot = { session: string; id: number; revision: number; recording: string; shot: number; start_us: number; end_us: number; recorded_s: number; began_by: string; ended_by: string; speed_m_s: number | null; spin_rps: number | null; spin_std_rps: number | null; axis_std_deg: number | null; topspin_rps: number | null; sidespin_rps: number | null; corkscrew_rps: number | null; told_by: "logo" | "rhythm" | "flight" | null; reason: string | null; has_picture: boolean; player: string | null; wing: string | null; stroke: string | null; drill: string | null; marked: boolean; deleted: boolean; kind: string[]; effect: number | null; effect_word: "spinny" | "neutral" | "speedy" | null; confidence: "sure" | "good" | "rough" | null; clock_hours: number | null; corkscrew_share: number | null };
 /** Declaration of one parameter, as its control needs it; `is_setup` where it belongs to the set-up. */
 export type ControlInfo = { name: string; label: string; kind: string; default: any; optional: boolean; unit: string; low: number | null; high: number | null; step: number | null; choices: string[]; help: string; allowed: string; scale: "linear" | "logarithmic" | "cubic" | "none"; is_setup: boolean };
 /** Answer without content. */
@@ -45,8 +45,22 @@ export type FolderListing = { root: string; folder: string; folders: string[]; r
 export type HeldOut = { clips: number; before: number; after: number; objection: string | null };
 /** Revision after a change. */
 export type Kept = { revision: number };
+/** Where shots bounced, by id: metres along the table with the flight from the net, and to the left. */
+export type Landings = { landings: Record<string, [number, number]> };
 /** A recording of a folder, or a dropped one; `name` opens it. */
 export type ListedRecording = { name: string; size_bytes: number };
+/** Have the running camera's stages go on with these parameters. */
+export type LiveParametersRequest = { parameters: Record<string, Record<string, any>> };
+/** State of one second, `t_s` after the start; latencies and rates are None where there is nothing to measure. */
+export type LiveSecond = { t_s: number; rate_mev_s: number; p50_ms: number | null; p99_ms: number | null; announced_ms: number | null; final_ms: number | null; dropped: number; skipped: number; backlog_ms: number; spin_backlog_ms: number; noise_on_hz: number | null; noise_off_hz: number | null; ball_on_hz: number | null; ball_off_hz: number | null };
+/** A shot that has ended, in words; `recording` has its events as soon as its spin is final. */
+export type LiveShotRow = { text: string; is_final: boolean; recording: string | null };
+/** Running camera as the page shows it. */
+export type LiveView = { camera: string; is_running: boolean; kept_s: number; seconds: LiveSecond[]; shots: LiveShotRow[]; notices: string[] };
+/** Recording of the last seconds: its name in the folder. */
+export type LiveWindow = { recording: string };
+/** Save the last seconds as a recording of its own. */
+export type LiveWindowRequest = { seconds: number };
 /** A spin method with its colour, as CSS. */
 export type MethodInfo = { name: string; label: string; help: string; colour: string };
 /** A metric of a run, shot or estimate: field name, label, unit (% for a share of 0 to 1) and explanation. */
@@ -58,7 +72,7 @@ export type NamesRequest = { ids: number[]; values: Record<string, string | bool
 /** Open a session on a recording of the folder; None for the one the program was started with. */
 export type OpenRequest = { recording?: string | null };
 /** Everything that the page needs to know at first; without `tools` it shows the viewer alone, `tab` in front. */
-export type Opening = { session: string; viewer_version: string; tools: boolean; tab: string; followed: number | null; recording: RecordingDescription; sections: SectionInfo[]; stages: Choice[]; methods: MethodInfo[]; run_metrics: MetricInfo[]; shot_metrics: MetricInfo[]; estimate_metrics: MetricInfo[]; tabs: Choice[]; exports: Choice[]; objectives: Choice[]; suggested: string[]; colours: Record<string, string>; presets: Record<string, Record<string, Record<string, any>>>; renamed: Record<string, string>; biases: BiasState };
+export type Opening = { session: string; viewer_version: string; tools: boolean; tab: string; followed: number | null; recording: RecordingDescription; sections: SectionInfo[]; stages: Choice[]; methods: MethodInfo[]; run_metrics: MetricInfo[]; shot_metrics: MetricInfo[]; estimate_metrics: MetricInfo[]; tabs: Choice[]; exports: Choice[]; objectives: Choice[]; suggested: string[]; colours: Record<string, string>; presets: Record<string, Record<string, Record<string, any>>>; renamed: Record<string, string>; biases: BiasState; is_live: boolean };
 /** The trials of an optimization so far. */
 export type Optimization = { objective: string; total: number; clips: number; trials: Trial[]; best: number | null; values: Record<string, boolean | number | string | null>; held_out: HeldOut | null; skipped: string[] };
 /** Progress of an optimization. */
@@ -69,8 +83,6 @@ export type OptimizationRequest = { parameters: Record<string, Record<string, an
 export type ParameterSweep = { name: string; total: number; points: SweepPoint[] };
 /** An .rrd picture that is ready to be fetched. */
 export type Picture = { id: string; size_bytes: number; start_us: number; end_us: number; opening_us: number };
-/** Camera's place over the table, see `flight_path`; None forgets it. */
-export type PoseRequest = { pose: Record<string, number[] | number[][]> | null };
 /** Parameters read from a preset, and notices of former names in it. */
 export type PresetValues = { parameters: Record<string, Record<string, any>>; notices: string[] };
 /** Preview of a run at a time, before its picture: the address of a PNG, and the answer in words. */
@@ -109,8 +121,8 @@ export type ShotsMessage = { kind: "shots"; share: number; shots: [number, numbe
 export type SpinProofPoints = { first_us: number; second_us: number; first: number[][]; second: number[][]; turned: number[][] };
 /** Statistics of series of shots, by their names. */
 export type Statistics = { series: Record<string, SeriesStatistics> };
-/** Statistics of series of shots by their names, each in order of time. */
-export type StatisticsRequest = { series: Record<string, number[]> };
+/** Statistics of series by their names: ids of shots by session; see `series_statistics` for `since_s`. */
+export type StatisticsRequest = { series: Record<string, Record<string, number[]>>; since_s?: number | null };
 /** Progress of a parameter sweep. */
 export type SweepMessage = { kind: "sweep"; state: "running" | "done" | "cancelled" | "failed"; error: string | null; content: ParameterSweep | null };
 /** Metrics of a run with one value; only `error` where the value does not go with the others. */
@@ -119,6 +131,10 @@ export type SweepPoint = { value: boolean | number | string; error: string | nul
 export type SweepRequest = { parameters: Record<string, Record<string, any>>; start_us?: number | null; end_us?: number | null; name: string; low?: number | null; high?: number | null; points?: number };
 /** Subject of one sweep: one bias, or several together. */
 export type SweptBias = { name: string; label: string; biases: string[] };
+/** Recordings that the table can be marked in, and the present marks. */
+export type TableMarks = { recordings: string[]; recording: string | null; corners_px: [number, number][] | null; height_m: number | null; off_px: number | null };
+/** Corners of the table in the picture of a recording, columns and rows in order round the table. */
+export type TableRequest = { recording: string; corners_px: [number, number][] };
 /** A preset (TOML) or a .bias file to read. */
 export type TextRequest = { text: string };
 /** One setting, over all clips that are tuned on. */
@@ -157,22 +173,26 @@ export interface Posts {
   "/api/biases/read": { sent: TextRequest; answered: BiasValues };
   "/api/biases/write": { sent: BiasRequest; answered: BiasText };
   "/api/drop": { sent: null; answered: Dropped };
+  "/api/live/parameters": { sent: LiveParametersRequest; answered: Done };
+  "/api/live/window": { sent: LiveWindowRequest; answered: LiveWindow };
   "/api/sessions": { sent: OpenRequest; answered: Opening };
 }
 /** GET requests: what is sent and answered. */
 export interface Gets {
   "/api/folder": { sent: null; answered: FolderListing };
+  "/api/live/view": { sent: null; answered: LiveView };
   "/api/summary": { sent: null; answered: RecordingSummary };
 }
 /** POST requests of a session: what is sent and answered. */
 export interface CoachPosts {
   "names": { sent: NamesRequest; answered: Kept };
   "now": { sent: Names; answered: Kept };
-  "pose": { sent: PoseRequest; answered: Kept };
-  "statistics": { sent: StatisticsRequest; answered: Statistics };
+  "table": { sent: TableRequest; answered: TableMarks };
 }
 /** GET requests of a session: what is sent and answered. */
 export interface CoachGets {
+  "landings": { sent: null; answered: Landings };
   "shots": { sent: null; answered: SessionShots };
   "shots/{shot_id}": { sent: null; answered: ShotDetail };
+  "table": { sent: null; answered: TableMarks };
 }
