@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import httpx
 import pytest
 
 from spinscope.app.coach.session import ShotSession
 
 from .coach_tab import CoachTab, needs_browser
+from .marked_table import MIDDLE_M, SIZE_PX, TURN, corners_px, write_table_recording
 from .session_shots import KNOWN, NO_DETAIL, analysis, shot
 
 
@@ -89,6 +92,34 @@ class TestPage:
             ink = [picture[..., 2].astype(int) - picture[..., 0] > 30 for picture in (small, painted)]
             assert ink[1].sum() > 100 and (ink[0] & ink[1]).sum() > 0.7 * ink[1].sum()
 
+    def test_the_tables_corners_are_marked_by_clicks_and_arrow_keys(
+        self, tab: CoachTab, session: ShotSession, tmp_path: Path
+    ) -> None:
+        page = tab.page
+        write_table_recording(tmp_path / "table.h5")
+        session.keep_setting("pose", None)
+        session.add(str(tmp_path / "table.h5"), KNOWN, None)
+        tab.go("shot/2")
+        assert "flight without the table" in page.inner_text(".flight")
+        page.get_by_role("link", name="Mark the table").click()
+        page.wait_for_selector(".marks .corner")
+        picture = page.locator(".marks .picture svg")
+        box = picture.bounding_box()
+        assert box is not None
+        scale = box["width"] / SIZE_PX[0]
+        for x, y in corners_px():
+            picture.click(position={"x": scale * (x + 0.5), "y": scale * (y + 0.5)})
+        page.locator(".marks .corner").first.focus()
+        for key in ("Shift+ArrowRight", "Shift+ArrowLeft"):
+            page.keyboard.press(key)
+        page.get_by_role("button", name="Keep the corners").click()
+        page.wait_for_selector(".notice:has-text('above the table')")
+        tab.until("document.body.dataset.place === 'shots'")
+        height_m = session.setting("pose")["camera_m"][2]
+        assert height_m == pytest.approx(abs(MIDDLE_M @ TURN[:, 2]), rel=0.01)
+        tab.go("shot/2")
+        assert page.locator(".flight rect.table").count() == 2
+
     def test_language_and_units_are_remembered_and_terms_explained(self, tab: CoachTab) -> None:
         page = tab.page
         page.select_option("select[name=language]", "de")
@@ -110,6 +141,21 @@ class TestPage:
         assert tab.page.locator("svg.chart polygon").count() == 2
         tab.page.locator("svg.chart .mark").first.click()
         tab.page.wait_for_selector("section.shot")
+
+    def test_sessions_are_compared_and_before_and_after_a_day(self, tab: CoachTab, earlier: ShotSession) -> None:
+        page = tab.page
+        tab.go("compare")
+        page.wait_for_selector(".answers li")
+        count = page.locator("svg.chart .mark").count()
+        page.get_by_label("All sessions").check()
+        tab.until(f"document.querySelectorAll('svg.chart .mark').length > {count}")
+        page.select_option("[name=since]", index=1)
+        page.wait_for_selector(".answers li:has-text('A: the spin rose by 4')")
+        page.select_option("[name=by]", "session")
+        page.wait_for_selector("table.statistics th:has-text('earlier')")
+        page.locator("table.statistics tr:has-text('earlier') button").click()
+        page.wait_for_selector("section.shot .number:has-text('33')")
+        assert page.input_value("select[name=session]") == "earlier"
 
     def test_a_test_counts_and_compares_with_the_last_time(self, tab: CoachTab, session: ShotSession) -> None:
         tab.go("tests")

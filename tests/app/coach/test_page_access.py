@@ -65,6 +65,27 @@ def test_axe_finds_nothing_serious(
     tab.close()
 
 
+def test_all_is_reached_by_touch(browser: Any, address: str, session: ShotSession) -> None:
+    tab = CoachTab(browser, address, **TABLET)
+    page = tab.page
+    page.locator("table.shots td.time a").first.tap()
+    page.wait_for_selector("section.shot")
+    tab.until("window.coach.view.player.motion.isPlaying")
+    page.locator(".player .play").tap()
+    tab.until("!window.coach.view.player.motion.isPlaying")
+    page.locator("dl.numbers .term").first.tap()
+    page.wait_for_selector("dl.numbers .about:visible")
+    page.get_by_role("button", name="Mark", exact=False).last.tap()
+    page.wait_for_selector(".star[aria-pressed=true]")
+    assert sum(row["marked"] for row in session.shots()) == 1
+    page.get_by_role("button", name="Previous shot").tap()
+    tab.until("document.body.dataset.place === 'shot/29'")
+    for place in ("compare", "tests", "live", "shots"):
+        page.locator(f"header nav a[href='#{place}']").tap()
+        tab.until(f"document.body.dataset.place === '{place}'")
+    tab.close()
+
+
 def test_all_is_reached_by_keyboard(tab: CoachTab, session: ShotSession) -> None:
     page = tab.page
 

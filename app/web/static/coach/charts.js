@@ -168,11 +168,10 @@ export function daysChart(series, days) {
   );
   let free = 0;
   for (const day of ordered) {
-    const middle = x(at(day));
-    if (middle < free) continue;
-    const inside = Math.min(Math.max(middle, LEFT + DAY_LABEL / 2), WIDTH - RIGHT - DAY_LABEL / 2);
+    const inside = Math.min(Math.max(x(at(day)), LEFT + DAY_LABEL / 2), WIDTH - RIGHT - DAY_LABEL / 2);
+    if (inside < free) continue;
     svg.append(drawing("text", { x: inside, y: HEIGHT - BOTTOM + 18, class: "x" }, dayOf(day.shots[0])));
-    free = middle + DAY_LABEL;
+    free = inside + DAY_LABEL;
   }
   known.forEach((own, index) => {
     const stroke = COLOURS[index % COLOURS.length];

@@ -137,12 +137,17 @@ export class Shots extends EventTarget {
   async save(rest, name) {
     const note = notice(text("file_soon"), "info", 0);
     try {
-      const response = await fetch(this.path(rest));
-      if (!response.ok) await answered(response); // throws the reason
-      download(name, await response.blob(), "");
+      download(name, await this.file(rest), "");
     } finally {
       note.remove();
     }
+  }
+
+  /** @param {string} rest */
+  async file(rest) {
+    const response = await fetch(this.path(rest));
+    if (!response.ok) await answered(response); // throws the reason
+    return response.blob();
   }
 
   /** @returns {Promise<Landings["landings"]>} */

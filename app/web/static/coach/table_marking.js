@@ -18,6 +18,7 @@ export class TableMarking {
   #placed = new Set();
   #next = 0; // corner that a click on the picture places
   #recording = "";
+  #url = ""; // of the picture
 
   /** @param {{shots: Shots, go: (place: string) => void}} page */
   constructor({ shots, go }) {
@@ -43,7 +44,10 @@ export class TableMarking {
     this.#corners = this.#recording === marks.recording ? marks.corners_px ?? [] : [];
     const select = element(
       "select",
-      { name: "recording", onchange: () => (this.#recording = select.value, this.#corners = [], this.#load()) },
+      {
+        name: "recording",
+        onchange: () => (this.#recording = select.value, this.#corners = [], attempt(() => this.#load())),
+      },
       recordings.map((path) =>
         element("option", { value: path, selected: path === this.#recording }, path.split(/[\\/]/).pop())
       ),
@@ -60,7 +64,7 @@ export class TableMarking {
       ),
       element("div.marks", {}, this.picture, this.loupe),
     );
-    await this.#load();
+    await attempt(() => this.#load()); // of a damaged recording: another one can be chosen
     return this.root;
   }
 
@@ -71,8 +75,12 @@ export class TableMarking {
   }
 
   async #load() {
+    this.picture.replaceChildren();
+    this.loupe.replaceChildren();
     const image = new Image();
-    image.src = this.shots.path(`table.png?recording=${encodeURIComponent(this.#recording)}`);
+    const picture = await this.shots.file(`table.png?recording=${encodeURIComponent(this.#recording)}`);
+    URL.revokeObjectURL(this.#url);
+    image.src = this.#url = URL.createObjectURL(picture);
     await image.decode();
     const { src, width, height } = image;
     this.#next = 0;
