@@ -259,7 +259,8 @@ def _add_table_routes(app: FastAPI, state: CoachState) -> None:
     @app.post(SESSION + "table")
     def mark(session: str, request: TableRequest) -> TableMarks:
         own = state.session(session)
-        mark_table(own, request.recording, request.corners_px, state.choices(own))
+        corners_px = [(x_px, y_px) for x_px, y_px in request.corners_px]
+        mark_table(own, request.recording, corners_px, state.choices(own))
         return _marks(own)
 
 

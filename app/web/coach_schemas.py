@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -41,7 +41,7 @@ class TableRequest(Request):
     """Corners of the table in the picture of a recording, columns and rows in order round the table."""
 
     recording: str
-    corners_px: list[tuple[float, float]] = Field(min_length=4, max_length=4)
+    corners_px: list[Annotated[list[float], Field(min_length=2, max_length=2)]] = Field(min_length=4, max_length=4)
 
 
 class WordsQuery(Request):

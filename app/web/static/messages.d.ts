@@ -134,7 +134,7 @@ export type SweptBias = { name: string; label: string; biases: string[] };
 /** Recordings that the table can be marked in, and the present marks. */
 export type TableMarks = { recordings: string[]; recording: string | null; corners_px: [number, number][] | null; height_m: number | null; off_px: number | null };
 /** Corners of the table in the picture of a recording, columns and rows in order round the table. */
-export type TableRequest = { recording: string; corners_px: [number, number][] };
+export type TableRequest = { recording: string; corners_px: number[][] };
 /** A preset (TOML) or a .bias file to read. */
 export type TextRequest = { text: string };
 /** One setting, over all clips that are tuned on. */

@@ -161,8 +161,7 @@ export class TableMarking {
   }
 
   async #keep() {
-    const corners_px = /** @type {[number, number][]} */ (this.#corners);
-    const marks = await this.shots.post("table", { recording: this.#recording, corners_px });
+    const marks = await this.shots.post("table", { recording: this.#recording, corners_px: this.#corners });
     notice(this.#words(marks), "info");
     this.go("shots");
   }
