@@ -13,6 +13,8 @@ import { byId, element } from "./elements.js";
 
 const TEXT = "textarea, select, input:not([type=range]):not([type=checkbox])";
 const CONTROL = `${TEXT}, input, button, summary, a`;
+const STOPS = ["a[href]", "button", "input", "select", "summary", "[tabindex]"]
+  .map((stop) => `${stop}:not([tabindex="-1"], :disabled)`).join();
 
 export class Keyboard {
   /** @type {Map<string, Key>} */
@@ -47,7 +49,7 @@ export class Keyboard {
     const target = /** @type {HTMLElement} */ (event.target);
     if (document.querySelector("dialog[open]")) return;
     const isInViewer = byId("viewer").contains(target) && !document.body.classList.contains("coach");
-    if (event.key === "Tab") return isInViewer && event.stopImmediatePropagation();
+    if (event.key === "Tab") return isInViewer && this.#take(event, () => besideViewer(event.shiftKey)?.focus());
     if (event.key === "Escape") return isInViewer ? this.#take(event, leaveViewer) : closeOpen();
     const key = this.#keys.get(named(event));
     if (!key || event.altKey || target.closest?.(key.moves && !isInViewer ? CONTROL : TEXT)) return;
@@ -68,6 +70,17 @@ export class Keyboard {
  */
 function named({ key, ctrlKey, metaKey }) {
   return ctrlKey || metaKey ? `Ctrl+${key}` : key;
+}
+
+// The viewer keeps the browser's own Tab to itself.
+/** @param {boolean} isBefore @returns {HTMLElement | undefined} */
+function besideViewer(isBefore) {
+  const viewer = byId("viewer");
+  const side = isBefore ? Node.DOCUMENT_POSITION_PRECEDING : Node.DOCUMENT_POSITION_FOLLOWING;
+  const stops = [.../** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(STOPS))].filter((stop) =>
+    !viewer.contains(stop) && stop.getClientRects().length && viewer.compareDocumentPosition(stop) & side
+  );
+  return isBefore ? stops.at(-1) : stops[0];
 }
 
 const leaveViewer = () => byId("overview").querySelector("[tabindex]").focus();

@@ -86,7 +86,7 @@ export class Viewer extends EventTarget {
     await viewer.start(null, parent, { base_url, ...size, ...plain });
     await ready;
     // The viewer's own field for what is typed into it, which is not to be seen and no stop of Tab.
-    for (const field of document.querySelectorAll("body > input")) {
+    for (const field of document.querySelectorAll('input[autocapitalize="off"]')) {
       field.setAttribute("aria-label", "Typing into the viewer");
       field.setAttribute("tabindex", "-1");
     }
