@@ -66,7 +66,7 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class HeldOut:
-    """How the proposal does on clips that it was not tuned on.
+    """Result of the proposal on clips that it was not tuned on.
 
     Attributes
     ----------

@@ -225,7 +225,7 @@ def _add_exports(app: FastAPI, state: CoachState) -> None:
 
 
 def _file(name: str, write: Callable[[Path], None]) -> Response:
-    """What is written to a file of that name, as an answer."""
+    """Answer with the content that is written to a file of that name."""
     with TemporaryDirectory(prefix="spinscope-") as folder:
         path = Path(folder) / name
         write(path)

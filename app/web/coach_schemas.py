@@ -136,7 +136,7 @@ class SessionNames(Response):
 
 
 class Landings(Response):
-    """Where shots bounced, by id: metres along the table with the flight from the net, and to the left."""
+    """Places where shots bounced, by id: metres along the table with the flight from the net, and to the left."""
 
     landings: dict[int, tuple[float, float]]
 

@@ -59,7 +59,7 @@ def sections() -> list[SectionInfo]:
         title = STAGES[group].label if group in STAGES else group.capitalize()
         for heading, fields in {title: rest, **own}.items():
             controls = [_control(group, field, declared[field]) for field in fields]
-            terms = TERMS.get(heading) or TERMS[group]
+            terms = TERMS.get(heading) or TERMS.get(group, ())
             made.append(SectionInfo(title=heading, terms=terms, is_open=False, controls=controls))
     return made
 

@@ -239,7 +239,7 @@ class FolderListing(Response):
 
 
 class RecordingSummary(Response):
-    """What a recording holds, or `error`; without `shots` where it is too long to be searched for them in passing.
+    """Content of a recording, or `error`; without `shots` where it is too long to be searched for them in passing.
 
     `spin` tells of the shot with the most logo events, or why there is none; `picture` is the address of a PNG.
     """

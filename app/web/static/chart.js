@@ -46,7 +46,7 @@ export class Chart {
     /** @type {any} */
     this.node = document.createElement("div");
     this.node.className = "chart";
-    this.node.setAttribute("role", "img");
+    this.node.setAttribute("role", "group");
     /** @type {ChartSpec["onpick"]} */
     this.onpick = undefined;
   }

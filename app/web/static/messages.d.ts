@@ -41,11 +41,11 @@ export type EventRate = { counts: number[]; edges_us: number[] };
 export type FlightPath = { frame: "table" | "hitter"; t_us: number[]; points_m: [number, number, number][]; net_clearance_m: number | null; height_std_m: number | null; landing_m: [number, number] | null };
 /** Subfolders and recordings of `folder`, a path within the folder `root` of the machine. */
 export type FolderListing = { root: string; folder: string; folders: string[]; recordings: ListedRecording[] };
-/** How the proposal does on clips that it was not tuned on. */
+/** Result of the proposal on clips that it was not tuned on. */
 export type HeldOut = { clips: number; before: number; after: number; objection: string | null };
 /** Revision after a change. */
 export type Kept = { revision: number };
-/** Where shots bounced, by id: metres along the table with the flight from the net, and to the left. */
+/** Places where shots bounced, by id: metres along the table with the flight from the net, and to the left. */
 export type Landings = { landings: Record<string, [number, number]> };
 /** A recording of a folder, or a dropped one; `name` opens it. */
 export type ListedRecording = { name: string; size_bytes: number };
@@ -89,7 +89,7 @@ export type PresetValues = { parameters: Record<string, Record<string, any>>; no
 export type PreviewMessage = { kind: "preview"; serial: number; t_us: number; picture: string; words: string };
 /** The opened recording, worked on shot by shot if it is long; `clip_us` is the first clip, [start, end). */
 export type RecordingDescription = { name: string; events: number; width_px: number; height_px: number; start_us: number; end_us: number; longest_us: number; is_long: boolean; clip_us: [number, number]; margin_us: number; has_truth: boolean; warnings: string[]; rate: EventRate };
-/** What a recording holds, or `error`; without `shots` where it is too long to be searched for them in passing. */
+/** Content of a recording, or `error`; without `shots` where it is too long to be searched for them in passing. */
 export type RecordingSummary = { events: number | null; duration_us: number | null; picture: string | null; shots: number | null; spin: string | null; error: string | null };
 /** The recording after its scene was simulated again. */
 export type Reopened = { recording: RecordingDescription; biases: BiasState };

@@ -19,7 +19,8 @@ SERIES = {
     "ON": entities.ON,
     "OFF": entities.OFF,
     "event rate": entities.RATE_COLOUR,
-    **{method.label: method.colour for method in methods()},
+    # Those of other publications are drawn where they were named only, with their names.
+    **{method.label: method.colour for method in methods() if not method.is_rival},
 }
 # Linear RGB of full protanopia and deuteranopia: Machado, Oliveira and Fernandes 2009, table 1.
 SIMULATIONS = {

@@ -7,9 +7,7 @@ from pathlib import Path
 from ...prophesee_header import parse_header
 from ...reader import FormatReader, ReadingOptions
 from ..registry import FORMATS, RecordingContent, RecordingFormat
-
-EVENT_BYTES = 8
-EVENT_KINDS = (0x00, 0x0C)  # 2D events of version 1 and CD events of version 2
+from .header import EVENT_BYTES, EVENT_KINDS
 
 
 def is_dat(path: Path, head: bytes) -> bool:

@@ -11,8 +11,8 @@ from ....errors import RecordingError
 from ...prophesee_header import MAX_HEADER_BYTES, parse_header
 from ...reader import FormatReader, Place, ReadingOptions, ReadPass, UncheckedEvents, file_errors
 from ...sensor import resolution_or_none
-from . import EVENT_BYTES, EVENT_KINDS
 from .decoding import EVENTS, NOW, OUTSIDE, STATE_SIZE, TIME_JUMPS, DatEvents, decode_dat
+from .header import EVENT_BYTES, EVENT_KINDS
 
 
 class DatReader(FormatReader):

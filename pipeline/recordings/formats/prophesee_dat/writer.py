@@ -8,7 +8,7 @@ import numpy as np
 
 from ....errors import RecordingError
 from ..registry import RecordingContent
-from . import EVENT_BYTES, EVENT_KINDS
+from .header import EVENT_BYTES, EVENT_KINDS
 
 LAST_US = (1 << 32) - 1
 FIELDS = np.dtype([("t", "<u4"), ("pixel", "<u4")])  # pixel: x 14 bits, y 14 bits, polarity 4 bits
