@@ -67,7 +67,8 @@ async function start() {
   if (hasTools) addTools(opening);
   new Keyboard(shortcuts(app, hasTools));
   viewer.start(opening.viewer_version, byId("viewer")).catch((error) => {
-    app.runner.isBlind = true; // the numbers are still there
+    app.runner.isBlind = true; // the numbers and the preview are still there
+    byId("viewer").replaceChildren(); // its own message
     const others = "`spinscope view --native` or `--save FILE.rrd` work without WebAssembly and WebGL";
     notice(`The viewer cannot run in this browser: ${error.message}; ${others}.`);
   });

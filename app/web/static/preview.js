@@ -15,6 +15,8 @@ export class Preview {
   #isAsking = false;
   /** @type {number | null} time that is to be shown next */
   #wanted_us = null;
+  /** @type {number | null} time that is shown */
+  #shown_us = null;
 
   /**
    * @param {{connection: Connection, settings: Settings, runner: RunRequests, viewer: Viewer}} app
@@ -31,7 +33,8 @@ export class Preview {
     runner.addEventListener("shown", () => (this.node.hidden = true));
     runner.addEventListener("numbers", (event) => {
       const { state } = /** @type {CustomEvent} */ (event).detail;
-      if (state === "done" && viewer.playhead_us !== null) this.#scrub(viewer.playhead_us);
+      const time_us = viewer.playhead_us ?? this.#shown_us;
+      if (state === "done" && time_us !== null) this.#scrub(time_us);
     });
     settings.onChange((settled) => (this.#isDragged = !settled));
     viewer.addEventListener("moved", (event) => this.#scrub(/** @type {CustomEvent} */ (event).detail));
@@ -46,6 +49,7 @@ export class Preview {
     if (!this.#isAlone && !this.#isDragged) return;
     this.image.src = picture;
     this.words.textContent = `${words}, at ${(t_us / 1000).toFixed(1)} ms`;
+    this.#shown_us = t_us;
     this.node.hidden = false;
   }
 
