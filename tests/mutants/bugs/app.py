@@ -144,8 +144,8 @@ WEB = [
 COACH = [
     Mutant(
         "app/coach/statistics.py",
-        "if abs(change) < CLEAR_SIGMAS * std:",
-        "if abs(change) < std:",
+        "if abs(change) <= CLEAR_SIGMAS * std:",
+        "if abs(change) <= std:",
         "tests/app/coach/test_terms.py",
     ),
     Mutant(

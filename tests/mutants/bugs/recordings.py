@@ -167,7 +167,7 @@ FORMATS = [
         "these = list(below)",
         "tests/app/test_batch.py -k found_once",
     ),
-    Mutant("pipeline/truth_table.py", 'text = text.replace(",", ".")', "pass", "tests/pipeline/test_truth_table.py"),
+    Mutant("pipeline/text_table.py", 'text = text.replace(",", ".")', "pass", "tests/pipeline/test_truth_table.py"),
 ]
 
 CAMERAS = [
@@ -233,8 +233,8 @@ CAMERAS = [
     ),
     Mutant(
         "pipeline/cameras/recent_events.py",
-        "for number, events in self._kept if number == clock",
-        "for number, events in self._kept",
+        "kept = [events for number, events in self._kept if number == clock]",
+        "kept = [events for _, events in self._kept]",
         "tests/app/test_live.py -k bounded",
     ),
     Mutant(
@@ -309,8 +309,8 @@ CALIBRATION = [
     ),
     Mutant(
         "pipeline/calibration/camera_calibration.py",
-        "float(matrix[0, 2]), float(matrix[1, 2])",
-        "float(matrix[1, 2]), float(matrix[0, 2])",
+        "matrix[0, 2], matrix[1, 2], *distortion",
+        "matrix[1, 2], matrix[0, 2], *distortion",
         "tests/pipeline/calibration/test_camera_calibration.py",
     ),
     Mutant(
