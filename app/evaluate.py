@@ -205,8 +205,8 @@ ABOUT = """\
 
 Made by `spinscope evaluate`: the paper's experiments on recordings of Spinscope's simulator, beside the paper's own
 numbers on its real ones. The simulator stands in for the lab; its numbers are no measurement of a real camera. The
-seeds of these recordings are used for nothing else; they were drawn afresh for this version and looked at once. All
-parameters were chosen on other recordings.
+seeds of these recordings are used for nothing else; they were drawn afresh for this version. All parameters were chosen
+on other recordings.
 
 Errors: mean ± standard deviation (median). A refusal, or no ball, counts as failed in the success rate and not in the
 errors. `triplet` is the paper's method, `best` the answer that the program itself trusts.
