@@ -17,6 +17,7 @@ F. Barranco, C. Fermuller, E. Ros, "Real-time clustering and multi-target tracki
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 
 import cv2
 import numpy as np
@@ -38,8 +39,8 @@ LATEST_US, REACH_RADII, STEPS = 1000, 1.5, 20
 FEWEST_EVENTS = 5
 
 
-class ConvolutionPeak:
-    """Circle at the peak of the surface's convolution with a ring (PUCK)."""
+class FollowedCircle(ABC):
+    """A circle that is followed from tick to tick."""
 
     def __init__(self) -> None:
         self.circle: Circle | None = None
@@ -51,8 +52,20 @@ class ConvolutionPeak:
         elif self.circle is None:
             self.circle = tick.track.hough
         else:
-            self.circle = peak_circle(tick.surface, self.circle, FASTEST_PX_S * _length_s(tick))
+            self.circle = self.next_circle(tick, self.circle)
         return ball_state(self.circle)
+
+    @abstractmethod
+    def next_circle(self, tick: Tick, last: Circle) -> Circle:
+        """The circle at the tick's end, from that of the tick before."""
+
+
+class ConvolutionPeak(FollowedCircle):
+    """Circle at the peak of the surface's convolution with a ring (PUCK)."""
+
+    def next_circle(self, tick: Tick, last: Circle) -> Circle:
+        """See `peak_circle`."""
+        return peak_circle(tick.surface, last, FASTEST_PX_S * _length_s(tick))
 
 
 def peak_circle(surface: SurfaceResult, last: Circle, reach_px: float) -> Circle:
@@ -87,23 +100,13 @@ def ring_kernel(radius_px: float) -> NDArray[np.float32]:
     return kernel
 
 
-class MeanShift:
+class MeanShift(FollowedCircle):
     """Mean of the latest events around the ball, shifted until it stays; the radius is the first circle's."""
 
-    def __init__(self) -> None:
-        self.circle: Circle | None = None
-
-    def step(self, tick: Tick) -> BallState | None:
-        """The ball at the tick's end, None while there is no track."""
-        if not tick.track.has_ball:
-            self.circle = None
-        elif self.circle is None:
-            self.circle = tick.track.hough
-        else:
-            end_us = tick.packet.end_us
-            latest = tick.filter.contour_events.between(end_us - LATEST_US, end_us)
-            self.circle = shifted_circle(latest, self.circle)
-        return ball_state(self.circle)
+    def next_circle(self, tick: Tick, last: Circle) -> Circle:
+        """See `shifted_circle`."""
+        end_us = tick.packet.end_us
+        return shifted_circle(tick.filter.contour_events.between(end_us - LATEST_US, end_us), last)
 
 
 def shifted_circle(events: EventBatch, last: Circle) -> Circle:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ...kernels.patch_matching import patch_displacements
 from ...kernels.plane_flow import plane_flow
 from ...results import Packet, SpinEstimate
-from ...stage import Context
+from ...stage import Context, SpinMethod
 from ...stages.flow import PLANE_SCALES, FlowEvents, FlowParameters, FlowResult, FlowState, ended_slices, slice_us
 from ...stages.logo import LogoResult
 from ...stages.rate import RateResult
@@ -163,30 +163,29 @@ class SliceFlowSpin:
         return replace(self.spin.estimate(packet.end_us, flow, rate), covariance_rps2=None)
 
 
-LUCAS_KANADE = rival(
+def _slice_flow(name: str, label: str, help: str, colour: tuple[int, int, int], flow_of: FlowOfSlice) -> SpinMethod:
+    state = partial(SliceFlowSpin, flow_of)
+    return rival(name, label, help, colour, inputs=("packet", "logo", "rate"), state=state, reads=FLOW)
+
+
+LUCAS_KANADE = _slice_flow(
     "lucas_kanade",
     "Lucas-Kanade",
     "the paper's spin with Lucas-Kanade's flow on accumulated frames (IJCAI 1981).",
     (141, 110, 99),
-    inputs=("packet", "logo", "rate"),
-    state=partial(SliceFlowSpin, lucas_kanade),
-    reads=FLOW,
+    lucas_kanade,
 )
-PLANES = rival(
+PLANES = _slice_flow(
     "plane_flow",
     "Plane fitting",
     "the paper's spin with the flow of local planes (Aung 2018).",
     (120, 144, 156),
-    inputs=("packet", "logo", "rate"),
-    state=partial(SliceFlowSpin, planes),
-    reads=FLOW,
+    planes,
 )
-TIME_SURFACES = rival(
+TIME_SURFACES = _slice_flow(
     "time_surface",
     "Time-surface matching",
     "the paper's spin with flow by matching time surfaces (Nagata 2021).",
     (220, 231, 117),
-    inputs=("packet", "logo", "rate"),
-    state=partial(SliceFlowSpin, time_surfaces),
-    reads=FLOW,
+    time_surfaces,
 )
