@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ..compilation import njit
 
 PEAK_BIN_US = 1000  # the peak rate is that of the fullest millisecond
 # A hot pixel has 10 events or more, and over 10 times as many as the second busiest of its 8 neighbours: a

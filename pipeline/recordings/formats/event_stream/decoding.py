@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ....compilation import njit
 
 EVENT_BYTES = 5
 NOW, EVENTS = 0, 1  # indices of `EventStreamEvents.state`: time of the last event, number written by the last call
