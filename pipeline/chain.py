@@ -16,193 +16,24 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import dataclass, field
 from itertools import islice
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
 from .camera import Camera
 from .errors import ParameterError
-from .events import EventBatch
-from .registry import STAGES, Parameters, default_stages, distrust_reason, methods, needed_stages, trusted_method
-from .results import MethodResult, Packet, SpinEstimate, nbytes
+from .event_source import EventSource
+from .registry import STAGES, Parameters, default_stages, needed_stages
+from .results import Packet, nbytes
 from .stage import Context, Stage
+from .tick import BallTick, Tick
 from .track_evidence import NO_EVIDENCE, TrackEvidence
-
-if TYPE_CHECKING:
-    from .spin.contrast.result import ContrastResult
-    from .spin.trajectory.stage import TrajectoryResult
-    from .stages.filter import FilterResult
-    from .stages.flow import FlowResult
-    from .stages.logo import LogoResult
-    from .stages.rate import RateResult
-    from .stages.surface import SurfaceResult
-    from .stages.track_result import BallTrack, TrackResult
 
 CACHE_BYTES = 2 << 30
 MAX_COLUMNS = 10_000
 MAX_TICKS = 4_000_000  # 5.5 hours at 200 Hz; more is a damaged clock, not a recording
 # How long packets are kept for shots that are announced late: five times what a contact takes to be seen at 200 Hz.
 EARLIER_US = 100_000
-
-
-@dataclass(frozen=True, eq=False)
-class StageResults:
-    """Results by stage name, of the stages that were run."""
-
-    results: Mapping[str, Any]
-
-    def get(self, name: str) -> Any:
-        """Result of a stage, None where it was not run."""
-        return self.results.get(name)
-
-    @cached_property
-    def estimates(self) -> dict[str, SpinEstimate]:
-        """Spin estimates from the present shot so far, by method, of the methods that were run."""
-        return {method.name: self.results[method.name].estimate for method in methods() if method.name in self.results}
-
-
-@dataclass(frozen=True, eq=False)
-class BallTick(StageResults):
-    """Results of one ball in one tick.
-
-    Attributes
-    ----------
-    results : Mapping[str, Any]
-        By name: the stages of one ball.
-    packet : Packet
-        The tick's events, from the start of the shot on.
-    track : BallTrack
-        The ball at the tick's end.
-    evidence : TrackEvidence
-        What its track shows from the shot's start to this tick.
-    earlier : tuple of BallTick
-        The ticks since the shot's start that came before it was announced, oldest first.
-    """
-
-    packet: Packet
-    track: BallTrack
-    evidence: TrackEvidence
-    earlier: tuple[BallTick, ...] = ()
-
-    @cached_property
-    def best(self) -> str | None:
-        """Method whose estimate is trusted, None where none is."""
-        return trusted_method(self.estimates, self.evidence.doubt)
-
-    @property
-    def best_reason(self) -> str | None:
-        """Reason for trusting no estimate, in words for people; None where one is."""
-        return distrust_reason(self.estimates, self.evidence.doubt)
-
-
-@dataclass(frozen=True, eq=False)
-class Tick(StageResults):
-    """Results of one tick: attributes by stage name, of the stages that were run.
-
-    Results of one ball are those of the ball that the detail views follow, the first one; without a ball they say why.
-
-    Attributes
-    ----------
-    packet : Packet
-        The tick's events.
-    results : Mapping[str, Any]
-        By name: the stages of the recording, and those of one ball for the followed ball, or for no ball.
-    balls : tuple of BallTick
-        Every ball in flight.
-    """
-
-    packet: Packet
-    balls: tuple[BallTick, ...]
-
-    @property
-    def best(self) -> str | None:
-        """Method whose estimate is trusted for the followed ball, None where none is."""
-        return self.balls[0].best if self.balls else None
-
-    if TYPE_CHECKING:  # results of the stages that ship; no fields, and not the only ones
-        filter: ClassVar[FilterResult]
-        surface: ClassVar[SurfaceResult]
-        track: ClassVar[TrackResult]
-        logo: ClassVar[LogoResult]
-        rate: ClassVar[RateResult]
-        flow: ClassVar[FlowResult]
-        triplet: ClassVar[MethodResult]
-        normal_flow: ClassVar[MethodResult]
-        contrast: ClassVar[ContrastResult]
-        trajectory: ClassVar[TrajectoryResult]
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        try:
-            return self.results[name]
-        except KeyError:
-            raise AttributeError(f"{name} is not among the targets of this run: {', '.join(self.results)}") from None
-
-
-class EventSource(Protocol):
-    """Origin of events: a recording, a camera or a simulation."""
-
-    @property
-    def identity(self) -> Hashable:
-        """Identity of the source by content: no other has an equal one."""
-
-    @property
-    def width_px(self) -> int:
-        """Width of the sensor."""
-
-    @property
-    def height_px(self) -> int:
-        """Height of the sensor."""
-
-    @property
-    def start_us(self) -> int:
-        """Time from which events exist (file time)."""
-
-    @property
-    def end_us(self) -> int:
-        """Time up to which all events are known (file time, exclusive); grows while a camera is running."""
-
-    @property
-    def growing(self) -> bool:
-        """Whether events may still come; then only whole ticks are run."""
-
-    def between(self, start_us: int, end_us: int) -> EventBatch:
-        """The events of [start_us, end_us). Asked for in rising order when `run` forgets packets."""
-
-
-@dataclass(frozen=True)
-class EventsInMemory:
-    """Source whose events are all in memory."""
-
-    identity: Hashable
-    events: EventBatch
-    width_px: int
-    height_px: int
-    start_us: int
-    end_us: int
-    growing: bool = False
-
-    def between(self, start_us: int, end_us: int) -> EventBatch:
-        """The events of [start_us, end_us)."""
-        return self.events.between(max(start_us, self.start_us), min(end_us, self.end_us))
-
-    @property
-    def event_count(self) -> int:
-        """Number of events."""
-        return len(self.events)
-
-    def rate(self, edges_us: NDArray[np.int64]) -> NDArray[np.int64]:
-        """(n,) int64 numbers of events between n + 1 times."""
-        return np.diff(np.searchsorted(self.events.t_us, edges_us))
-
-    def part(self, identity: Hashable, start_us: int, end_us: int) -> EventsInMemory:
-        """The events of [start_us, end_us) as a source of its own."""
-        return replace(self, identity=identity, events=self.between(start_us, end_us), start_us=start_us, end_us=end_us)
 
 
 @dataclass(slots=True, eq=False)

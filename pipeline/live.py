@@ -24,8 +24,9 @@ import numpy as np
 
 from .cameras import ArrivedTick, EventCamera, EventStream
 from .cameras.clock import now_s
-from .chain import Chain, EventsInMemory, Tick
+from .chain import Chain
 from .errors import CameraError, ParameterError
+from .event_source import EventsInMemory
 from .events import EventBatch
 from .live_outputs import LiveBall, LiveNotice, LiveOutput, LiveShot, LiveSpin, LiveStatus
 from .recordings import RawWriter
@@ -36,6 +37,7 @@ from .session import SAMPLES, Choices, Session, method_targets
 from .shots import ShotLog
 from .spin_so_far import ContrastInFlight, SpinsInFlight
 from .stages.track_result import EndedBy
+from .tick import Tick
 
 STATUS_S = 1.0
 # Ticks with a ball that wait for their spins, at the most; then the tracker waits, too: 3 s of flight at 200 Hz, which

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .chain import Tick
 from .flight_calibration import measured_up
 from .results import SpinEstimate
 from .session import Result, Session
 from .shots import Shot
 from .spin_terms import Kind, kind_of_spin, km_h, rpm
+from .tick import Tick
 
 Floats = NDArray[np.float64]
 

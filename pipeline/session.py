@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from .camera import Camera, CameraParameters
-from .chain import Chain, EventsInMemory, Tick
+from .chain import Chain
 from .errors import ParameterError, RecordingError
+from .event_source import EventsInMemory
 from .events import EventBatch
 from .presets import preset
 from .recordings import ReadingOptions, Recording, open_recording
@@ -23,6 +24,7 @@ from .results import Truth
 from .shots import Shot, ShotLog
 from .sidecar import GROUPS, Sidecar
 from .stages.fixed_ball import find_fixed_ball
+from .tick import Tick
 
 SAMPLES = Path(__file__).parents[1] / "sample_recordings"
 DEFAULT_SAMPLE = SAMPLES / "flight_fast_top.h5"

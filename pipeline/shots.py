@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .camera import Camera
-from .chain import EARLIER_US, BallTick, Tick
+from .chain import EARLIER_US
 from .errors import ParameterError
 from .registry import distrust_reason, trusted_method
 from .results import ReadOnlyArrays, SpinEstimate, Truth, spin_errors
 from .spin.combined.result import CombinedResult
 from .spin.trajectory.motion import FittedMotion
 from .stages.track_result import BallTrack, BeganBy, EndedBy, ShotEnd
+from .tick import BallTick, Tick
 
 Floats = NDArray[np.float64]
 

@@ -14,11 +14,12 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from .chain import BallTick, Chain
+from .chain import Chain
 from .registry import Parameters
 from .results import SpinEstimate
 from .spin.contrast import stage as contrast
 from .spin.contrast.parameters import FLOW_METHOD
+from .tick import BallTick
 
 # The methods by accuracy on the evaluation's flights, best first.
 ROLLING_METHODS = ("contrast", "normal_flow", "triplet")

@@ -14,13 +14,13 @@ import numpy as np
 from spinscope.pipeline.biases import BiasParameters
 from spinscope.pipeline.cameras import ArrivedTick
 from spinscope.pipeline.cameras.event_camera import check_biases
-from spinscope.pipeline.chain import Tick
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.live_outputs import LiveNotice, LiveOutput, LiveShot, LiveSpin, LiveStatus
 from spinscope.pipeline.recordings import write_recording
 from spinscope.pipeline.registry import Parameters
 from spinscope.pipeline.result_rows import ResultRow
 from spinscope.pipeline.spin_terms import vector_words
+from spinscope.pipeline.tick import Tick
 
 from ..tuning.bias_sweep import BiasRange, BiasState, BiasSweep
 from ..viewer import entities

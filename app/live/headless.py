@@ -12,11 +12,11 @@ from typing import Protocol
 
 from spinscope.pipeline.cameras import ArrivedTick, EventCamera, EventStream, RecentEvents
 from spinscope.pipeline.cameras.event_stream import Sink
-from spinscope.pipeline.chain import Tick
 from spinscope.pipeline.live import LiveRun, load_kernels
 from spinscope.pipeline.live_outputs import LiveBall, LiveNotice, LiveOutput, LiveShot, LiveSpin
 from spinscope.pipeline.result_rows import ResultRow
 from spinscope.pipeline.session import Choices, Session
+from spinscope.pipeline.tick import Tick
 
 from ..terminal import note
 from ..tuning.bias_sweep import BiasSweep

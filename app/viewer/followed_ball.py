@@ -6,9 +6,9 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from spinscope.pipeline.chain import BallTick, Tick
 from spinscope.pipeline.shots import Shot
 from spinscope.pipeline.stages.track_result import Status
+from spinscope.pipeline.tick import BallTick, Tick
 
 Absent = Callable[[str, str], Any]
 

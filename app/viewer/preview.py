@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from spinscope.pipeline.chain import Tick
 from spinscope.pipeline.kernels.hsv import hsv_image
+from spinscope.pipeline.tick import Tick
 
 from . import entities as at
 from .png import png

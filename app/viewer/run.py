@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinscope.pipeline.camera import Camera
-from spinscope.pipeline.chain import Tick
 from spinscope.pipeline.recordings import CameraFrame, Recording
 from spinscope.pipeline.registry import STAGES, methods, rival_methods
 from spinscope.pipeline.results import SpinEstimate, Truth
 from spinscope.pipeline.shots import Shot
 from spinscope.pipeline.stage import SpinMethod
+from spinscope.pipeline.tick import Tick
 
 from .followed_ball import followed_ticks
 

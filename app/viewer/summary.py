@@ -11,10 +11,10 @@ import rerun as rr
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from spinscope.pipeline.chain import Tick
 from spinscope.pipeline.results import SpinEstimate
 from spinscope.pipeline.shots import BEGAN_WORDS, ENDED_WORDS
 from spinscope.pipeline.spin_terms import Kind, axis_words, kind_of_spin, km_h, rpm, speed_words, std_words
+from spinscope.pipeline.tick import Tick
 
 from . import entities as at
 from .png import png

@@ -15,10 +15,10 @@ from spinscope.app.viewer.drawing_cache import DrawingCache
 from spinscope.app.viewer.preview import preview, preview_words
 from spinscope.app.viewer.rrd import rrd_bytes
 from spinscope.app.viewer.run import ViewedRun
-from spinscope.pipeline.chain import Tick
 from spinscope.pipeline.metrics import RunMetrics
 from spinscope.pipeline.registry import STAGES
 from spinscope.pipeline.session import Result
+from spinscope.pipeline.tick import Tick
 
 from .message_queue import MessageQueue
 from .open_recording import OpenRecording

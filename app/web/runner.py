@@ -9,9 +9,9 @@ from collections.abc import Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 from spinscope.app.viewer.run import ViewedRun
-from spinscope.pipeline.chain import Tick
 from spinscope.pipeline.registry import STAGES, Parameters, quick_stages
 from spinscope.pipeline.session import Result, Session
+from spinscope.pipeline.tick import Tick
 
 from .jobs import error_text
 from .message_queue import RequestQueue, Superseded

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..api import estimate
-from ..chain import Chain, EventsInMemory
+from ..chain import Chain
+from ..event_source import EventsInMemory
 from ..presets import preset
 from ..recordings.in_memory import RecordingInMemory
 from ..registry import Parameters, methods

@@ -23,10 +23,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..chain import Tick
 from ..events import EventBatch
 from ..results import Circle
 from ..stages.surface import SurfaceResult
+from ..tick import Tick
 
 BallState = NDArray[np.float64]  # (5,) x, y, vx, vy, radius in px and px/s; NaN where there is none
 

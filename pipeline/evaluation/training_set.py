@@ -17,10 +17,10 @@ import numpy as np
 from joblib import Parallel
 from numpy.typing import NDArray
 
-from ..chain import Tick
 from ..errors import ParameterError
 from ..files import atomic_file
 from ..simulator import SimulatedRecording, human_shot, spinner
+from ..tick import Tick
 from .estimation import chain_over
 from .rendering import camera_of, render
 from .suites.spinner import known_circle

@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from spinscope.pipeline.chain import Chain, EventsInMemory
+from spinscope.pipeline.chain import Chain
+from spinscope.pipeline.event_source import EventsInMemory
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.registry import STAGES, Parameters
 from spinscope.pipeline.results import Packet

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spinscope.pipeline.chain import Tick
 from spinscope.pipeline.results import MethodResult, SpinEstimate
 from spinscope.pipeline.session import Choices, Session
 from spinscope.pipeline.spin.contrast import stage as contrast
@@ -19,6 +18,7 @@ from spinscope.pipeline.spin.contrast.events import whole_window
 from spinscope.pipeline.spin.contrast.parameters import ContrastParameters
 from spinscope.pipeline.spin.contrast.score import score
 from spinscope.pipeline.stage import Context
+from spinscope.pipeline.tick import Tick
 from tests.reference.contrast import dotted_ball, naive_score
 
 # The thread's own time: what other programs do on a shared machine does not count.

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from spinscope.pipeline.chain import Chain, EventsInMemory
+from spinscope.pipeline.chain import Chain
+from spinscope.pipeline.event_source import EventsInMemory
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.registry import Parameters
 from tests.benchmarks.bench_chain import SAMPLES, ball, clutter, flight, packets

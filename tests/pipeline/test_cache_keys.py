@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spinscope.pipeline.chain import Chain, EventsInMemory
+from spinscope.pipeline.chain import Chain
+from spinscope.pipeline.event_source import EventsInMemory
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.parameters import Tunable
 from spinscope.pipeline.registry import STAGES, Parameters

@@ -15,11 +15,13 @@ import pytest
 from numpy.typing import NDArray
 
 from spinscope.pipeline import chain as chain_module
-from spinscope.pipeline.chain import Chain, EventsInMemory, Tick
+from spinscope.pipeline.chain import Chain
 from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.event_source import EventsInMemory
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.registry import STAGES, Parameters
 from spinscope.pipeline.stage import Stage
+from spinscope.pipeline.tick import Tick
 
 INPUTS = {
     "filter": ("packet",),

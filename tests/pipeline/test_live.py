@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 
 from spinscope.pipeline.cameras import ArrivedTick, EventStream, ReplayCamera
-from spinscope.pipeline.chain import Tick
 from spinscope.pipeline.errors import CameraError, ParameterError
 from spinscope.pipeline.live import LiveRun
 from spinscope.pipeline.live_outputs import LiveBall, LiveNotice, LiveOutput, LiveShot, LiveSpin, LiveStatus
 from spinscope.pipeline.session import Session
 from spinscope.pipeline.spin_so_far import ROLLING_METHODS
+from spinscope.pipeline.tick import Tick
 
 QUICK = "triplet"  # contrast has the same code behind it and takes ten times as long
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spinscope.pipeline.chain import BallTick
 from spinscope.pipeline.registry import quick_stages
 from spinscope.pipeline.results import SpinEstimate, spin_errors
 from spinscope.pipeline.session import Session
 from spinscope.pipeline.spin_so_far import ANSWERS_KEPT, ContrastInFlight, SpinsInFlight, SpinSoFar
+from spinscope.pipeline.tick import BallTick
 
 
 @pytest.fixture(scope="module")

@@ -8,12 +8,13 @@ import numpy as np
 
 from ...calibration.ball_labels import BallLabels
 from ...camera import BallParameters
-from ...chain import Chain, Tick
+from ...chain import Chain
 from ...errors import RecordingError
 from ...registry import Parameters
 from ...results import Circle, Truth
 from ...simulator import flight
 from ...stages.track_kalman import OBSERVED, BallFilter
+from ...tick import Tick
 from .. import paper
 from ..estimation import chain_over
 from ..lab_recordings import FLIGHT, LabRecording

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...cameras import EventStream, ReplayCamera
-from ...chain import EventsInMemory
+from ...event_source import EventsInMemory
 from ...events import EventBatch
 from ...live import LiveRun, load_kernels
 from ...live_outputs import LiveShot, LiveSpin, LiveStatus

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from spinscope.app.viewer.run import ViewedRun
-from spinscope.pipeline.chain import Tick
 from spinscope.pipeline.registry import STAGES
 from spinscope.pipeline.session import Choices, Session
+from spinscope.pipeline.tick import Tick
 
 
 def run_of(path: Path, choices: Choices) -> ViewedRun:

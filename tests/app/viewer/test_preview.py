@@ -10,7 +10,7 @@ import numpy as np
 from spinscope.app.viewer import entities
 from spinscope.app.viewer.preview import SIDE_PX, TITLES, _turned, preview, preview_words
 from spinscope.app.viewer.run import ViewedRun
-from spinscope.pipeline.chain import Tick
+from spinscope.pipeline.tick import Tick
 
 
 def panes(content: bytes) -> list[np.ndarray]:

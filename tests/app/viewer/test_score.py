@@ -12,7 +12,7 @@ from spinscope.app.viewer import entities
 from spinscope.app.viewer.rrd import write_rrd
 from spinscope.app.viewer.run import ViewedRun
 from spinscope.app.viewer.score import CELL_PX, DISC_RADIUS_PX, GAP_PX
-from spinscope.pipeline.chain import Tick
+from spinscope.pipeline.tick import Tick
 from tests.app.viewer.conftest import with_results
 from tests.app.viewer.reading import Rows, read_back
 

@@ -13,12 +13,14 @@ import h5py
 import numpy as np
 import pytest
 
-from spinscope.pipeline.chain import Chain, EventsInMemory, Tick
+from spinscope.pipeline.chain import Chain
+from spinscope.pipeline.event_source import EventsInMemory
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.registry import STAGES, Parameters, default_stages
 from spinscope.pipeline.session import Choices, Session
 from spinscope.pipeline.stage import Stage
 from spinscope.pipeline.stages.track_result import TrackResult
+from spinscope.pipeline.tick import Tick
 
 FIXED = Parameters().with_values(
     {"track": {"ball": "fixed", "fixed_x_px": 528.43, "fixed_y_px": 426.87, "fixed_radius_px": 16.49}}
