@@ -1,7 +1,8 @@
 """Fixtures, options and workers of all tests.
 
 A run of everything has two workers. Numba keeps machine code beside the sources, so what one of them compiles the other
-one loads; a lock for each function has the second one wait for the first instead of compiling the same.
+one loads; a lock for each function has the second one wait for the first instead of compiling the same. So that it
+need not wait, one begins with the file that compiles most and the other with files that need hardly any kernel.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,11 +27,19 @@ except ImportError:  # Windows: the workers then compile some functions twice
     fcntl = None  # type: ignore[assignment]
 
 # Kernels compile inside the first example. The gate tries the same examples every time; a developer others each time.
-settings.register_profile("spinscope", deadline=None, derandomize=bool(os.environ.get("CI")))
+settings.register_profile("spinscope", deadline=None, max_examples=50, derandomize=bool(os.environ.get("CI")))
 settings.load_profile("spinscope")
 
 SAMPLES = Path(__file__).parents[1] / "sample_recordings"
 WORKERS = 2
+FIRST = (
+    "pipeline/stages/test_contract.py",  # compiles all kernels of the stages
+    "pipeline/recordings/test_recordings_fuzz.py",
+    "test_gate.py",
+    "app/coach/test_page.py",
+    "app/coach/test_page_access.py",
+    "pipeline/test_isolation.py",
+)
 
 
 @pytest.fixture(scope="session")
@@ -44,6 +54,14 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
         return WORKERS
     config.option.dist = "no"
     return 0
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the files named in FIRST first, then those with most tests."""
+    folder = Path(__file__).parent
+    rank = {folder / name: number for number, name in enumerate(FIRST)}
+    count = Counter(item.path for item in items)
+    items.sort(key=lambda item: (rank.get(item.path, len(rank)), -count[item.path]))
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -294,7 +294,8 @@ def test_ctrl_c_and_kill_end_all_processes_and_the_rows_are_kept(folder: Path, s
     for number in range(30):
         shutil.copy(samples / "flight_slow_top.h5", folder / f"flight{number}.h5")
     journal = Path("out.csv.rows.jsonl")
-    command = [sys.executable, "-m", "spinscope", "analyze", "in", "--out", "out.csv", "--jobs", "2"]
+    options = ["--out", "out.csv", "--method", "triplet", "--jobs", "2"]
+    command = [sys.executable, "-m", "spinscope", "analyze", "in", *options]
     with subprocess.Popen(
         command, stderr=subprocess.PIPE, text=True, start_new_session=True, env=os.environ
     ) as running:

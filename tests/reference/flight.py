@@ -58,7 +58,8 @@ def naive_log_likelihood(
     """The average over the scale of the lift, by summation."""
     lift = naive_lift(spin_rps, velocity_m_s, air)
     scales = np.linspace(-30.0, 30.0, 20001)
-    values = np.array([pull @ (s * lift) - 0.5 * s * s * lift @ information @ lift for s in 1 + lift_std * scales])
+    factors = 1 + lift_std * scales
+    values = factors * (pull @ lift) - 0.5 * factors**2 * (lift @ information @ lift)
     density = np.exp(-0.5 * scales**2) / np.sqrt(2 * np.pi)
     top = values.max()
     return float(top + np.log(np.sum(np.exp(values - top) * density) * (scales[1] - scales[0])))
