@@ -27,6 +27,7 @@ PIPELINE = Path(__file__).parents[1]
 CACHE_BYTES = 2 << 30  # a full run of all suites keeps some 200 MB; older versions' files go first
 WORKER_IDLE_S = 5  # after so long without work a process ends
 PARENT_CHECK_S = 1.0  # how often a process looks whether the one that started it still lives
+CLUSTER_WAIT_S = 10.0  # the longest that a cluster and its first worker are waited for
 Progress = Callable[[float, str], None]  # share done (0..1) and what is being done
 
 
@@ -99,7 +100,7 @@ def executor(workers: int = 1, cluster: str | None = None) -> Iterator[Parallel]
         Number of processes; up to 1, this process does the work.
     cluster : str or None
         Address of a Dask scheduler, like "tcp://127.0.0.1:8786", whose workers do the work instead; raises
-        ParameterError where Dask is not installed or none answers.
+        ParameterError where Dask is not installed, none answers or it has no workers.
     """
     options: dict[str, Any] = {"return_as": "generator_unordered", "batch_size": 1}
     if cluster is None:
@@ -112,11 +113,15 @@ def executor(workers: int = 1, cluster: str | None = None) -> Iterator[Parallel]
     except ImportError:
         raise ParameterError("a cluster needs Dask: install it with `pip install spinscope[cluster]`") from None
     try:
-        client = dask.Client(cluster, timeout=10)
+        client = dask.Client(cluster, timeout=CLUSTER_WAIT_S)
     except (OSError, ValueError) as error:
         reason = " ".join(str(error).split())[:200]
         raise ParameterError(f"no Dask cluster answers at {cluster} ({reason}): is it running?") from error
     with client, parallel_config("dask"):
+        try:
+            client.wait_for_workers(1, timeout=CLUSTER_WAIT_S)
+        except TimeoutError as error:
+            raise ParameterError(f"the Dask cluster at {cluster} has no workers: start some") from error
         yield Parallel(-1, **options)
 
 

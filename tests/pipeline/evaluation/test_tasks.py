@@ -189,15 +189,28 @@ def test_two_workers_of_a_dask_cluster(tmp_path: Path) -> None:
     import distributed as dask
 
     with (
-        dask.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        dask.LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
         executor(cluster=cluster.scheduler_address) as parallel,
     ):
         rows = run([Task(pow_of, {"number": number}) for number in range(6)], TaskContext(tmp_path), parallel)
         with pytest.raises(ParameterError, match="no"):
             run([*squares(3), Task(failing), *squares(9)[3:]], TaskContext(tmp_path), parallel)
     assert [row["power"] for row in rows] == [2**n for n in range(6)]
-    assert len({row["process"] for row in rows}) <= 2
+
+
+@pytest.mark.filterwarnings("ignore")  # Dask's own
+@pytest.mark.filterwarnings("default")  # Dask warns of slow machines
+def test_a_cluster_without_workers_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    import distributed as dask
+
+    monkeypatch.setattr("spinscope.pipeline.evaluation.tasks.CLUSTER_WAIT_S", 0.1)
+    with (
+        dask.LocalCluster(n_workers=0, processes=False, dashboard_address=None) as cluster,
+        pytest.raises(ParameterError, match="has no workers"),
+        executor(cluster=cluster.scheduler_address),
+    ):
+        pass
 
 
 def pow_of(context: TaskContext, number: int) -> list[Row]:
-    return [{"power": 2**number, "process": os.getpid()}]
+    return [{"power": 2**number}]
