@@ -1,26 +1,21 @@
 """Calls in a process of their own, for foreign libraries that a damaged or hostile file can hang, crash or blow up.
 
 The process has limits on memory and on computing and waiting without progress; when one is reached it ends, and the
-call raises `IsolationError` while everything else goes on. It is started once and kept for the next call. It is no
-child of `multiprocessing`, which would run an unguarded script of the user a second time.
+call raises `IsolationError` while everything else goes on. It is started once and kept for the next call.
 """
 
 from __future__ import annotations
 
-import atexit
 import faulthandler
 import math
 import os
-import pickle
 import signal
-import subprocess
-import sys
-import threading
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, BinaryIO, TypeVar
 
+from .child_process import ChildProcess, IdleProcesses, pipes_to_parent, receive_value, send_value
 from .errors import SpinscopeError
 
 try:
@@ -77,11 +72,11 @@ def iterate(function: Callable[..., Iterator[Value]], *arguments: Any) -> Iterat
 
     The process works one value ahead. The limit of time holds for each value.
     """
-    process = _idle_process() or _Process()
+    process = _idle.take() or _Process()
     try:
-        process.send(function, arguments)
+        process.call(function, arguments)
         while True:
-            kind, value = process.receive()
+            kind, value = process.answer()
             if kind != VALUE:
                 break
             wish = STOP
@@ -91,7 +86,10 @@ def iterate(function: Callable[..., Iterator[Value]], *arguments: Any) -> Iterat
             finally:
                 process.ask(wish)
     finally:
-        _keep(process)
+        if process.is_idle:
+            _idle.keep(process)
+        else:
+            process.end()
     if kind == OUR_ERROR:
         raise value
     if kind == OUT_OF_MEMORY:
@@ -115,74 +113,44 @@ def _single(function: Callable[..., Value], *arguments: Any) -> Iterator[Value]:
     yield function(*arguments)
 
 
-class _Process:
-    """The caller's side of one process."""
+class _Process(ChildProcess):
+    """Process with limits, which answers calls."""
 
     def __init__(self) -> None:
         self._silence_s = MAX_SILENCE_S
-        path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
         try:
-            self._process = subprocess.Popen(
-                # -P: what lies in the working folder is not imported.
-                [sys.executable, "-P", "-c", f"from {__name__} import serve; serve({MAX_CPU_S}, {MAX_SILENCE_S})"],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                env={**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"},  # threads take memory
+            super().__init__(
+                f"from {__name__} import serve; serve({MAX_CPU_S}, {MAX_SILENCE_S})",
+                {"OPENBLAS_NUM_THREADS": "1"},  # threads take memory
             )
         except OSError as error:
             raise IsolationError(f"the process to read it in does not start ({error.strerror})") from error
-        assert self._process.stdin is not None and self._process.stdout is not None
-        self._requests: BinaryIO = self._process.stdin  # type: ignore[assignment]
-        self._answers: BinaryIO = self._process.stdout  # type: ignore[assignment]
         self.is_idle = True  # whether it waits for a call
 
-    def send(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
-        """Call a function; raises nothing where the process has ended, which `receive` then tells."""
+    def call(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
+        """Call a function, whose values `answer` gives."""
         self.is_idle = False
         folder = None  # of relative paths
         with suppress(OSError):  # it has been removed: only absolute paths are of use
             folder = os.getcwd()
-        self._write(pickle.dumps((function, arguments, folder)))
+        self.send((function, arguments, folder))
 
     def ask(self, wish: bytes) -> None:
         """Ask for the next value, or for none."""
-        self._write(wish)
+        self.send(wish)
         self.is_idle = wish == STOP
 
-    def receive(self) -> tuple[int, Any]:
+    def answer(self) -> tuple[int, Any]:
         """Kind and value of the answer; raises IsolationError when the process has ended."""
         try:
-            kind, pickled, sizes = pickle.load(self._answers)
-            buffers = [bytearray(size) for size in sizes]
-            for buffer in buffers:
-                if self._answers.readinto(buffer) < len(buffer):  # type: ignore[attr-defined]
-                    raise EOFError
-        except (EOFError, pickle.UnpicklingError) as error:
+            kind, value = self.receive()
+        except EOFError as error:
             raise IsolationError(self._end_in_words()) from error
         self.is_idle = kind != VALUE
-        return kind, pickle.loads(pickled, buffers=buffers)
-
-    def is_running(self) -> bool:
-        """Whether the process still runs and can be talked to."""
-        return self._process.poll() is None and not self._requests.closed
-
-    def end(self) -> None:
-        """End the process."""
-        self._process.kill()
-        self._process.wait()
-        for pipe in (self._requests, self._answers):
-            with suppress(OSError):
-                pipe.close()
-
-    def _write(self, content: bytes) -> None:
-        # A closed pipe is a ValueError: the garbage collector may close it before it ends an abandoned `iterate`.
-        with suppress(BrokenPipeError, ValueError):
-            self._requests.write(content)
-            self._requests.flush()
+        return kind, value
 
     def _end_in_words(self) -> str:
-        status = self._process.wait()
+        status = self.exit_status()
         if status == SILENT_EXIT:
             return f"reading it makes no progress for {self._silence_s:g} s"
         if hasattr(signal, "SIGXCPU") and status == -signal.SIGXCPU:
@@ -190,38 +158,7 @@ class _Process:
         return f"reading it crashes the library (exit status {status})"
 
 
-_idle: list[_Process] = []
-_idle_lock = threading.Lock()
-
-
-def _idle_process() -> _Process | None:
-    """A process that waits for a call; None where there is none."""
-    with _idle_lock:
-        while _idle:
-            process = _idle.pop()
-            if process.is_running():
-                return process
-            process.end()
-    return None
-
-
-def _keep(process: _Process) -> None:
-    """Keep a process for the next call, or end it where it cannot take one or enough others wait."""
-    with _idle_lock:
-        if process.is_idle and process.is_running() and len(_idle) < MAX_IDLE:
-            _idle.append(process)
-            return
-    process.end()
-
-
-def _end_idle() -> None:
-    while (process := _idle_process()) is not None:
-        process.end()
-
-
-atexit.register(_end_idle)
-if hasattr(os, "register_at_fork"):  # a copy of this process must not talk to the same ones
-    os.register_at_fork(after_in_child=_idle.clear)
+_idle = IdleProcesses[_Process](MAX_IDLE)
 
 
 _limits: tuple[int, float] | None = None  # CPU time and time in seconds; None where this process has no limits
@@ -237,15 +174,11 @@ def serve(cpu_s: int, silence_s: float) -> None:
     """
     global _limits
     _limits = (cpu_s, silence_s)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the caller's, who then closes the pipe
-    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    with open(os.devnull, "r+b") as nothing:  # a library that prints must not disturb the answers
-        os.dup2(nothing.fileno(), 0)
-        os.dup2(nothing.fileno(), 1)
+    requests, answers = pipes_to_parent()
     _limit_memory()
     try:
         while True:
-            function, arguments, folder = pickle.load(requests)
+            function, arguments, folder = receive_value(requests)
             if folder is not None:
                 with suppress(OSError):
                     os.chdir(folder)
@@ -258,11 +191,11 @@ def _answer(values: Iterator[Any], requests: BinaryIO, answers: BinaryIO) -> Non
     """Send the values, each when the caller asks for it, then the end or an error."""
     kind, value = _next(values)
     while True:
-        _send(answers, kind, value)
+        send_value(answers, (kind, value))
         if kind != VALUE:
             return
         kind, value = _next(values)  # while the caller works on the one before
-        if requests.read(len(NEXT)) != NEXT:
+        if receive_value(requests) != NEXT:
             with _time_limit():
                 values.close()  # type: ignore[attr-defined]
             return
@@ -281,17 +214,6 @@ def _next(values: Iterator[Any]) -> tuple[int, Any]:
         return OUT_OF_MEMORY, None
     except Exception:  # noqa: BLE001  raised again by the caller
         return FOREIGN_ERROR, traceback.format_exc()
-
-
-def _send(answers: BinaryIO, kind: int, value: Any) -> None:
-    """Send one answer: a pickled head with the sizes of the arrays, then the arrays as they are in memory."""
-    arrays: list[pickle.PickleBuffer] = []
-    pickled = pickle.dumps(value, protocol=5, buffer_callback=arrays.append)
-    parts = [array.raw() for array in arrays]
-    pickle.dump((kind, pickled, [part.nbytes for part in parts]), answers)
-    for part in parts:
-        answers.write(part)
-    answers.flush()
 
 
 @contextmanager

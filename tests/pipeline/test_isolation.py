@@ -53,10 +53,10 @@ def fail() -> None:
 @pytest.fixture
 def strict(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The processes of the test may wait less than usual."""
-    isolation._end_idle()
+    isolation._idle.end()
     monkeypatch.setattr(isolation, "MAX_SILENCE_S", SHORT_S)
     yield
-    isolation._end_idle()
+    isolation._idle.end()
 
 
 def wait_for(duration_s: float) -> int:

@@ -134,7 +134,7 @@ def test_others_are_served_while_a_library_loops(samples: Path, monkeypatch: pyt
         except RecordingError as error:
             failed.append(error)
 
-    isolation._end_idle()
+    isolation._idle.end()
     monkeypatch.setattr(isolation, "_Process", KnownProcess)
     monkeypatch.setattr(isolation, "MAX_CPU_S", 600)  # until it is ended here
     monkeypatch.setattr(isolation, "MAX_SILENCE_S", 600.0)

@@ -1,0 +1,167 @@
+"""Child process of this program with which values are exchanged through pipes.
+
+It is no child of `multiprocessing`, which would run an unguarded script of the user a second time. It ends with this
+process, however that ends: its standard input is then at its end.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any, BinaryIO, Generic, TypeVar
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
+PIPE_BYTES = 1 << 20  # the most that Linux gives to everybody: a whole tick of a busy scene
+
+
+def send_value(file: BinaryIO, value: Any) -> None:
+    """Write a value that can be pickled: a head with the sizes of its arrays, then these as they are in memory."""
+    arrays: list[pickle.PickleBuffer] = []
+    pickled = pickle.dumps(value, protocol=5, buffer_callback=arrays.append)
+    parts = [array.raw() for array in arrays]
+    pickle.dump((pickled, [part.nbytes for part in parts]), file)
+    for part in parts:
+        file.write(part)
+    file.flush()
+
+
+def receive_value(file: BinaryIO) -> Any:
+    """Read a value that `send_value` wrote, its arrays in memory of their own; raises EOFError at the file's end."""
+    try:
+        pickled, sizes = pickle.load(file)
+    except pickle.UnpicklingError as error:  # cut off
+        raise EOFError from error
+    buffers = [bytearray(size) for size in sizes]
+    for buffer in buffers:
+        if file.readinto(buffer) < len(buffer):  # type: ignore[attr-defined]
+            raise EOFError
+    return pickle.loads(pickled, buffers=buffers)
+
+
+class ChildProcess:
+    """The parent's side of a child process.
+
+    Parameters
+    ----------
+    program : str
+        Python statements that it runs, of which one takes `pipes_to_parent`.
+    environment : Mapping of str to str
+        Environment variables besides this process's own.
+
+    Raises
+    ------
+    OSError
+        When it does not start.
+    """
+
+    def __init__(self, program: str, environment: Mapping[str, str] | None = None) -> None:
+        path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-c", program],  # -P: what lies in the working folder is not imported
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONPATH": path, **(environment or {})},
+        )
+        assert self._process.stdin is not None and self._process.stdout is not None
+        self._requests: BinaryIO = self._process.stdin  # type: ignore[assignment]
+        self._answers: BinaryIO = self._process.stdout  # type: ignore[assignment]
+        if hasattr(fcntl, "F_SETPIPE_SZ"):
+            with suppress(OSError):  # the user's pipes take too much already
+                fcntl.fcntl(self._requests, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
+
+    def send(self, value: Any) -> None:
+        """Send a value; raises nothing where the process has ended, which `receive` then tells."""
+        # A closed pipe is a ValueError: the garbage collector may close it before it ends an abandoned generator.
+        with suppress(BrokenPipeError, ValueError):
+            send_value(self._requests, value)
+
+    def receive(self) -> Any:
+        """The next value from the process; raises EOFError when it has ended."""
+        return receive_value(self._answers)
+
+    def is_running(self) -> bool:
+        """Whether the process still runs and can be talked to."""
+        return self._process.poll() is None and not self._requests.closed
+
+    def exit_status(self) -> int:
+        """Exit status of a process that has ended, or is about to; that of a signal is negative."""
+        return self._process.wait()
+
+    def kill(self) -> None:
+        """Have the process end, from any thread."""
+        self._process.kill()
+
+    def end(self) -> None:
+        """End the process."""
+        self._process.kill()
+        self._process.wait()
+        for pipe in (self._requests, self._answers):
+            with suppress(OSError):
+                pipe.close()
+
+
+Kept = TypeVar("Kept", bound=ChildProcess)
+
+
+class IdleProcesses(Generic[Kept]):
+    """Processes that wait for the next call; they end with this one.
+
+    Parameters
+    ----------
+    most : int
+        How many are kept.
+    """
+
+    def __init__(self, most: int) -> None:
+        self._most, self._idle, self._lock = most, list[Kept](), threading.Lock()
+        atexit.register(self.end)
+        if hasattr(os, "register_at_fork"):  # a copy of this process must not talk to the same ones
+            os.register_at_fork(after_in_child=self._idle.clear)
+
+    def take(self) -> Kept | None:
+        """A process that waits; None where there is none."""
+        with self._lock:
+            while self._idle:
+                process = self._idle.pop()
+                if process.is_running():
+                    return process
+                process.end()
+        return None
+
+    def keep(self, process: Kept) -> None:
+        """Keep a process that waits, or end it where it has ended or enough others wait."""
+        with self._lock:
+            if process.is_running() and len(self._idle) < self._most:
+                self._idle.append(process)
+                return
+        process.end()
+
+    def end(self) -> None:
+        """End all that wait."""
+        while (process := self.take()) is not None:
+            process.end()
+
+
+def pipes_to_parent() -> tuple[BinaryIO, BinaryIO]:
+    """What the parent sends and where it takes answers, in a child process; prints then go nowhere.
+
+    Ctrl-C is the parent's, who then ends the process.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    with open(os.devnull, "r+b") as nothing:  # a library that prints must not disturb the answers
+        os.dup2(nothing.fileno(), 0)
+        os.dup2(nothing.fileno(), 1)
+    return requests, answers

@@ -1,0 +1,321 @@
+"""Spins of a live run: the work of its child process, behind the tracker.
+
+One thread tells the spins of the shots so far, tick by tick, one maximises contrast for them as fast as it can, and one
+answers the whole shots as `analyze` does, when no ball is in flight.
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import sys
+import threading
+import traceback
+from collections import deque
+from collections.abc import Callable, Collection, Iterable, Iterator
+from typing import Any, NamedTuple
+
+from .chain import Chain
+from .child_process import pipes_to_parent, receive_value, send_value
+from .errors import SpinscopeError
+from .event_source import EventsInMemory
+from .events import EventBatch
+from .live_outputs import LiveShot, LiveSpin
+from .registry import STAGES, Parameters, needed_stages, quick_stages
+from .session import SAMPLES, Session
+from .shots import ShotLog
+from .spin_so_far import ContrastInFlight, SpinsInFlight
+from .stages.track_result import EndedBy
+from .tick import Tick
+
+MOST_HELD = 100  # ticks held back from the final spins while a ball is in flight: longer than most shots
+ARRIVALS_KEPT = 4000  # ticks whose arrival is remembered: 20 s at 200 Hz, longer than any shot's end takes to be known
+# Python lets a thread run for 5 ms while another waits; with a tick's work in several threads that is many ticks.
+SWITCH_S = 0.0005
+# A half and a third of the tracker's share where they want one core.
+SO_FAR_NICENESS, FINAL_NICENESS = 3, 5
+PARENT_GONE_EXIT = 3
+
+
+class SpinRun(NamedTuple):
+    """Request of a run: stages to answer, whether the spin of every tick is told, and the sensor's size."""
+
+    targets: tuple[str, ...]
+    with_balls: bool
+    width_px: int
+    height_px: int
+
+
+class Stretch(NamedTuple):
+    """Beginning of a stretch of ticks without gaps, with these parameters; the one before has ended."""
+
+    parameters: Parameters
+
+
+class TrackedTick(NamedTuple):
+    """Tick with its track, and when it came (`clock.now_s`).
+
+    Attributes
+    ----------
+    tick : Tick
+        Its events and all that stages of one ball need only where it has a ball.
+    clock : int
+        Number of the camera's clock.
+    first_s, last_s : float
+        As of `ArrivedTick`.
+    """
+
+    tick: Tick
+    clock: int
+    first_s: float
+    last_s: float
+
+
+class Numbered(NamedTuple):
+    """Message to the process, with its number in the run; None ends the run."""
+
+    number: int
+    message: Stretch | TrackedTick | None
+
+
+class Answers(NamedTuple):
+    """Answers to one message.
+
+    Attributes
+    ----------
+    number : int
+        That of the message.
+    is_final : bool
+        Whether they are of whole shots, with which the message is done.
+    outputs : tuple of (float, LiveSpin or LiveShot)
+        When the events came that each latency counts from, and the output without it.
+    is_idle : bool
+        Whether no shot is in flight, so that no further answer needs this message or an earlier one.
+    """
+
+    number: int
+    is_final: bool
+    outputs: tuple[tuple[float, LiveSpin | LiveShot], ...]
+    is_idle: bool = False
+
+
+class _Ticks:
+    """Ticks of a stretch as they come.
+
+    Attributes
+    ----------
+    begin : Numbered
+        The message that begins the stretch.
+    end : Numbered
+        The message after its last tick; `begin` until that has come.
+    """
+
+    def __init__(self, begin: Numbered, coming: queue.SimpleQueue[Numbered]) -> None:
+        self.begin = self.end = begin
+        self._coming = coming
+        self._arrivals: deque[tuple[int, float]] = deque(
+            maxlen=ARRIVALS_KEPT
+        )  # (end of the tick, when it was complete)
+
+    @property
+    def parameters(self) -> Parameters:
+        """Values of all stages."""
+        assert isinstance(self.begin.message, Stretch)
+        return self.begin.message.parameters
+
+    def __iter__(self) -> Iterator[tuple[int, TrackedTick]]:
+        while isinstance((one := self._coming.get()).message, TrackedTick):
+            self._arrivals.append((one.message.tick.packet.end_us, one.message.last_s))
+            yield one.number, one.message
+        self.end = one
+
+    def came_s(self, end_us: int) -> float:
+        """When the last events before a time of these ticks came."""
+        return next((last_s for upto_us, last_s in self._arrivals if upto_us >= end_us), self._arrivals[-1][1])
+
+
+class LiveSpins:
+    """Spins of one run.
+
+    Parameters
+    ----------
+    run : SpinRun
+        Request.
+    send : callable
+        Takes `Answers`, or the error that ends the run, from any thread.
+    """
+
+    def __init__(self, run: SpinRun, send: Callable[[Answers | Exception], None]) -> None:
+        self._run, self._send = run, send
+        self._tracked: queue.SimpleQueue[Numbered] = queue.SimpleQueue()
+        self._told: queue.SimpleQueue[Numbered] = queue.SimpleQueue()
+
+    def work(self, messages: Iterable[Numbered]) -> None:
+        """Answer the messages up to the run's end."""
+        threads = [
+            threading.Thread(target=self._guarded, args=(work, niceness), name=name)
+            for name, work, niceness in (
+                ("spin so far", self._tell_all, SO_FAR_NICENESS),
+                ("spin", self._answer_all, FINAL_NICENESS),
+            )
+        ]
+        for thread in threads:
+            thread.start()
+        for one in messages:
+            self._tracked.put(one)
+            if one.message is None:
+                break
+        for thread in threads:
+            thread.join()
+
+    def _guarded(self, work: Callable[[], None], niceness: int) -> None:
+        """Body of a thread that lets those go first that matter more; its error ends the run."""
+        if sys.platform == "linux":
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), niceness)
+        try:
+            work()
+        except SpinscopeError as error:
+            self._send(error)
+        except Exception:  # noqa: BLE001  raised in the parent
+            self._send(RuntimeError(traceback.format_exc()))
+
+    def _tell_all(self) -> None:
+        """Tell the spins so far, and hand the messages on."""
+        for ticks in _stretches(self._tracked):
+            self._told.put(ticks.begin)
+            self._tell(ticks)
+            if ticks.end.message is None:
+                self._told.put(ticks.end)
+
+    def _tell(self, ticks: _Ticks) -> None:
+        """Tell the spins so far of a stretch, and hand its ticks on when no ball is in flight."""
+        needed = {stage.name for stage in needed_stages(self._run.targets)}
+        has_contrast = "contrast" in needed
+        # Beside contrast maximisation only what it asks for: each further stage has it come later.
+        so_far = STAGES["contrast"].inputs if has_contrast else needed
+        quick = tuple(stage.name for stage in needed_stages(so_far) if stage.name in quick_stages())
+        chain, spins = self._new_chain(), SpinsInFlight()
+        contrast = ContrastInFlight(ticks.parameters, chain, spins)
+        thread = threading.Thread(target=self._guarded, args=(contrast.work, SO_FAR_NICENESS), name="contrast so far")
+        thread.start()
+        log, held = ShotLog(), list[Numbered]()
+        for number, one in self._answered(chain, ticks, quick):
+            outputs: list[tuple[float, LiveSpin | LiveShot]] = []
+            for ball in one.tick.balls:
+                spins.add_tick(ball)
+                if self._run.with_balls:
+                    outputs += _told(spins, ball.track.shot, ball.packet.end_us, None, one.first_s)
+            if has_contrast:
+                contrast.put(one.tick.balls)
+            log.add(one.tick)
+            outputs += _announced(log, spins, ticks)
+            if outputs:
+                self._send(Answers(number, False, tuple(outputs)))
+            spins.keep_only(ball.track.shot for ball in one.tick.balls)
+            held.append(Numbered(number, one))
+            if not one.tick.balls or len(held) == MOST_HELD:
+                self._hand_on(held)
+        log.close()
+        if outputs := _announced(log, spins, ticks):
+            self._send(Answers(ticks.end.number, False, tuple(outputs)))
+        self._hand_on(held)
+        contrast.close()
+        thread.join()
+
+    def _hand_on(self, held: list[Numbered]) -> None:
+        """Let the final spins be worked on, which would hold up those so far, when no ball is in flight."""
+        for one in held:
+            self._told.put(one)
+        held.clear()
+
+    def _answer_all(self) -> None:
+        """Answer the shots as of a recording."""
+        for ticks in _stretches(self._told):
+            log, last = ShotLog(), None
+            for number, one in self._answered(self._new_chain(), ticks, self._run.targets):
+                log.add(one.tick)
+                last = one
+                self._send(Answers(number, True, _ended(log, ticks, one), not one.tick.balls))
+            log.close()
+            outputs = () if last is None else _ended(log, ticks, last)
+            self._send(Answers(ticks.end.number, True, outputs, is_idle=True))
+
+    def _new_chain(self) -> Chain:
+        """A chain for one stretch."""
+        return Chain(EventsInMemory(("live",), EventBatch.empty(), self._run.width_px, self._run.height_px, 0, 0))
+
+    def _answered(self, chain: Chain, ticks: _Ticks, targets: Collection[str]) -> Iterator[tuple[int, TrackedTick]]:
+        """The ticks of a stretch with the results of stages of one ball."""
+        at_work = deque[tuple[int, TrackedTick]]()
+
+        def tracked() -> Iterator[Tick]:
+            for number, one in ticks:
+                at_work.append((number, one))
+                yield one.tick
+
+        for tick in chain.answer(ticks.parameters, tracked(), targets, forget=STAGES.names):
+            number, one = at_work.popleft()
+            yield number, one._replace(tick=tick)
+
+
+def _stretches(coming: queue.SimpleQueue[Numbered]) -> Iterator[_Ticks]:
+    """The stretches of a run; the ticks of each are to be taken before the next is asked for."""
+    begin = coming.get()
+    while begin.message is not None:
+        ticks = _Ticks(begin, coming)
+        yield ticks
+        begin = ticks.end
+
+
+def _announced(log: ShotLog, spins: SpinsInFlight, ticks: _Ticks) -> list[tuple[float, LiveSpin | LiveShot]]:
+    """The spins so far of the shots whose end is known now."""
+    return [
+        told
+        for shot in log.take_ended()
+        for told in _told(spins, shot.number, shot.end_us, shot.ended_by, ticks.came_s(shot.end_us))
+    ]
+
+
+def _told(
+    spins: SpinsInFlight, shot: int, end_us: int, ended_by: EndedBy | None, came_s: float
+) -> list[tuple[float, LiveSpin | LiveShot]]:
+    """The newest spin of a shot; nothing where no method was run."""
+    spin = spins.newest(shot, end_us)
+    return [] if spin is None else [(came_s, LiveSpin(shot, end_us, spin, ended_by, 0.0))]
+
+
+def _ended(log: ShotLog, ticks: _Ticks, one: TrackedTick) -> tuple[tuple[float, LiveSpin | LiveShot], ...]:
+    """The shots whose end is known in a tick."""
+    return tuple(
+        (ticks.came_s(shot.end_us), LiveShot(shot, one.clock, one.tick.packet.end_us, 0.0)) for shot in log.take_ended()
+    )
+
+
+def load_stages(stages: Collection[str] | None = None) -> None:
+    """Run stages, all by default, over shots with a contact and with two balls: no kernel is loaded in a shot."""
+    for sample in ("bounce.h5", "two_balls.h5"):
+        session = Session.open(SAMPLES / "own" / sample)
+        for _ in session.ticks(stages, forget=STAGES.names):
+            pass
+
+
+def serve() -> None:
+    """Answer runs until the parent ends; the main program of the process."""
+    requests, answers = pipes_to_parent()
+    sys.setswitchinterval(SWITCH_S)
+    lock = threading.Lock()
+
+    def send(value: Any) -> None:
+        with lock:
+            send_value(answers, value)
+
+    try:
+        while True:
+            run: SpinRun | None = receive_value(requests)
+            if run is None:
+                load_stages()
+            else:
+                LiveSpins(run, send).work(iter(lambda: receive_value(requests), None))
+            send(None)
+    except (EOFError, BrokenPipeError):
+        os._exit(PARENT_GONE_EXIT)

@@ -1,0 +1,214 @@
+"""Child process for the spins of a live run, which share neither Python's lock nor a core with the tracker.
+
+Where the process ends before its time another one takes over from the last moment without a shot in flight.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+from .cameras.clock import now_s
+from .child_process import ChildProcess, IdleProcesses
+from .errors import SpinscopeError
+from .live_outputs import LiveNotice, LiveOutput
+from .live_spins import Answers, Numbered, SpinRun, Stretch, TrackedTick, serve
+
+# Ticks with a ball that wait for their spins, at the most; then the tracker waits, too: 3 s of flight at 200 Hz, which
+# at 5 Mev/s is some 600 MB. Ticks without a ball are next to nothing.
+MOST_FLYING = 600
+# Ticks of shots in flight that another process could go on from: a second at 200 Hz, longer than most shots.
+MOST_REPEATED = 200
+MOST_ENDS = 3  # of processes without an answer between
+
+_idle = IdleProcesses[ChildProcess](1)
+
+
+def _process() -> ChildProcess:
+    """A process that waits for a run; raises SpinscopeError."""
+    try:
+        return _idle.take() or ChildProcess(f"from {serve.__module__} import serve; serve()")
+    except OSError as error:
+        raise SpinscopeError(
+            f"the process for the spins does not start ({error.strerror}): close other programs"
+        ) from error
+
+
+@contextmanager
+def loaded_kernels() -> Iterator[None]:
+    """Have a process for the next run load its kernels meanwhile; raises SpinscopeError."""
+    process = _process()
+    process.send(None)
+    yield
+    try:
+        process.receive()
+    except EOFError as error:
+        raise SpinscopeError(f"the process for the spins ended ({_status_words(process)})") from error
+    _idle.keep(process)
+
+
+def _status_words(process: ChildProcess) -> str:
+    status = process.exit_status()
+    return signal.Signals(-status).name if status < 0 else f"exit status {status}"
+
+
+class SpinProcess:
+    """Spins of one run.
+
+    Parameters
+    ----------
+    run : SpinRun
+        Request.
+    put : callable
+        Takes each output, and at last None or the error that ended the run, in a thread of this class.
+    """
+
+    def __init__(self, run: SpinRun, put: Callable[[LiveOutput | BaseException | None], None]) -> None:
+        self._run, self._put = run, put
+        self._changed = threading.Condition()
+        self._kept = deque[Numbered]()  # from the first message on that another process would need
+        self._stretch: Numbered | None = None  # to which the first of them belongs
+        self._next = 0  # number of the next one to be sent
+        self._done = 0  # number of the first one without its final answers
+        self._flying = 0  # ticks with a ball from there on
+        self._answered = {False: -1, True: -1}  # number of the last message answered, by whether finally
+        self._ends = 0  # of processes before their time since the last new answer
+        self._is_over = False
+        self._threads = [
+            threading.Thread(target=work, name=name, daemon=True)
+            for name, work in (("spin requests", self._send), ("spin answers", self._receive))
+        ]
+
+    def start(self) -> None:
+        """Begin to work; raises SpinscopeError when no process starts."""
+        self._process = self._begun()
+        for thread in self._threads:
+            thread.start()
+
+    def put(self, message: Stretch | TrackedTick | None) -> None:
+        """Hand over a message, as soon as there is room for it; None ends the run."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._flying < MOST_FLYING or self._is_over)
+            number = self._kept[-1].number + 1 if self._kept else self._done
+            self._kept.append(Numbered(number, message))
+            self._flying += _has_ball(message)
+            self._changed.notify_all()
+
+    @property
+    def waiting(self) -> int:
+        """Number of messages without their final answers."""
+        with self._changed:
+            return self._kept[-1].number + 1 - self._done if self._kept else 0
+
+    def abandon(self) -> None:
+        """End the run without the answers that are still to come."""
+        with self._changed:
+            if not self._is_over:
+                self._is_over = True
+                self._changed.notify_all()
+                self._process.kill()
+
+    def join(self) -> None:
+        """Wait for the end of the run."""
+        for thread in self._threads:
+            thread.join()
+
+    def _begun(self) -> ChildProcess:
+        """A process that has begun with the run and its present stretch."""
+        process = _process()
+        process.send(self._run)
+        if self._stretch is not None:
+            process.send(self._stretch)
+        return process
+
+    def _send(self) -> None:
+        """Body of a thread: send the messages until the run is over."""
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._is_over or (self._kept and self._kept[-1].number >= self._next))
+                if self._is_over:
+                    return
+                one, process = self._kept[self._next - self._kept[0].number], self._process
+                self._next += 1
+            process.send(one)
+
+    def _receive(self) -> None:
+        """Body of a thread: hand on the outputs until the run is over."""
+        end: BaseException | None = None
+        try:
+            while (answer := self._answer()) is not None:
+                self._take(answer)
+        except Exception as error:  # noqa: BLE001  handed on
+            end = error
+        with self._changed:
+            is_abandoned, self._is_over = self._is_over, True
+            self._changed.notify_all()
+        if is_abandoned or end is not None:
+            self._process.end()
+        else:
+            _idle.keep(self._process)
+        self._put(end)
+
+    def _answer(self) -> Answers | None:
+        """The next answers, perhaps of another process; None at the end of the run. Raises what ended it."""
+        while True:
+            try:
+                answer = self._process.receive()
+            except EOFError:
+                with self._changed:
+                    if self._is_over:
+                        return None
+                    self._begin_anew()
+                continue
+            if isinstance(answer, Exception):
+                raise answer
+            assert answer is None or isinstance(answer, Answers)
+            return answer
+
+    def _begin_anew(self) -> None:
+        """Have another process go on, the second time without what the two before did not answer; raises the third."""
+        ended = f"the process for the spins ended ({_status_words(self._process)})"
+        self._process.end()
+        self._ends += 1
+        if self._ends == MOST_ENDS:
+            raise SpinscopeError(f"{ended} {MOST_ENDS} times without an answer: please report this")
+        ticks = sum(isinstance(one.message, TrackedTick) and one.number < self._next for one in self._kept)
+        if self._ends == 1:
+            self._put(LiveNotice(f"{ended}: another one works on the last {ticks} ticks again"))
+        else:
+            self._forget(self._next)
+            self._put(LiveNotice(f"{ended} again over the same events: the spins of {ticks} ticks are left out"))
+        self._next = self._done = self._kept[0].number if self._kept else self._next
+        self._flying = sum(_has_ball(one.message) for one in self._kept)
+        self._process = self._begun()
+        self._changed.notify_all()
+
+    def _take(self, answers: Answers) -> None:
+        """Hand on the outputs of a message, unless a process before did."""
+        is_new = answers.number > self._answered[answers.is_final]
+        self._answered[answers.is_final] = max(answers.number, self._answered[answers.is_final])
+        if answers.is_final:
+            self._ends = 0 if is_new else self._ends
+            with self._changed:
+                while self._done <= answers.number:
+                    self._flying -= _has_ball(self._kept[self._done - self._kept[0].number].message)
+                    self._done += 1
+                self._forget(self._done - (0 if answers.is_idle else MOST_REPEATED))
+                self._changed.notify_all()
+        for came_s, output in answers.outputs if is_new else ():
+            self._put(replace(output, latency_ms=(now_s() - came_s) * 1e3))
+
+    def _forget(self, number: int) -> None:
+        """Keep the messages no longer that come before one, the end of the run excepted."""
+        while self._kept and self._kept[0].number < number and self._kept[0].message is not None:
+            one = self._kept.popleft()
+            if isinstance(one.message, Stretch):
+                self._stretch = one
+
+
+def _has_ball(message: Stretch | TrackedTick | None) -> bool:
+    return isinstance(message, TrackedTick) and message.tick.track.has_ball
