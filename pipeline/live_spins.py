@@ -1,7 +1,7 @@
 """Spins of a live run: the work of its child process, behind the tracker.
 
-One thread tells the spins of the shots so far, tick by tick, one maximises contrast for them as fast as it can, and one
-answers the whole shots as `analyze` does, when no ball is in flight.
+One thread sees the shots end, one tells their spins so far, tick by tick, one maximises contrast for these as fast as
+it can, and one answers the whole shots as `analyze` does, when no ball is in flight.
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ import sys
 import threading
 import traceback
 from collections import deque
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from typing import Any, NamedTuple
 
+from .cameras.clock import now_s
 from .chain import Chain
 from .child_process import pipes_to_parent, receive_value, send_value
 from .errors import SpinscopeError
@@ -23,11 +24,12 @@ from .events import EventBatch
 from .live_outputs import LiveShot, LiveSpin
 from .registry import STAGES, Parameters, needed_stages, quick_stages
 from .session import SAMPLES, Session
-from .shots import ShotLog
+from .shots import Shot, ShotLog
 from .spin_so_far import ContrastInFlight, SpinsInFlight
-from .stages.track_result import EndedBy
 from .tick import Tick
 
+# After a shot's last events the spin so far is told, which may be from somewhat older events: 50 ms are promised.
+ANNOUNCED_S = 0.04
 MOST_HELD = 100  # ticks held back from the final spins while a ball is in flight: longer than most shots
 ARRIVALS_KEPT = 4000  # ticks whose arrival is remembered: 20 s at 200 Hz, longer than any shot's end takes to be known
 # Python lets a thread run for 5 ms while another waits; with a tick's work in several threads that is many ticks.
@@ -86,7 +88,7 @@ class Answers(NamedTuple):
     number : int
         That of the message.
     is_final : bool
-        Whether they are of whole shots, with which the message is done.
+        Whether they are of whole shots, in order; with them the message is done. Others come in any order.
     outputs : tuple of (float, LiveSpin or LiveShot)
         When the events came that each latency counts from, and the output without it.
     is_idle : bool
@@ -97,6 +99,16 @@ class Answers(NamedTuple):
     is_final: bool
     outputs: tuple[tuple[float, LiveSpin | LiveShot], ...]
     is_idle: bool = False
+
+
+class _EndedShot(NamedTuple):
+    """Shot whose end is known, with the number of the message that told it, and when its last events came."""
+
+    shot: Shot
+    doubt: str | None
+    number: int
+    came_s: float
+    spins: SpinsInFlight
 
 
 class _Ticks:
@@ -110,9 +122,9 @@ class _Ticks:
         The message after its last tick; `begin` until that has come.
     """
 
-    def __init__(self, begin: Numbered, coming: queue.SimpleQueue[Numbered]) -> None:
+    def __init__(self, begin: Numbered, get: Callable[[], Numbered]) -> None:
         self.begin = self.end = begin
-        self._coming = coming
+        self._get = get
         self._arrivals: deque[tuple[int, float]] = deque(
             maxlen=ARRIVALS_KEPT
         )  # (end of the tick, when it was complete)
@@ -124,7 +136,7 @@ class _Ticks:
         return self.begin.message.parameters
 
     def __iter__(self) -> Iterator[tuple[int, TrackedTick]]:
-        while isinstance((one := self._coming.get()).message, TrackedTick):
+        while isinstance((one := self._get()).message, TrackedTick):
             self._arrivals.append((one.message.tick.packet.end_us, one.message.last_s))
             yield one.number, one.message
         self.end = one
@@ -149,9 +161,12 @@ class LiveSpins:
         self._run, self._send = run, send
         self._tracked: queue.SimpleQueue[Numbered] = queue.SimpleQueue()
         self._told: queue.SimpleQueue[Numbered] = queue.SimpleQueue()
+        self._spins: dict[int, SpinsInFlight] = {}  # by the number of the message that begins the stretch
+        self._ended: list[_EndedShot] = []  # not announced yet
+        self._lock = threading.Lock()
 
-    def work(self, messages: Iterable[Numbered]) -> None:
-        """Answer the messages up to the run's end."""
+    def work(self, get: Callable[[], Numbered]) -> None:
+        """Answer the messages that `get` waits for, up to the run's end."""
         threads = [
             threading.Thread(target=self._guarded, args=(work, niceness), name=name)
             for name, work, niceness in (
@@ -161,10 +176,10 @@ class LiveSpins:
         ]
         for thread in threads:
             thread.start()
-        for one in messages:
-            self._tracked.put(one)
-            if one.message is None:
-                break
+        for ticks in _stretches(get):
+            self._see_ends(ticks)
+            if ticks.end.message is None:
+                self._tracked.put(ticks.end)
         for thread in threads:
             thread.join()
 
@@ -179,9 +194,53 @@ class LiveSpins:
         except Exception:  # noqa: BLE001  raised in the parent
             self._send(RuntimeError(traceback.format_exc()))
 
+    def _see_ends(self, ticks: _Ticks) -> None:
+        """See the shots of a stretch end, which then are announced in time, and hand its ticks on."""
+        spins = self._spins[ticks.begin.number] = SpinsInFlight()
+        self._tracked.put(ticks.begin)
+        log, doubts = ShotLog(), dict[int, str | None]()
+        for number, one in self._answered(self._new_chain(), ticks, ("track",)):
+            log.add(one.tick)
+            doubts |= {end.shot: end.doubt for end in one.tick.track.ended if end.doubt is not None}
+            self._take_ended(log, doubts, number, ticks, spins)
+            doubts = {ball.track.shot: ball.evidence.doubt for ball in one.tick.balls}
+            self._tracked.put(Numbered(number, one))
+        log.close()
+        self._take_ended(log, doubts, ticks.end.number, ticks, spins)
+
+    def _take_ended(
+        self, log: ShotLog, doubts: dict[int, str | None], number: int, ticks: _Ticks, spins: SpinsInFlight
+    ) -> None:
+        """Have the shots announced whose end is known now."""
+        for shot in log.take_ended():
+            came_s = ticks.came_s(shot.end_us)
+            with self._lock:
+                self._ended.append(_EndedShot(shot, doubts.get(shot.number), number, came_s, spins))
+            timer = threading.Timer(came_s + ANNOUNCED_S - now_s(), self._announce, (number,))
+            timer.daemon = True
+            timer.start()
+
+    def _announce(self, number: int, *, is_complete: bool = False) -> None:
+        """Tell the spins so far of the shots that ended by a message, as far as there are any.
+
+        Parameters
+        ----------
+        number : int
+            That of the message.
+        is_complete : bool
+            Whether all answers so far are there, and no further ones are waited for.
+        """
+        with self._lock:  # until they are sent: none is on its way when the run has ended
+            for one in [one for one in self._ended if one.number <= number]:
+                outputs = _told(one)
+                if outputs:
+                    self._send(Answers(one.number, False, outputs))
+                if outputs or is_complete:
+                    self._ended.remove(one)
+
     def _tell_all(self) -> None:
         """Tell the spins so far, and hand the messages on."""
-        for ticks in _stretches(self._tracked):
+        for ticks in _stretches(self._tracked.get):
             self._told.put(ticks.begin)
             self._tell(ticks)
             if ticks.end.message is None:
@@ -194,33 +253,37 @@ class LiveSpins:
         # Beside contrast maximisation only what it asks for: each further stage has it come later.
         so_far = STAGES["contrast"].inputs if has_contrast else needed
         quick = tuple(stage.name for stage in needed_stages(so_far) if stage.name in quick_stages())
-        chain, spins = self._new_chain(), SpinsInFlight()
+        chain, spins = self._new_chain(), self._spins.pop(ticks.begin.number)
         contrast = ContrastInFlight(ticks.parameters, chain, spins)
         thread = threading.Thread(target=self._guarded, args=(contrast.work, SO_FAR_NICENESS), name="contrast so far")
         thread.start()
-        log, held = ShotLog(), list[Numbered]()
+        held = list[Numbered]()
         for number, one in self._answered(chain, ticks, quick):
-            outputs: list[tuple[float, LiveSpin | LiveShot]] = []
             for ball in one.tick.balls:
                 spins.add_tick(ball)
-                if self._run.with_balls:
-                    outputs += _told(spins, ball.track.shot, ball.packet.end_us, None, one.first_s)
             if has_contrast:
                 contrast.put(one.tick.balls)
-            log.add(one.tick)
-            outputs += _announced(log, spins, ticks)
-            if outputs:
-                self._send(Answers(number, False, tuple(outputs)))
+            if self._run.with_balls and one.tick.balls:
+                self._tell_tick(number, one, spins)
+            self._announce(number, is_complete=True)
             spins.keep_only(ball.track.shot for ball in one.tick.balls)
             held.append(Numbered(number, one))
             if not one.tick.balls or len(held) == MOST_HELD:
                 self._hand_on(held)
-        log.close()
-        if outputs := _announced(log, spins, ticks):
-            self._send(Answers(ticks.end.number, False, tuple(outputs)))
+        self._announce(ticks.end.number, is_complete=True)
         self._hand_on(held)
         contrast.close()
         thread.join()
+
+    def _tell_tick(self, number: int, one: TrackedTick, spins: SpinsInFlight) -> None:
+        """Tell the spins so far of the balls of a tick."""
+        newest = [
+            (ball.track.shot, spins.newest(ball.track.shot, ball.packet.end_us, ball.evidence.doubt))
+            for ball in one.tick.balls
+        ]
+        end_us = one.tick.packet.end_us
+        outputs = [(one.first_s, LiveSpin(shot, end_us, spin, None, 0.0)) for shot, spin in newest if spin is not None]
+        self._send(Answers(number, False, tuple(outputs)))
 
     def _hand_on(self, held: list[Numbered]) -> None:
         """Let the final spins be worked on, which would hold up those so far, when no ball is in flight."""
@@ -230,7 +293,7 @@ class LiveSpins:
 
     def _answer_all(self) -> None:
         """Answer the shots as of a recording."""
-        for ticks in _stretches(self._told):
+        for ticks in _stretches(self._told.get):
             log, last = ShotLog(), None
             for number, one in self._answered(self._new_chain(), ticks, self._run.targets):
                 log.add(one.tick)
@@ -258,30 +321,21 @@ class LiveSpins:
             yield number, one._replace(tick=tick)
 
 
-def _stretches(coming: queue.SimpleQueue[Numbered]) -> Iterator[_Ticks]:
+def _stretches(get: Callable[[], Numbered]) -> Iterator[_Ticks]:
     """The stretches of a run; the ticks of each are to be taken before the next is asked for."""
-    begin = coming.get()
+    begin = get()
     while begin.message is not None:
-        ticks = _Ticks(begin, coming)
+        ticks = _Ticks(begin, get)
         yield ticks
         begin = ticks.end
 
 
-def _announced(log: ShotLog, spins: SpinsInFlight, ticks: _Ticks) -> list[tuple[float, LiveSpin | LiveShot]]:
-    """The spins so far of the shots whose end is known now."""
-    return [
-        told
-        for shot in log.take_ended()
-        for told in _told(spins, shot.number, shot.end_us, shot.ended_by, ticks.came_s(shot.end_us))
-    ]
-
-
-def _told(
-    spins: SpinsInFlight, shot: int, end_us: int, ended_by: EndedBy | None, came_s: float
-) -> list[tuple[float, LiveSpin | LiveShot]]:
-    """The newest spin of a shot; nothing where no method was run."""
-    spin = spins.newest(shot, end_us)
-    return [] if spin is None else [(came_s, LiveSpin(shot, end_us, spin, ended_by, 0.0))]
+def _told(one: _EndedShot) -> tuple[tuple[float, LiveSpin | LiveShot], ...]:
+    """The newest spin of a shot; nothing where no method has answered."""
+    spin = one.spins.newest(one.shot.number, one.shot.end_us, one.doubt)
+    if spin is None:
+        return ()
+    return ((one.came_s, LiveSpin(one.shot.number, one.shot.end_us, spin, one.shot.ended_by, 0.0)),)
 
 
 def _ended(log: ShotLog, ticks: _Ticks, one: TrackedTick) -> tuple[tuple[float, LiveSpin | LiveShot], ...]:
@@ -315,7 +369,7 @@ def serve() -> None:
             if run is None:
                 load_stages()
             else:
-                LiveSpins(run, send).work(iter(lambda: receive_value(requests), None))
+                LiveSpins(run, send).work(lambda: receive_value(requests))
             send(None)
     except (EOFError, BrokenPipeError):
         os._exit(PARENT_GONE_EXIT)

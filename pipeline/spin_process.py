@@ -15,7 +15,7 @@ from dataclasses import replace
 from .cameras.clock import now_s
 from .child_process import ChildProcess, IdleProcesses
 from .errors import SpinscopeError
-from .live_outputs import LiveNotice, LiveOutput
+from .live_outputs import LiveNotice, LiveOutput, LiveShot, LiveSpin
 from .live_spins import Answers, Numbered, SpinRun, Stretch, TrackedTick, serve
 
 # Ticks with a ball that wait for their spins, at the most; then the tracker waits, too: 3 s of flight at 200 Hz, which
@@ -24,6 +24,8 @@ MOST_FLYING = 600
 # Ticks of shots in flight that another process could go on from: a second at 200 Hz, longer than most shots.
 MOST_REPEATED = 200
 MOST_ENDS = 3  # of processes without an answer between
+
+_Key = tuple[int, str, int, bool]
 
 _idle = IdleProcesses[ChildProcess](1)
 
@@ -75,7 +77,8 @@ class SpinProcess:
         self._next = 0  # number of the next one to be sent
         self._done = 0  # number of the first one without its final answers
         self._flying = 0  # ticks with a ball from there on
-        self._answered = {False: -1, True: -1}  # number of the last message answered, by whether finally
+        self._furthest = 0  # the same of all processes so far
+        self._given = set[_Key]()  # outputs of the messages that are kept
         self._ends = 0  # of processes before their time since the last new answer
         self._is_over = False
         self._threads = [
@@ -189,18 +192,20 @@ class SpinProcess:
 
     def _take(self, answers: Answers) -> None:
         """Hand on the outputs of a message, unless a process before did."""
-        is_new = answers.number > self._answered[answers.is_final]
-        self._answered[answers.is_final] = max(answers.number, self._answered[answers.is_final])
-        if answers.is_final:
-            self._ends = 0 if is_new else self._ends
-            with self._changed:
-                while self._done <= answers.number:
-                    self._flying -= _has_ball(self._kept[self._done - self._kept[0].number].message)
-                    self._done += 1
-                self._forget(self._done - (0 if answers.is_idle else MOST_REPEATED))
-                self._changed.notify_all()
-        for came_s, output in answers.outputs if is_new else ():
-            self._put(replace(output, latency_ms=(now_s() - came_s) * 1e3))
+        for came_s, output in answers.outputs:
+            if (key := _key(answers.number, output)) not in self._given:
+                self._given.add(key)
+                self._put(replace(output, latency_ms=(now_s() - came_s) * 1e3))
+        if not answers.is_final:
+            return
+        with self._changed:
+            while self._done <= answers.number:
+                self._flying -= _has_ball(self._kept[self._done - self._kept[0].number].message)
+                self._done += 1
+            if self._done > self._furthest:
+                self._furthest, self._ends = self._done, 0
+            self._forget(self._done - (0 if answers.is_idle else MOST_REPEATED))
+            self._changed.notify_all()
 
     def _forget(self, number: int) -> None:
         """Keep the messages no longer that come before one, the end of the run excepted."""
@@ -208,6 +213,14 @@ class SpinProcess:
             one = self._kept.popleft()
             if isinstance(one.message, Stretch):
                 self._stretch = one
+        self._given = {key for key in self._given if key[0] >= number}
+
+
+def _key(number: int, output: LiveSpin | LiveShot) -> _Key:
+    """Identity of an output of a message: kind, shot and, of a spin, whether the shot has ended."""
+    if isinstance(output, LiveShot):
+        return number, "shot", output.shot.number, True
+    return number, "spin", output.shot, output.ended_by is not None
 
 
 def _has_ball(message: Stretch | TrackedTick | None) -> bool:

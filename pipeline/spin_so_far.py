@@ -23,8 +23,8 @@ from .tick import BallTick
 
 # The methods by accuracy on the evaluation's flights, best first.
 ROLLING_METHODS = ("contrast", "normal_flow", "triplet")
-# Of a shot since contrast maximisation has last answered: 20 ms at 200 Hz. More often, and the tracker, which shares
-# Python's lock, comes too late.
+# Of a shot since contrast maximisation has last answered: 20 ms at 200 Hz. More often, and the stages of every tick,
+# which share Python's lock, come too late.
 FEWEST_TICKS = 4
 ANSWERS_KEPT = 40  # of each method: 200 ms, longer than any shot's end takes to be known
 
@@ -50,13 +50,11 @@ class SpinsInFlight:
 
     def __init__(self) -> None:
         self._answers: dict[int, dict[str, deque[SpinSoFar]]] = {}
-        self._doubts: dict[int, str | None] = {}
         self._lock = threading.Lock()
 
     def add_tick(self, ball: BallTick) -> None:
         """Take the answers of the methods that were run in a tick, and in the ticks before its shot was known."""
         with self._lock:
-            self._doubts[ball.track.shot] = ball.evidence.doubt
             self._answers.setdefault(ball.track.shot, {})
             for one in (*ball.earlier, ball):
                 for estimate in one.estimates.values():
@@ -71,15 +69,17 @@ class SpinsInFlight:
     def _add(self, shot: int, spin: SpinSoFar) -> None:
         self._answers[shot].setdefault(spin.estimate.method, deque(maxlen=ANSWERS_KEPT)).append(spin)
 
-    def newest(self, shot: int, end_us: int) -> SpinSoFar | None:
-        """The estimate from the shot's events up to a time at the latest; None where no method was run."""
+    def newest(self, shot: int, end_us: int, doubt: str | None) -> SpinSoFar | None:
+        """The estimate from the shot's events up to a time at the latest; None where no method has answered yet.
+
+        A doubt about its track (`TrackEvidence.doubt`) refuses it.
+        """
         with self._lock:
             answers = self._answers.get(shot, {})
             last = [
                 next((one for one in reversed(answers.get(method, ())) if one.t_us <= end_us), None)
                 for method in ROLLING_METHODS
             ]
-            doubt = self._doubts.get(shot)
         asked = [one for one in last if one is not None]
         if doubt is not None and asked:
             return SpinSoFar(asked[0].t_us, SpinEstimate.refused(asked[0].estimate.method, doubt))
@@ -89,7 +89,7 @@ class SpinsInFlight:
         """Forget all shots but these."""
         with self._lock:
             for shot in self._answers.keys() - set(shots):
-                del self._answers[shot], self._doubts[shot]
+                del self._answers[shot]
 
 
 class ContrastInFlight:

@@ -37,28 +37,28 @@ def test_the_most_accurate_method_that_answers_in_time(flying: list[BallTick]) -
     ball = flying[-1]
     assert ball.evidence.doubt is None
     shot, end_us, spins = ball.track.shot, ball.packet.end_us, SpinsInFlight()
-    assert spins.newest(shot, end_us) is None
+    assert spins.newest(shot, end_us, None) is None
     spins.add(shot, spin(end_us, "contrast", 9.0))  # of a shot that is not in flight
-    assert spins.newest(shot, end_us) is None
+    assert spins.newest(shot, end_us, None) is None
     spins.add_tick(ball)
-    first = spins.newest(shot, end_us)
+    first = spins.newest(shot, end_us, None)
     assert first is not None and first.estimate is ball.estimates["normal_flow"]
     for answer in (spin(100, "contrast", 1.0), spin(200, "contrast", 2.0), spin(end_us + 1, "contrast", 3.0)):
         spins.add(shot, answer)
-    newest = spins.newest(shot, end_us)
+    newest = spins.newest(shot, end_us, None)
     assert newest is not None and newest.t_us == 200
     spins.add(shot, spin(end_us + 2, "contrast", None))  # a refusal is an answer, too
-    newest = spins.newest(shot, end_us + 2)
+    newest = spins.newest(shot, end_us + 2, None)
     assert newest is not None and newest.estimate.method == "normal_flow"
     spins.keep_only([shot + 1])
-    assert spins.newest(shot, end_us) is None
+    assert spins.newest(shot, end_us, None) is None
 
 
 def test_a_doubtful_track_has_no_spin(flying: list[BallTick]) -> None:
     ball, spins = flying[0], SpinsInFlight()
     assert ball.evidence.doubt is not None
     spins.add_tick(ball)
-    found = spins.newest(ball.track.shot, ball.packet.end_us)
+    found = spins.newest(ball.track.shot, ball.packet.end_us, ball.evidence.doubt)
     assert found is not None and found.estimate.reason == ball.evidence.doubt
 
 
@@ -99,7 +99,7 @@ def test_ticks_that_wait_are_taken_up_at_once(session: Session, flying: list[Bal
     contrast.close()
     thread.join()
     (answer,) = spins.given
-    newest = spins.newest(flying[-1].track.shot, end_us)
+    newest = spins.newest(flying[-1].track.shot, end_us, None)
     assert newest is not None and newest.estimate is answer.estimate and answer.estimate.vector_rps is not None
     assert session.truth is not None
     apart_rps, apart_deg = spin_errors(answer.estimate.vector_rps, session.truth.spin_rps[0])
