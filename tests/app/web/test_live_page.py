@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import cv2
 import httpx
@@ -15,6 +17,7 @@ from spinscope.app.web.live_schemas import LiveSecond, LiveShotRow, LiveView
 from spinscope.pipeline.errors import CameraError
 from spinscope.pipeline.registry import Parameters
 
+from .browser_tab import Tab, needs_browser
 from .conftest import Served, served
 
 
@@ -94,3 +97,28 @@ def test_biases_act_on_the_camera(running: tuple[Served, StandIn]) -> None:
 def test_without_a_camera_the_routes_say_so(tuner: Served) -> None:
     answer = httpx.get(f"{tuner.address}api/live/view")
     assert answer.status_code == 404 and "spinscope live" in answer.json()["error"]
+
+
+@needs_browser[0]
+@needs_browser[1]
+def test_the_buttons_of_the_panel(browser: Any, running: tuple[Served, StandIn]) -> None:
+    made, live = running
+    tab = Tab(browser.new_page())
+    tab.page.route(re.compile(r"re_viewer_bg\.wasm"), lambda route: route.abort())
+    tab.open(made.address)
+    panel = tab.panel("Live camera")
+    panel.get_by_text("2 packets lost by the camera").wait_for()
+    tab.page.locator("#notices").get_by_text("unplugged").wait_for()
+    assert panel.locator("svg path").count() == 8
+    tab.until("document.querySelector('img.live').naturalWidth === 64")
+    panel.get_by_text("Pause").click()
+    panel.get_by_text("Go on").click()
+    panel.get_by_text("Pause").wait_for()
+    panel.get_by_text("Use the sliders from now on").click()
+    tab.page.locator("#notices").get_by_text("go on with these settings").wait_for()
+    tab.panel("Biases").locator("[data-bias=gain] input[type=range]").press("ArrowUp")
+    tab.until("!document.querySelector('[data-bias=gain] input').disabled")
+    panel.get_by_text("Look at them").click()
+    tab.until(f"location.hash.includes('recording={live.window.name}')")
+    tab.page.close()
+    assert live.asked == [Parameters().logo.pad_px, {"gain": 4}, 10.0] and not tab.errors
