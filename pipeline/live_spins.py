@@ -28,7 +28,7 @@ from .shots import Shot, ShotLog
 from .spin_so_far import ContrastInFlight, SpinsInFlight
 from .tick import Tick
 
-# After a shot's last events the spin so far is told, which may be from somewhat older events: 50 ms are promised.
+# After a shot's last events the spin so far is told, which may be from somewhat older ones: 50 ms are promised.
 ANNOUNCED_S = 0.04
 MOST_HELD = 100  # ticks held back from the final spins while a ball is in flight: longer than most shots
 ARRIVALS_KEPT = 4000  # ticks whose arrival is remembered: 20 s at 200 Hz, longer than any shot's end takes to be known
@@ -125,9 +125,8 @@ class _Ticks:
     def __init__(self, begin: Numbered, get: Callable[[], Numbered]) -> None:
         self.begin = self.end = begin
         self._get = get
-        self._arrivals: deque[tuple[int, float]] = deque(
-            maxlen=ARRIVALS_KEPT
-        )  # (end of the tick, when it was complete)
+        # The end of each tick, and when it was complete.
+        self._arrivals: deque[tuple[int, float]] = deque(maxlen=ARRIVALS_KEPT)
 
     @property
     def parameters(self) -> Parameters:
@@ -159,8 +158,8 @@ class LiveSpins:
 
     def __init__(self, run: SpinRun, send: Callable[[Answers | Exception], None]) -> None:
         self._run, self._send = run, send
-        self._tracked: queue.SimpleQueue[Numbered] = queue.SimpleQueue()
-        self._told: queue.SimpleQueue[Numbered] = queue.SimpleQueue()
+        self._for_so_far: queue.SimpleQueue[Numbered] = queue.SimpleQueue()
+        self._for_final: queue.SimpleQueue[Numbered] = queue.SimpleQueue()
         self._spins: dict[int, SpinsInFlight] = {}  # by the number of the message that begins the stretch
         self._ended: list[_EndedShot] = []  # not announced yet
         self._lock = threading.Lock()
@@ -179,7 +178,7 @@ class LiveSpins:
         for ticks in _stretches(get):
             self._see_ends(ticks)
             if ticks.end.message is None:
-                self._tracked.put(ticks.end)
+                self._for_so_far.put(ticks.end)
         for thread in threads:
             thread.join()
 
@@ -197,14 +196,14 @@ class LiveSpins:
     def _see_ends(self, ticks: _Ticks) -> None:
         """See the shots of a stretch end, which then are announced in time, and hand its ticks on."""
         spins = self._spins[ticks.begin.number] = SpinsInFlight()
-        self._tracked.put(ticks.begin)
+        self._for_so_far.put(ticks.begin)
         log, doubts = ShotLog(), dict[int, str | None]()
         for number, one in self._answered(self._new_chain(), ticks, ("track",)):
             log.add(one.tick)
             doubts |= {end.shot: end.doubt for end in one.tick.track.ended if end.doubt is not None}
             self._take_ended(log, doubts, number, ticks, spins)
             doubts = {ball.track.shot: ball.evidence.doubt for ball in one.tick.balls}
-            self._tracked.put(Numbered(number, one))
+            self._for_so_far.put(Numbered(number, one))
         log.close()
         self._take_ended(log, doubts, ticks.end.number, ticks, spins)
 
@@ -221,30 +220,33 @@ class LiveSpins:
             timer.start()
 
     def _announce(self, number: int, *, is_complete: bool = False) -> None:
-        """Tell the spins so far of the shots that ended by a message, as far as there are any.
+        """Tell the spins so far of the shots that ended by a message, as far as they are known.
 
         Parameters
         ----------
         number : int
             That of the message.
         is_complete : bool
-            Whether all answers so far are there, and no further ones are waited for.
+            Whether all ticks so far are answered: then a refusal is told, too.
         """
         with self._lock:  # until they are sent: none is on its way when the run has ended
             for one in [one for one in self._ended if one.number <= number]:
-                outputs = _told(one)
-                if outputs:
-                    self._send(Answers(one.number, False, outputs))
-                if outputs or is_complete:
+                shot = one.shot
+                spin = one.spins.newest(shot.number, shot.end_us, one.doubt)
+                if spin is not None and (is_complete or spin.estimate.status == "ok"):
+                    output = LiveSpin(shot.number, shot.end_us, spin, shot.ended_by, 0.0)
+                    self._send(Answers(one.number, False, ((one.came_s, output),)))
+                    self._ended.remove(one)
+                elif is_complete:
                     self._ended.remove(one)
 
     def _tell_all(self) -> None:
         """Tell the spins so far, and hand the messages on."""
-        for ticks in _stretches(self._tracked.get):
-            self._told.put(ticks.begin)
+        for ticks in _stretches(self._for_so_far.get):
+            self._for_final.put(ticks.begin)
             self._tell(ticks)
             if ticks.end.message is None:
-                self._told.put(ticks.end)
+                self._for_final.put(ticks.end)
 
     def _tell(self, ticks: _Ticks) -> None:
         """Tell the spins so far of a stretch, and hand its ticks on when no ball is in flight."""
@@ -288,12 +290,12 @@ class LiveSpins:
     def _hand_on(self, held: list[Numbered]) -> None:
         """Let the final spins be worked on, which would hold up those so far, when no ball is in flight."""
         for one in held:
-            self._told.put(one)
+            self._for_final.put(one)
         held.clear()
 
     def _answer_all(self) -> None:
         """Answer the shots as of a recording."""
-        for ticks in _stretches(self._told.get):
+        for ticks in _stretches(self._for_final.get):
             log, last = ShotLog(), None
             for number, one in self._answered(self._new_chain(), ticks, self._run.targets):
                 log.add(one.tick)
@@ -328,14 +330,6 @@ def _stretches(get: Callable[[], Numbered]) -> Iterator[_Ticks]:
         ticks = _Ticks(begin, get)
         yield ticks
         begin = ticks.end
-
-
-def _told(one: _EndedShot) -> tuple[tuple[float, LiveSpin | LiveShot], ...]:
-    """The newest spin of a shot; nothing where no method has answered."""
-    spin = one.spins.newest(one.shot.number, one.shot.end_us, one.doubt)
-    if spin is None:
-        return ()
-    return ((one.came_s, LiveSpin(one.shot.number, one.shot.end_us, spin, one.shot.ended_by, 0.0)),)
 
 
 def _ended(log: ShotLog, ticks: _Ticks, one: TrackedTick) -> tuple[tuple[float, LiveSpin | LiveShot], ...]:

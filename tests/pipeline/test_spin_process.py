@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from spinscope.pipeline import spin_process
@@ -12,8 +13,10 @@ from spinscope.pipeline.child_process import ChildProcess
 from spinscope.pipeline.errors import SpinscopeError
 from spinscope.pipeline.live import LiveRun
 from spinscope.pipeline.live_outputs import LiveNotice, LiveOutput, LiveShot, LiveSpin
+from spinscope.pipeline.live_spins import Answers, LiveSpins, SpinRun, _EndedShot
+from spinscope.pipeline.results import SpinEstimate
 from spinscope.pipeline.session import Session
-from spinscope.pipeline.tick import Tick
+from spinscope.pipeline.spin_so_far import SpinsInFlight, SpinSoFar
 
 QUICK = "triplet"
 
@@ -43,21 +46,25 @@ def live(session: Session, killed_at_us: int | None = None) -> list[LiveOutput]:
     return list(run.outputs())
 
 
-def told(outputs: list[LiveOutput]) -> list[tuple[int, int, str | None]]:
-    return [(one.shot, one.t_us, one.ended_by) for one in outputs if isinstance(one, LiveSpin)]
-
-
 def notices(outputs: list[LiveOutput]) -> list[str]:
     return [one.text for one in outputs if isinstance(one, LiveNotice)]
 
 
 def test_a_killed_process_loses_no_shot_and_repeats_none(session: Session) -> None:
-    whole, outputs = live(session), live(session, killed_at_us=90_000)  # 15 ms after the bounce is known
-    for found in (whole, outputs):
-        assert [one.shot.to_dict(session.camera, 0.02) for one in found if isinstance(one, LiveShot)] == [
-            shot.to_dict(session.camera, 0.02) for shot in session.estimate(QUICK).shots
-        ]
-    assert told(outputs) == told(whole)
+    outputs, shots = (
+        live(session, killed_at_us=90_000),
+        session.estimate(QUICK).shots,
+    )  # 15 ms after the bounce is known
+    found = [one.shot for one in outputs if isinstance(one, LiveShot)]
+    assert [shot.to_dict(session.camera, 0.02) for shot in found] == [
+        shot.to_dict(session.camera, 0.02) for shot in shots
+    ]
+    told = [(one.shot, one.t_us, one.ended_by) for one in outputs if isinstance(one, LiveSpin)]
+    assert len(told) == len(set(told))
+    assert {one for one in told if one[2]} == {(shot.number, shot.end_us, shot.ended_by) for shot in shots}
+    assert {one[1] for one in told if one[2] is None} == {
+        tick.packet.end_us for tick in session.ticks(("track",)) if tick.balls
+    }
     (notice,) = notices(outputs)
     assert ": another one works on the last" in notice
 
@@ -91,3 +98,25 @@ def test_an_error_in_the_process_comes_out(session: Session, monkeypatch: pytest
     monkeypatch.setattr(run._spins, "_run", run._spins._run._replace(targets=("no such stage",)))
     with pytest.raises(SpinscopeError, match="no such stage"):
         list(run.outputs())
+
+
+def test_a_shot_is_announced_once_and_as_soon_as_there_is_a_spin(session: Session) -> None:
+    shots, spins, sent = session.estimate(QUICK).shots, SpinsInFlight(), list[Answers | Exception]()
+    live_spins = LiveSpins(SpinRun((QUICK,), False, 4, 4), sent.append)
+    live_spins._ended = [_EndedShot(shot, None, 7 + number, 1.5, spins) for number, shot in enumerate(shots)]
+    first, second = shots
+    spins._answers = {first.number: {}, second.number: {}}
+    refused = SpinEstimate.refused(QUICK, "too few events")
+    spins.add(second.number, SpinSoFar(second.end_us, refused))
+    live_spins._announce(8)
+    assert not sent  # their ticks are still to be answered
+    spins.add(first.number, SpinSoFar(first.end_us - 10_000, SpinEstimate(QUICK, np.ones(3), np.eye(3), None)))
+    live_spins._announce(6)
+    assert not sent
+    for is_complete in (False, True, True):
+        live_spins._announce(8, is_complete=is_complete)
+    found = [(one.number, one.is_final, one.outputs) for one in sent if isinstance(one, Answers)]
+    assert [(number, is_final, len(outputs)) for number, is_final, outputs in found] == [(7, False, 1), (8, False, 1)]
+    for (_, _, ((came_s, spin),)), shot in zip(found, shots, strict=True):
+        assert isinstance(spin, LiveSpin) and (came_s, spin.shot, spin.t_us) == (1.5, shot.number, shot.end_us)
+    assert not live_spins._ended
