@@ -13,7 +13,7 @@ from spinscope.pipeline.live import LiveRun
 from spinscope.pipeline.live_outputs import LiveStatus
 from spinscope.pipeline.session import Session
 
-SPEED, HOURS, SETTLED_S = 20.0, 2.0, 600.0  # of the recording
+SPEED, HOURS, SETTLED_S = 20.0, 2.0, 1200.0  # of the recording: a minute until as much waits for the spins as may
 
 
 def resident_bytes(process: int) -> int:

@@ -51,11 +51,8 @@ def notices(outputs: list[LiveOutput]) -> list[str]:
 
 
 def test_a_killed_process_loses_no_shot_and_repeats_none(session: Session) -> None:
-    outputs, shots = (
-        live(session, killed_at_us=90_000),
-        session.estimate(QUICK).shots,
-    )  # 15 ms after the bounce is known
-    found = [one.shot for one in outputs if isinstance(one, LiveShot)]
+    outputs = live(session, killed_at_us=90_000)  # 15 ms after the bounce is known
+    shots, found = session.estimate(QUICK).shots, [one.shot for one in outputs if isinstance(one, LiveShot)]
     assert [shot.to_dict(session.camera, 0.02) for shot in found] == [
         shot.to_dict(session.camera, 0.02) for shot in shots
     ]
