@@ -41,35 +41,39 @@ class ClockSegments:
         """Whether all events taken so far were handed on or dropped."""
         return not len(self._held)
 
-    def joined(self, parts: Iterable[UncheckedEvents]) -> Iterator[UncheckedEvents]:
-        """Yield the events of all parts, none of them empty, with the shift added."""
+    def joined(self, parts: Iterable[UncheckedEvents]) -> Iterator[tuple[UncheckedEvents, bool]]:
+        """Yield the events of all parts, none of them empty, with the shift added.
+
+        With each part comes whether its events are known to be in order.
+        """
         for part in parts:
             yield from self._take(part, final=False)
         yield from self._take(UncheckedEvents.empty(), final=True)
 
-    def _take(self, new: UncheckedEvents, final: bool) -> Iterator[UncheckedEvents]:
+    def _take(self, new: UncheckedEvents, final: bool) -> Iterator[tuple[UncheckedEvents, bool]]:
         events = UncheckedEvents.concatenate([self._held, new]) if len(self._held) else new
         self._held = UncheckedEvents.empty()
+        rises = not np.any(events.t_us[1:] < events.t_us[:-1])
         while len(events):
-            first, count = self._first_late(events.t_us), len(events)
+            first, count = self._first_late(events.t_us, rises), len(events)
             is_sure = final or first == count or count - first >= SEGMENT_EVENTS
             is_open = not self._has_begun and first < SEGMENT_EVENTS  # what is stale is not known yet
             if not final and is_open and (count < SEGMENT_EVENTS or not is_sure):
                 is_sure, first = False, 0
             if is_sure and first < count and self._is_set_back(events.t_us, first):
-                yield from self._set_back(events[:first], int(events.t_us[first]))
+                yield from self._set_back(events[:first], rises, int(events.t_us[first]))
                 events = events[first:]
                 continue
             upto = self._end_of_late(events.t_us, first) if is_sure else first
-            yield from self._hand_on(events[:upto])
+            yield from self._hand_on(events[:upto], rises)
             if not is_sure:
                 self._held = events[upto:]
                 return
             events = events[upto:]
 
-    def _first_late(self, t_us: NDArray[np.int64]) -> int:
+    def _first_late(self, t_us: NDArray[np.int64], rises: bool) -> int:
         """Index of the first event that is late; their number where none is."""
-        if t_us[0] >= self._latest_us and not np.any(t_us[1:] < t_us[:-1]):
+        if rises and t_us[0] >= self._latest_us:
             return t_us.size
         late = t_us < np.maximum(np.maximum.accumulate(t_us), self._latest_us) - MAX_DISORDER_US
         return int(np.argmax(late)) if late.any() else t_us.size
@@ -90,19 +94,21 @@ class ClockSegments:
         behind = t_us[first:] >= self._latest_before(t_us, first) - MAX_DISORDER_US
         return first + int(np.argmax(behind)) if behind.any() else t_us.size
 
-    def _set_back(self, before: UncheckedEvents, first_us: int) -> Iterator[UncheckedEvents]:
+    def _set_back(self, before: UncheckedEvents, rises: bool, first_us: int) -> Iterator[tuple[UncheckedEvents, bool]]:
         """Hand on or drop the rest of a segment, and begin the next one."""
         if not self._has_begun and len(before) < SEGMENT_EVENTS:
             self._reading.damage.stale_events += len(before)
         else:
-            yield from self._hand_on(before)
+            yield from self._hand_on(before, rises)
             self._reading.damage.clock_resets += 1
             self.shift_us += self._latest_us - first_us
         self._has_begun, self._latest_us = False, NO_TIME_US
 
-    def _hand_on(self, events: UncheckedEvents) -> Iterator[UncheckedEvents]:
+    def _hand_on(self, events: UncheckedEvents, rises: bool) -> Iterator[tuple[UncheckedEvents, bool]]:
         if not len(events):
             return
         self._has_begun = True
-        self._latest_us = max(self._latest_us, int(events.t_us.max()))
-        yield UncheckedEvents(events.t_us + self.shift_us, *events.columns[1:]) if self.shift_us else events
+        self._latest_us = max(self._latest_us, int(events.t_us[-1] if rises else events.t_us.max()))
+        if self.shift_us:
+            events = UncheckedEvents(events.t_us + self.shift_us, *events.columns[1:])
+        yield events, rises

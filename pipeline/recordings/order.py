@@ -35,16 +35,20 @@ class TimeOrder:
         self.latest_us = latest_us
         self._before_us = NO_TIME_US  # of the event just before, in file order
 
-    def sorted(self, parts: Iterable[UncheckedEvents]) -> Iterator[UncheckedEvents]:
-        """Yield the events of all parts in order of time, in parts that are not empty."""
-        for part in parts:
-            yield from self._push(part)
+    def sorted(self, parts: Iterable[tuple[UncheckedEvents, bool]]) -> Iterator[UncheckedEvents]:
+        """Yield the events of all parts in order of time, in parts that are not empty.
+
+        parts: with whether they are known to be in order, see `ClockSegments.joined`.
+        """
+        for part, rises in parts:
+            yield from self._push(part, rises)
         yield from self._ordered()
 
-    def _push(self, new: UncheckedEvents) -> Iterator[UncheckedEvents]:
+    def _push(self, new: UncheckedEvents, rises: bool) -> Iterator[UncheckedEvents]:
         """Take the next events; yields those that no later event can precede."""
         t_us = new.t_us
-        backward = int(np.count_nonzero(t_us[1:] < t_us[:-1])) + (int(t_us[0]) < self._before_us)
+        backward = 0 if rises else int(np.count_nonzero(t_us[1:] < t_us[:-1]))
+        backward += int(t_us[0]) < self._before_us
         in_order = not backward and int(t_us[0]) >= self.latest_us
         if not in_order:
             new = self._without_late(new)

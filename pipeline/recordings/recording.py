@@ -34,7 +34,7 @@ HASH_BLOCK_BYTES = 1 << 20
 EVENT_BYTES = 13  # 8 + 2 + 2 + 1
 LAST_COORDINATE = (1 << 16) - 1  # larger ones are broken, whatever they say
 MAX_STRAY_SHARE = 1e-3  # of events that lie outside every known sensor and do not count for its size
-USUAL_EVENT_BYTES = 4  # in RAW: exactly so in EVT2, 4 to 5 in EVT3 where few pixels of a row fire together
+LEAST_EVENT_BYTES = 2  # an event of its own in EVT3; room that nothing is written to costs no memory
 
 
 def file_identity(path: Path) -> str:
@@ -221,7 +221,7 @@ class Recording:
         # Half of the memory, and twice while a column grows.
         most = _memory_bytes() // (4 * EVENT_BYTES) if max_events is None else max_events
         whole = start_us is None and end_us is None
-        expected = self.events or self.path.stat().st_size // USUAL_EVENT_BYTES
+        expected = self.events or self.path.stat().st_size // LEAST_EVENT_BYTES
         columns = _GrowingColumns(min(expected, most) if whole else CHUNK_EVENTS)
         for batch in self.chunks(start_us, end_us, on_progress=on_progress):
             columns.append(batch)

@@ -52,8 +52,8 @@ def test_segments_are_joined_as_by_the_twin_however_they_come(
     reading = ReadPass()
     pieces = [unchecked(events[a:b]) for a, b in pairwise(places) if b > a]
     found = []
-    for part in ClockSegments(reading).joined(pieces):
-        assert len(part)
+    for part, rises in ClockSegments(reading).joined(pieces):
+        assert len(part) and (not rises or np.all(part.t_us[1:] >= part.t_us[:-1]))
         found += zip(*(column.tolist() for column in part.columns), strict=True)
     expected, stale, resets = naive_segments(events, RUN)
     assert found == expected

@@ -51,7 +51,7 @@ class DatReader(FormatReader):
                 block = file.read(reading.max_events * EVENT_BYTES)
                 final = not block
                 data = rest + block
-                words = np.frombuffer(data, "<u4", len(data) // EVENT_BYTES * 2).reshape(-1, 2)
+                words = np.frombuffer(data, "<i8", len(data) // EVENT_BYTES)
                 columns = (np.empty(len(words), dtype) for dtype in (np.int64, np.uint16, np.uint16, np.bool_))
                 out = DatEvents._make([*columns, state])
                 done = int(decode_dat(out, words, final)) * EVENT_BYTES

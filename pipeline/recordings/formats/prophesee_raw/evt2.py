@@ -37,17 +37,11 @@ def decode_evt2(out: Decoded, heads: NDArray[np.uint32], masks: NDArray[np.uint3
     vectors = masks.size > 0
     while at < size and events <= last_start and triggers < trigger_room:
         if time_known and not vectors:
-            upto = min(size, at + last_start + one - events)
-            while at < upto:
-                word = np.int64(heads[at])
-                if word >> HIGH_BITS > CD_ON:
-                    break
-                t_us[events] = high_us | ((word >> TIME_SHIFT) & LOW_MASK)
-                x_px[events] = (word >> X_SHIFT) & 0x7FF
-                y_px[events] = word & 0x7FF
-                on[events] = word >> HIGH_BITS != CD_OFF
-                events += one
+            upto, first = min(size, at + last_start + one - events), at
+            while at < upto and heads[at] >> HIGH_BITS <= CD_ON:
                 at += one
+            _write_run(out, events, heads[first:at], high_us)
+            events += at - first
             if at == upto:
                 continue
         word = np.int64(heads[at])
@@ -85,3 +79,16 @@ def decode_evt2(out: Decoded, heads: NDArray[np.uint32], masks: NDArray[np.uint3
         at += one
     state[decoding.EVENTS], state[decoding.TRIGGERS] = events, triggers
     return int(at)
+
+
+@njit(cache=True, nogil=True)
+def _write_run(out: Decoded, first: np.uint64, words: NDArray[np.uint32], high_us: int) -> None:
+    """Write the events of words (n,) into `out` from index `first` on, in a loop that the compiler vectorizes."""
+    end = first + np.uint64(words.size)
+    t_us, x_px, y_px, on = out.t_us[first:end], out.x_px[first:end], out.y_px[first:end], out.on[first:end]
+    for k in range(words.size):
+        word = words[k]
+        t_us[k] = high_us | np.int64((word >> TIME_SHIFT) & LOW_MASK)
+        x_px[k] = (word >> X_SHIFT) & 0x7FF
+        y_px[k] = word & 0x7FF
+        on[k] = word >> HIGH_BITS != CD_OFF
