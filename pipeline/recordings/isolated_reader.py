@@ -36,7 +36,7 @@ class IsolatedReader(FormatReader):
 
     def columns(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
         """Yield the events that the process reads one part ahead."""
-        request = replace(reading, on_progress=None, damage=Damage(), triggers=[])
+        request = replace(reading, on_progress=None, damage=Damage(), triggers=[], columns=None)
         with self._isolation_errors():
             for part in iterate(_parts, self._reader, request):
                 part.note_in(reading)

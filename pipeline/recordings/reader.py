@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..errors import RecordingError
 from ..events import ColumnBatch
 from ..results import Truth
+from .growing_columns import DecodedColumns, GrowingColumns
 from .sensor import Resolution
 
 Progress = Callable[[float], None]  # called with the share done, 0 to 1
@@ -143,6 +144,8 @@ class ReadPass:
         Number of the first event that the reader gave.
     triggers : list of Triggers
         Edges found so far.
+    columns : GrowingColumns or None
+        Memory for all events of the pass, where they are to be held.
     """
 
     max_events: int = CHUNK_EVENTS
@@ -153,6 +156,17 @@ class ReadPass:
     first_row: int = 0
     damage: Damage = field(default_factory=Damage)
     triggers: list[Triggers] = field(default_factory=list)
+    columns: GrowingColumns | None = None
+
+    def room(self, events: int) -> DecodedColumns:
+        """Columns to decode the next events into, up to so many."""
+        return DecodedColumns.empty(events) if self.columns is None else self.columns.room(events)
+
+    def decoded(self, room: DecodedColumns, events: int) -> UncheckedEvents:
+        """The first events of the room given last, which have been decoded into it."""
+        if self.columns is not None:
+            self.columns.note_decoded(events)
+        return UncheckedEvents(*room.rows(0, events))
 
     def report(self, done: float, total: float) -> None:
         """Tell the share done."""

@@ -14,6 +14,7 @@ from ..errors import RecordingError
 from ..events import EventBatch
 from ..results import Truth
 from .clock_segments import ClockSegments
+from .growing_columns import GrowingColumns
 from .index import IndexBuilder, RecordingIndex
 from .order import NO_TIME_US, TimeOrder
 from .reader import (
@@ -222,8 +223,9 @@ class Recording:
         most = _memory_bytes() // (4 * EVENT_BYTES) if max_events is None else max_events
         whole = start_us is None and end_us is None
         expected = self.events or self.path.stat().st_size // LEAST_EVENT_BYTES
-        columns = _GrowingColumns(min(expected, most) if whole else CHUNK_EVENTS)
-        for batch in self.chunks(start_us, end_us, on_progress=on_progress):
+        columns = GrowingColumns(min(expected, most) if whole else CHUNK_EVENTS)
+        reading = ReadPass(start_us=start_us, end_us=end_us, on_progress=on_progress, columns=columns)
+        for batch in self._batches(reading):
             columns.append(batch)
             if columns.events > most:
                 raise TooManyEvents(
@@ -339,28 +341,3 @@ class Recording:
             columns = columns[inside]
         x, y = (column.astype(np.uint16, copy=False) for column in (columns.x, columns.y))
         return EventBatch(columns.t_us, x, y, columns.on)
-
-
-class _GrowingColumns:
-    """Columns that parts are copied to as they come.
-
-    Reading is twice as fast as when the parts are kept to be joined: their fresh memory costs more than the copies.
-    """
-
-    def __init__(self, room: int) -> None:
-        self.events = 0
-        self._columns = [np.empty(room, kind) for kind in EventBatch.KINDS]
-
-    def append(self, batch: EventBatch) -> None:
-        first, self.events = self.events, self.events + len(batch)
-        room = self._columns[0].size
-        if self.events > room:
-            larger = [np.empty(max(2 * room, self.events), kind) for kind in EventBatch.KINDS]
-            for new, old in zip(larger, self._columns, strict=True):
-                new[:first] = old[:first]
-            self._columns = larger
-        for column, values in zip(self._columns, batch.columns, strict=True):
-            column[first : self.events] = values
-
-    def batch(self) -> EventBatch:
-        return EventBatch(*(column[: self.events] for column in self._columns))

@@ -51,15 +51,33 @@ RECORDINGS = [
     ),
     Mutant(
         "pipeline/recordings/formats/prophesee_dat/decoding.py",
-        "if outside or _is_copy(words, i):",
-        "if outside:",
+        "if _is_outside(words[i]) or _is_copy(words, i):",
+        "if _is_outside(words[i]):",
         "tests/pipeline/recordings/test_recordings_dat.py",
+    ),
+    Mutant(
+        "pipeline/recordings/formats/prophesee_dat/decoding.py",
+        "(words[k] - words[k - 1]) & TIME_MASK > MAX_DISORDER_US",
+        "(words[k] - words[k - 1]) & TIME_MASK > 200 * MAX_DISORDER_US",
+        "tests/pipeline/recordings/test_recordings_dat.py",
+    ),
+    Mutant(
+        "pipeline/recordings/formats/prophesee_raw/evt2.py",
+        "heads[at] >> HIGH_BITS <= CD_ON",
+        "heads[at] >> HIGH_BITS <= 0x3",
+        RAW,
     ),
     Mutant(
         "pipeline/recordings/formats/hdf5/ecf.py",
         "(a & low) | ((b >> 2 * bits) << bits)",
         "(a & low) | (b >> 2 * bits)",
         "tests/pipeline/recordings/test_recordings_columns.py tests/pipeline/recordings/test_recordings_encodings.py",
+    ),
+    Mutant(
+        "pipeline/recordings/growing_columns.py",
+        "self._decoded += events",
+        "self._decoded = self.events",
+        "tests/pipeline/recordings/test_recordings_streamed.py",
     ),
     Mutant(
         "pipeline/recordings/order.py",

@@ -73,6 +73,7 @@ def test_every_window_is_as_from_a_read_of_the_whole(tmp_path: Path, format: str
     write(tmp_path / name, long_recording(), **SIZE)
     recording = open_recording(tmp_path / name)
     whole = recording.read()
+    assert_same_events(whole, EventBatch.concatenate(recording.chunks()))
     pieces = RecordingPieces(recording)
     assert len(pieces.index.cut_us) >= 4 and pieces.index.events == len(whole)
     assert_same_events(pieces.between(-(2**62), 2**62), whole)

@@ -50,16 +50,15 @@ class EventStreamReader(FormatReader):
             while block := file.read(reading.max_events * EVENT_BYTES):
                 data = rest + block
                 while True:
-                    room = reading.max_events
-                    columns = (np.empty(room, dtype) for dtype in (np.int64, np.uint16, np.uint16, np.bool_))
-                    out = EventStreamEvents._make([*columns, state])
+                    room = reading.room(reading.max_events)
+                    out = EventStreamEvents(*room, state)
                     done = int(decode_event_stream(out, np.frombuffer(data, np.uint8), self._is_atis))
                     data, offset = data[done:], offset + done
                     reading.place = Place(offset, (int(state[NOW]),))
                     events = int(state[EVENTS])
                     if not events:
                         break
-                    yield UncheckedEvents(out.t_us[:events], out.x_px[:events], out.y_px[:events], out.on[:events])
+                    yield reading.decoded(room, events)
                 rest = data
                 reading.report(file.tell(), size)
             reading.damage.lost_bytes += len(rest)

@@ -52,14 +52,13 @@ class DatReader(FormatReader):
                 final = not block
                 data = rest + block
                 words = np.frombuffer(data, "<i8", len(data) // EVENT_BYTES)
-                columns = (np.empty(len(words), dtype) for dtype in (np.int64, np.uint16, np.uint16, np.bool_))
-                out = DatEvents._make([*columns, state])
-                done = int(decode_dat(out, words, final)) * EVENT_BYTES
+                room = reading.room(len(words))
+                done = int(decode_dat(DatEvents(*room, state), words, final)) * EVENT_BYTES
                 offset, rest = offset + done, data[done:]
                 reading.damage.time_jumps += int(state[TIME_JUMPS])
                 reading.damage.outside_events += int(state[OUTSIDE])
                 reading.place = Place(offset, (int(state[NOW]),))
                 if state[EVENTS]:
-                    yield UncheckedEvents(out.t_us, out.x_px, out.y_px, out.on)[: int(state[EVENTS])]
+                    yield reading.decoded(room, int(state[EVENTS]))
                 reading.report(offset - self._start, self._end - self._start)
         reading.damage.lost_bytes += len(rest)

@@ -117,10 +117,9 @@ class RawDecoder:
         return (first, second) if self._legacy else (second, first)
 
     def _decode(self, heads: NDArray[Any], masks: NDArray[np.uint32], final: bool) -> tuple[int, UncheckedEvents]:
-        room = max(self._reading.max_events, 4096)
-        columns = (np.empty(room, dtype) for dtype in (np.int64, np.uint16, np.uint16, np.bool_))
+        room = self._reading.room(max(self._reading.max_events, 4096))
         edges = (np.empty(TRIGGER_ROOM, dtype) for dtype in (np.int64, np.uint8, np.uint8))
-        out = Decoded._make([*columns, *edges, self._state])
+        out = Decoded._make([*room, *edges, self._state])
         if self._encoding == "EVT3":
             used = int(decode_evt3(out, heads, final))
         else:
@@ -129,7 +128,7 @@ class RawDecoder:
         if triggers:
             t_us, value, number = out.trigger_t_us, out.trigger_value, out.trigger_id
             self._reading.triggers.append(Triggers(t_us[:triggers], value[:triggers], number[:triggers]))
-        return used, UncheckedEvents(out.t_us[:events], out.x_px[:events], out.y_px[:events], out.on[:events])
+        return used, self._reading.decoded(room, events)
 
 
 def format_options(header: dict[str, str]) -> dict[str, str]:
