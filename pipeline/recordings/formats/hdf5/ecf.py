@@ -174,7 +174,7 @@ def _columns_masked(x: NDArray[np.uint16], count: int, data: Bytes, at: int) -> 
         at += 2
         x[done] = word >> 5
         done += 1
-        for k in range(5):
+        for k in range(5 if word & 31 else 0):  # few columns have a neighbour, except at edges
             if done < count and (word >> (4 - k)) & 1:
                 x[done] = (word >> 5) + k + 1
                 done += 1
