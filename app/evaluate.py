@@ -228,6 +228,7 @@ trusts. Which events are the logo's is not known, so shares "of those with logo"
 def write_page(evaluations: Sequence[Evaluation], path: Path, pictures: Sequence[Path] = ()) -> None:
     """Write the tables of these suites, with their figures from `write_figures`, as one page of Markdown.
 
+    The same tables stand beside it as JSON, one object a suite and line, with the cells as the page shows them.
     Raises RecordingError.
     """
     lines = [ABOUT if any(one.report.folder is None for one in evaluations) else ABOUT_REAL]
@@ -242,6 +243,14 @@ def write_page(evaluations: Sequence[Evaluation], path: Path, pictures: Sequence
         for table in one.report.tables:
             lines += _table_lines(table, "###")
     write_whole(path, "\n".join(lines).rstrip() + "\n")
+    tables = [json.dumps(_page_tables(one), ensure_ascii=False) for one in evaluations]
+    write_whole(path.with_suffix(".json"), "\n".join(tables) + "\n")
+
+
+def _page_tables(one: Evaluation) -> dict[str, Any]:
+    """A suite's tables, cells as text, with how they were made."""
+    shown = [{"title": table.title, "columns": table.columns, "rows": table.as_text()} for table in one.report.tables]
+    return {"suite": one.report.suite.name, "made": _how_made(one), "tables": shown}
 
 
 def _table_lines(table: ResultTable, heading: str) -> list[str]:

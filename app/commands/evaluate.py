@@ -48,7 +48,12 @@ DATASET = "dataset"  # in place of a suite: a training set
 @click.option("--quick", is_flag=True, help="A thinned suite, about ten seconds.")
 @click.option("--json", "output", type=click.Path(path_type=Path), metavar="OUT", help="Write JSON, one suite a line.")
 @click.option("--figures", type=click.Path(path_type=Path), metavar="DIR", help="Write figures (PNG) and rows (CSV).")
-@click.option("--page", type=click.Path(path_type=Path), metavar="FILE.md", help="Write tables and figures as a page.")
+@click.option(
+    "--page",
+    type=click.Path(path_type=Path),
+    metavar="FILE.md",
+    help="Write tables and figures as a page, and the tables as JSON beside it.",
+)
 @click.option("--out", type=click.Path(path_type=Path), metavar="FOLDER", help="With dataset: folder to write it to.")
 @click.option("--shards", type=click.IntRange(1), default=16, show_default=True, help="With dataset: number of files.")
 @click.option(

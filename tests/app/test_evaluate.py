@@ -73,6 +73,9 @@ def test_json_csv_and_page(evaluation: Evaluation, tmp_path: Path) -> None:
     page = (tmp_path / "page.md").read_text()
     assert "| all | 0.75 ± 0.65 (0.75) |" in page and evaluation.machine in page and evaluation.date in page
     assert page.count("](figures/made_up_errors.png)") == page.count("![") == 1
+    beside = json.loads((tmp_path / "page.json").read_text(encoding="utf-8"))
+    table = {"title": "Errors [px]", "columns": ["what", "error [px]"], "rows": [["all", "0.75 ± 0.65 (0.75)"]]}
+    assert beside["suite"] == "made_up" and beside["tables"] == [table]
 
 
 def test_quick_is_said(evaluation: Evaluation, tmp_path: Path) -> None:
