@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-import subprocess
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,16 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spinscope.pipeline.errors import ParameterError, RecordingError
-from spinscope.pipeline.files import atomic_file
+from spinscope.pipeline.errors import ParameterError
 
+from ..video_encoder import FRAMES_HZ, encode_video
 from .ball_picture import GROUND, ball_picture
 from .shot_words import ShotWords
 
 Bytes = NDArray[np.uint8]
 
 WIDTH_PX, HEIGHT_PX, BALL_PX = 720, 900, 600
-FRAMES_HZ = 25
 SECONDS = 6.0  # of the video: the shot as slowly as that takes
 TEXT, FAINT = (21, 25, 30), (82, 91, 102)
 
@@ -30,30 +27,10 @@ def write_video(shot: Mapping[str, Any], detail: Mapping[str, Any], path: Path, 
 
     It needs imageio-ffmpeg, which is an extra.
     """
-    if path.suffix.lower() != ".mp4":
-        raise ParameterError(f"a video ends in .mp4: give such a name instead of {path}")
     if shot["spin_rps"] is None:
         raise ParameterError(f"the spin of this shot is not seen ({shot['reason']}): there is no turning ball to show")
-    try:
-        encoder: Any = importlib.import_module("imageio_ffmpeg")
-    except ImportError:
-        raise ParameterError("a video needs imageio-ffmpeg: install it with `pip install spinscope[video]`") from None
-    with atomic_file(path, "video") as part:
-        size = f"{WIDTH_PX}x{HEIGHT_PX}"
-        source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(FRAMES_HZ), "-i", "-"]
-        coded = ["-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "23", "-movflags", "+faststart", "-f", "mp4"]
-        command = [encoder.get_ffmpeg_exe(), "-y", "-loglevel", "error", *source, *coded, str(part)]
-        with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-            assert process.stdin is not None and process.stderr is not None
-            try:
-                for frame in video_frames(shot, detail, words):
-                    process.stdin.write(frame.tobytes())
-                process.stdin.close()
-            except BrokenPipeError:
-                pass  # the encoder says why
-            said = process.stderr.read().decode(errors="replace")
-        if process.returncode:
-            raise RecordingError(f"the video cannot be written ({' '.join(said.split())[:200]}): {path}")
+    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{WIDTH_PX}x{HEIGHT_PX}"]
+    encode_video((frame.tobytes() for frame in video_frames(shot, detail, words)), source, path)
 
 
 def video_frames(shot: Mapping[str, Any], detail: Mapping[str, Any], words: ShotWords) -> Iterator[Bytes]:

@@ -1,20 +1,31 @@
-"""Two runs A and B beside each other: A under a prefix of its own and paler, and the view of both."""
+"""Two runs A and B beside each other: A under a prefix of its own and paler, what differs, and the view of both."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+import cv2
+import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+from numpy.typing import NDArray
 
 from . import entities as at
 from . import panes
+from .ball_projections import sphere
+from .image import ball_places
+from .png import png
 from .rerun_api import Chunk, columns_at, once, styled
-from .run import ViewedRun
+from .run import ViewedRun, shown_estimate, vector_of
+
+Floats = NDArray[np.float64]
 
 A = "/A"
 # Series of A are drawn in the colour of the same series of B, mixed with this.
 PALE, PALENESS = (235, 235, 235), 0.55
+GRID_DEG, GRID_POINTS = 30, 49  # of the sphere on which the axes stand
+TIP_RADII = 1.3  # of an axis on the unit sphere
+ARC_POINTS = 17  # of the arc between two axes
 
 
 def compared(a: Sequence[Chunk]) -> list[Chunk]:
@@ -47,24 +58,48 @@ def note_with_a(run: ViewedRun, text: str) -> list[Chunk]:
     return _note(run, f"{text}\n\nCurves: {legend}. A is paler.")
 
 
+def difference_chunks(a: ViewedRun, b: ViewedRun) -> list[Chunk]:
+    """What differs between the runs: surfaces around B's ball, and the axes of the shown spins on a unit sphere."""
+    return [*_surface_difference(a, b), *_axes(a, b)]
+
+
 def comparison(run: ViewedRun) -> rrb.Container:
-    """Pictures of A and B side by side, their curves in the same plots."""
+    """Pictures of A and B side by side and as a difference, their curves in the same plots."""
     return rrb.Vertical(
-        rrb.Horizontal(
-            panes.close_up(run, "A: surface and circles", prefix=A),
-            panes.close_up(run, "B: surface and circles"),
-            panes.derotated_logo("A: derotated logo", prefix=A),
-            panes.derotated_logo("B: derotated logo"),
-            column_shares=[3, 3, 2, 2],
-        ),
-        rrb.Horizontal(
-            _plot("x", "x [px], A pale"),
-            _plot("radius", "Radius [px], A pale"),
-            _plot("spin", "Spin [rps], A pale"),
-            panes.text(at.COMPARISON, "Differences"),
-            column_shares=[3, 3, 3, 2],
-        ),
+        rrb.Horizontal(*_surfaces(run), *_logos(), column_shares=[3, 3, 3, 4, 4]),
+        rrb.Horizontal(*_plots(), panes.compared_axes("Axes"), _differences(), column_shares=[3, 3, 3, 3, 3]),
     )
+
+
+def narrow_comparison(run: ViewedRun) -> rrb.Container:
+    """The same in fewer columns."""
+    return rrb.Vertical(
+        rrb.Horizontal(*_surfaces(run)),
+        rrb.Horizontal(*_logos(), panes.compared_axes("Axes"), column_shares=[3, 3, 2]),
+        rrb.Horizontal(*_plots()),
+        _differences(),
+        row_shares=[3, 3, 3, 2],
+    )
+
+
+def _surfaces(run: ViewedRun) -> list[rrb.View]:
+    return [
+        panes.close_up(run, "A: surface", prefix=A),
+        panes.close_up(run, "B: surface"),
+        panes.difference(run, "B red, A blue"),
+    ]
+
+
+def _logos() -> list[rrb.View]:
+    return [panes.derotated_logo("A: derotated logo", prefix=A), panes.derotated_logo("B: derotated logo")]
+
+
+def _plots() -> list[rrb.View]:
+    return [_plot("x", "x [px], A pale"), _plot("radius", "Radius [px]"), _plot("spin", "Spin [rps]")]
+
+
+def _differences() -> rrb.View:
+    return panes.text(at.COMPARISON, "Differences")
 
 
 def _plot(quantity: str, name: str) -> rrb.View:
@@ -78,6 +113,88 @@ def _plot(quantity: str, name: str) -> rrb.View:
     )
 
 
+def _surface_difference(a: ViewedRun, b: ViewedRun) -> list[Chunk]:
+    """Surface of B less that of A at every tick of B, around B's ball: red where B is brighter, blue where A is."""
+    half_px = int(np.ceil(panes.CLOSE_UP_RADII * b.largest_radius_px))
+    before = np.searchsorted(a.ends_us, b.ends_us, side="right") - 1
+    pictures = [png(np.zeros((2 * half_px + 1, 2 * half_px + 1, 3), np.uint8))]
+    for tick, row, (x, y) in zip(b.ticks, before, ball_places(b)[1:], strict=True):
+        own = _around(tick.surface.values, x, y, half_px)
+        other = _around(a.ticks[row].surface.values, x, y, half_px) if row >= 0 else np.zeros_like(own)
+        more, less = (np.clip(sign * (own - other) / 255, 0, 1)[..., None] for sign in (1, -1))
+        pictures.append(png((more * np.array(at.ON) + less * np.array(at.OFF)).astype(np.uint8)))
+    corner = rr.Transform3D(translation=[-half_px - 0.5, -half_px - 0.5, 0.0])
+    return [
+        once(at.DIFFERENCE, corner, rr.EncodedImage.from_fields(media_type="image/png")),
+        columns_at(at.DIFFERENCE, b.times_us, rr.EncodedImage.columns(blob=pictures)),
+    ]
+
+
+def _around(values: NDArray[np.uint8], x: float, y: float, half_px: int) -> Floats:
+    """Part of a picture around a place, black beyond its edges."""
+    side = 2 * half_px + 1
+    place = np.array([[1, 0, half_px - x], [0, 1, half_px - y]])
+    return np.asarray(cv2.warpAffine(values, place, (side, side)), np.float64)
+
+
+def _axes(a: ViewedRun, b: ViewedRun) -> list[Chunk]:
+    """Shown axes of both runs on a unit sphere with the truth, and the angle on the arc from A to B."""
+    spins = [np.array([vector_of(shown_estimate(tick)[0]) for tick in run.ticks]) for run in (a, b)]
+    pale = _paler(at.RING_COLOUR)
+    chunks = [
+        _sphere(),
+        *_arrow(a, "A", spins[0], pale),
+        *_arrow(b, "B", spins[1], at.RING_COLOUR),
+        *_arc(a, b, *spins),
+    ]
+    if b.true_spins_rps is not None:
+        chunks += _arrow(b, "truth", np.nan_to_num(b.true_spins_rps) * b.has_ball[:, None], at.TRUTH_COLOUR)
+    return chunks
+
+
+def _sphere() -> Chunk:
+    """Circles of longitude and latitude."""
+    turn = np.linspace(-np.pi, np.pi, GRID_POINTS)
+    steps = np.radians(np.arange(-180 + GRID_DEG, 180, GRID_DEG))
+    circles = [sphere(step, turn / 2) for step in [*steps, np.pi]]
+    circles += [sphere(turn, step) for step in steps if abs(step) < np.pi / 2]
+    return once(f"{at.COMPARED_AXES}/sphere", rr.LineStrips3D(circles, colors=[at.MASK_COLOUR], radii=[-0.4]))
+
+
+def _arrow(run: ViewedRun, name: str, spins_rps: Floats, colour: at.Colour) -> list[Chunk]:
+    """Axis of a run at every tick at which it is known."""
+    magnitudes = np.linalg.norm(spins_rps, axis=1)
+    known = magnitudes > 0
+    axes = TIP_RADII * spins_rps[known] / magnitudes[known, None]
+    labels = [f"{name} {magnitude:.1f} rps" for magnitude in magnitudes[known]]
+    entity, columns = f"{at.COMPARED_AXES}/{name}", rr.Arrows3D.columns(vectors=axes, labels=labels)
+    style = styled(entity, rr.Arrows3D, colors=colour, radii=0.03, show_labels=True)
+    return [style, columns_at(entity, run.times_us, columns, [0, *known.astype(int)])]
+
+
+def _arc(a: ViewedRun, b: ViewedRun, spins_a: Floats, spins_b: Floats) -> list[Chunk]:
+    """Arc from A's axis to B's at every tick of B at which both are known, labelled with its angle."""
+    before = np.searchsorted(a.ends_us, b.ends_us, side="right") - 1
+    first = spins_a[np.maximum(before, 0)] * (before >= 0)[:, None]
+    lengths = [np.linalg.norm(spins, axis=1) for spins in (first, spins_b)]
+    known = np.minimum(*lengths) > 0
+    first, last = (spins[known] / length[known, None] for spins, length in zip((first, spins_b), lengths, strict=True))
+    angles_deg = np.degrees(np.arccos(np.clip((first * last).sum(axis=1), -1, 1)))
+    share = np.linspace(0, 1, ARC_POINTS)[:, None]
+    chords = first[:, None] * (1 - share) + last[:, None] * share
+    arcs = chords / np.maximum(np.linalg.norm(chords, axis=2, keepdims=True), 1e-9)
+    columns = rr.LineStrips3D.columns(strips=list(arcs), labels=[f"{angle:.1f}°" for angle in angles_deg])
+    entity = f"{at.COMPARED_AXES}/angle"
+    style = styled(entity, rr.LineStrips3D, colors=at.OTHERS_COLOUR, radii=-1.5, show_labels=True)
+    return [style, columns_at(entity, b.times_us, columns, [0, *known.astype(int)])]
+
+
+def _paler(colour: at.Colour) -> at.Colour:
+    """Colour of A for what B has in this one."""
+    red, green, blue = (round(part + PALENESS * (light - part)) for part, light in zip(colour, PALE, strict=True))
+    return red, green, blue
+
+
 def _pale(style: Chunk) -> Chunk:
     """The style of a series, laid over its own: what is written later holds."""
     batch = style.to_record_batch()
@@ -85,8 +202,7 @@ def _pale(style: Chunk) -> Chunk:
     archetype = next(name.split(":")[0] for name in batch.schema.names if ":" in name)
     name = batch.column(names["names"])[0].as_py()[0]
     colour = batch.column(names["colors"])[0].as_py()[0] >> 8
-    parts = [(colour >> shift) & 255 for shift in (16, 8, 0)]
-    pale = [round(part + PALENESS * (light - part)) for part, light in zip(parts, PALE, strict=True)]
+    pale = _paler(((colour >> 16) & 255, (colour >> 8) & 255, colour & 255))
     made = getattr(rr, archetype).from_fields(names=f"A: {name}", colors=[(*pale, 255)])
     return once(style.entity_path, made)
 

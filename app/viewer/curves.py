@@ -119,7 +119,7 @@ class Plot:
     def view(self, run: ViewedRun, *, legend: bool = True) -> rrb.TimeSeriesView:
         """View of the plot over the time in view; without its legend where there is no room for it."""
         corner = self.legend if legend else "none"
-        y_range = self._range(run)
+        y_range = self.axis_range(run)
         if corner == "top" and y_range is not None:
             y_range = (y_range[0], y_range[1] + LEGEND_SHARE * (y_range[1] - y_range[0]))
         place: Literal["RightBottom", "RightTop"] = "RightBottom" if corner == "bottom" else "RightTop"
@@ -133,7 +133,7 @@ class Plot:
 
     def _contacts(self, run: ViewedRun) -> list[Curve]:
         """Vertical lines at the contacts over the range of the axis: up within a nanosecond, the time's resolution."""
-        y_range = self._range(run)
+        y_range = self.axis_range(run)
         if y_range is None or not run.contacts_us.size:
             return []
         t_us = np.add.outer(run.contacts_us, [-1e-3, 0.0, 1e-3]).ravel()
@@ -141,7 +141,7 @@ class Plot:
         t_us, values = np.concatenate([[run.start_us], t_us]), _from_start(values)
         return [Curve("contacts", "contact", CONTACT_COLOUR, values, t_us=t_us, width=1.0)]
 
-    def _range(self, run: ViewedRun) -> Range | None:
+    def axis_range(self, run: ViewedRun) -> Range | None:
         """Range of the axis, or of the curves with a tenth to spare on either side; None where they have no values."""
         if self.y_range:
             return self.y_range(run)

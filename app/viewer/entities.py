@@ -73,6 +73,10 @@ SUMMARY = "/summary"
 COACH = "/coach"
 COMPARISON = "/compare"
 
+# Of two runs A and B: their surfaces' difference around the ball, and their axes on a unit sphere.
+DIFFERENCE = "/difference"
+COMPARED_AXES = "/axes"
+
 # Colours of series, of ON and OFF, and of the spin methods are told apart by red-green-blind eyes, too: a test.
 ON: Colour = (210, 30, 60)
 OFF: Colour = (120, 180, 255)

@@ -210,14 +210,18 @@ def _rings(run: ViewedRun, entity: str, radii_px: Sequence[float], colour: at.Co
     return _circles(run, entity, circles, colour, 0.8)
 
 
-def _ball_place(run: ViewedRun) -> Chunk:
-    """Origin of the views in the ball's frame: its centre, or the nearest known one while there is no ball."""
+def ball_places(run: ViewedRun) -> Floats:
+    """Centre (n + 1, 2) of the ball at the start and each tick's end, px; the nearest known one while there is none."""
     known = np.flatnonzero(run.has_ball)
-    places = np.full((len(run.ticks) + 1, 2), (run.camera.width_px / 2, run.camera.height_px / 2))
-    if known.size:
-        last = np.maximum(np.searchsorted(known, np.arange(-1, len(run.ticks)), side="right") - 1, 0)
-        places = run.means[known[last], :2]
-    translation = np.column_stack([places, np.zeros(len(places))])
+    if not known.size:
+        return np.full((len(run.ticks) + 1, 2), (run.camera.width_px / 2, run.camera.height_px / 2))
+    last = np.maximum(np.searchsorted(known, np.arange(-1, len(run.ticks)), side="right") - 1, 0)
+    return run.means[known[last], :2]
+
+
+def _ball_place(run: ViewedRun) -> Chunk:
+    """Origin of the views in the ball's frame."""
+    translation = np.column_stack([ball_places(run), np.zeros(len(run.ticks) + 1)])
     return columns_at(at.BALL_PLACE, run.times_us, rr.Transform3D.columns(translation=translation))
 
 

@@ -16,6 +16,7 @@ Floats = NDArray[np.float64]
 
 CIRCLES = (at.HOUGH, at.MEASURED, at.KALMAN, at.TRUE_CIRCLE)
 ALL_BALLS = (at.BALLS, at.TRACKS)
+CLOSE_UP_RADII = 2.4  # half the width of a close-up: the ball with what moves near it
 
 
 def picture(origin: str, name: str, contents: list[str] | None = None, bounds: Floats | None = None) -> rrb.View:
@@ -48,7 +49,7 @@ def surface(run: ViewedRun, name: str = "Surface: Hough yellow, Kalman green") -
 def close_up(run: ViewedRun, name: str = "Surface around the ball", prefix: str = "") -> rrb.View:
     """The surface with the circles around the ball, moving along with it."""
     contents = [prefix + path for path in (at.SURFACE, *CIRCLES)]
-    return picture(prefix + at.BALL_PLACE, name, contents, _square(2.4 * run.largest_radius_px))
+    return picture(prefix + at.BALL_PLACE, name, contents, _square(CLOSE_UP_RADII * run.largest_radius_px))
 
 
 def logo_events(run: ViewedRun) -> rrb.View:
@@ -105,6 +106,16 @@ def ball(run: ViewedRun, name: str = "Ball with derotated logo", *, methods: boo
         _tilted(np.zeros(3), 5.5 * run.ball_radius_m),
         rrb.LineGrid3D(visible=False),
     )
+
+
+def compared_axes(name: str) -> rrb.View:
+    """Axes of two runs on a unit sphere, seen as the ball is."""
+    return _space(at.COMPARED_AXES, name, ["$origin/**"], _tilted(np.zeros(3), 3.6), rrb.LineGrid3D(visible=False))
+
+
+def difference(run: ViewedRun, name: str) -> rrb.View:
+    """Difference of two runs' surfaces around the ball."""
+    return picture(at.DIFFERENCE, name, bounds=_square(CLOSE_UP_RADII * run.largest_radius_px))
 
 
 def flight(run: ViewedRun, name: str = "Flight path, grid 0.1 m", hidden: tuple[str, ...] = ()) -> rrb.View:

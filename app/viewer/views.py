@@ -12,7 +12,7 @@ from spinscope.pipeline.extensions import Registry
 
 from . import entities as at
 from . import panes, plots
-from .comparison import comparison
+from .comparison import comparison, narrow_comparison
 from .run import ViewedRun
 from .summary import CARD_PX
 
@@ -189,7 +189,14 @@ for _view in (
         help="Every method's estimate and what speaks for it.",
         panes=_spin,
     ),
-    View(name="compare", label="Compare", help="Two settings A and B side by side.", panes=comparison, compares=True),
+    View(
+        name="compare",
+        label="Compare",
+        help="Two settings A and B side by side.",
+        panes=comparison,
+        narrow_panes=narrow_comparison,
+        compares=True,
+    ),
     View(name="coach", label="Coach", help="Spin and speed in large letters, ball and flight.", panes=_coach),
 ):
     VIEWS.register(_view)

@@ -27,6 +27,7 @@ from .publisher import preview_message
 from .schemas import Done, Opening, OpenRequest, PreviewMessage, Reopened, RunRequest
 from .security import SecurityMiddleware
 from .tool_routes import add_tool_routes
+from .video_routes import add_video_routes
 
 SWEEP_UP_S = 5.0
 FOREVER = {"cache-control": "max-age=31536000, immutable"}
@@ -73,6 +74,7 @@ def application(state: AppState, token: str | None = None, hosts: Collection[str
     add_folder_routes(app, state)
     add_tool_routes(app, state, session_of)
     add_live_routes(app, state.live)
+    add_video_routes(app)
     return app
 
 

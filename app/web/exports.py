@@ -1,4 +1,4 @@
-"""Exports of a result: .rrd, JSON as `spinscope analyze` writes it, CSV; and a picture of the events."""
+"""Exports of a result: .rrd, JSON as `spinscope analyze` writes it, tables, figures; and a picture of the events."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ import numpy as np
 
 from spinscope.app.table_files import write_table
 from spinscope.app.viewer import save
+from spinscope.app.viewer.figure import series_figure
+from spinscope.app.viewer.run import ViewedRun
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.result_rows import tick_columns, tick_rows
 from spinscope.pipeline.session import Result
@@ -69,6 +71,11 @@ def as_rrd(result: Result) -> bytes:
         return path.read_bytes()
 
 
+def figure(result: Result, suffix: str, pinned: Result | None) -> bytes:
+    """Figure of the series for a publication; `suffix` is its format's."""
+    return series_figure(ViewedRun.of(result), suffix, None if pinned is None else ViewedRun.of(pinned))
+
+
 def event_picture(events: EventBatch, width_px: int, height_px: int) -> bytes:
     """PNG of the number of events of each pixel, the logarithm as brightness: where a ball in place is to be seen."""
     counts = np.zeros((height_px, width_px))
@@ -90,12 +97,25 @@ def _csv(rows: list[dict[str, Any]]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Export:
-    """A kind of file that a result is saved as."""
+    """A kind of file that a result is saved as.
+
+    Attributes
+    ----------
+    label : str
+        For people.
+    make : callable
+        `make(result) -> content`; `make(result, pinned=A)` where it `compares`.
+    media_type, suffix : str
+        Of the file.
+    compares : bool
+        Whether it shows a pinned result A beside the present one.
+    """
 
     label: str
-    make: Callable[[Result], str | bytes]
+    make: Callable[..., str | bytes]
     media_type: str
     suffix: str
+    compares: bool = False
 
 
 EXPORTS = {
@@ -108,5 +128,11 @@ EXPORTS = {
         partial(series, suffix=".parquet"),
         "application/vnd.apache.parquet",
         "series.parquet",
+    ),
+    "series.svg": Export(
+        "Figure of the series (SVG)", partial(figure, suffix=".svg"), "image/svg+xml", "series.svg", compares=True
+    ),
+    "series.pdf": Export(
+        "Figure of the series (PDF)", partial(figure, suffix=".pdf"), "application/pdf", "series.pdf", compares=True
     ),
 }

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Any, Literal
 
 from spinscope.app.tuning.parameter_sweep import sensible_highs
-from spinscope.app.viewer.comparison import compared, note_with_a, note_without_a
+from spinscope.app.viewer.comparison import compared, difference_chunks, note_with_a, note_without_a
 from spinscope.app.viewer.drawing_cache import DrawingCache
 from spinscope.app.viewer.preview import preview, preview_words
 from spinscope.app.viewer.rrd import rrd_bytes
@@ -106,7 +106,9 @@ class Publisher:
         if a is None:
             chunks += note_without_a(run)
         else:
-            chunks += [*compared(self._chunks(a, ViewedRun.of(a, followed))), *note_with_a(run, _difference_text(a, b))]
+            run_a = ViewedRun.of(a, followed)
+            chunks += [*compared(self._chunks(a, run_a)), *difference_chunks(run_a, run)]
+            chunks += note_with_a(run, _difference_text(a, b))
         picture_id = f"{self._session_id}-{report.serial}{f'-part{len(b.ticks)}' if partial else ''}"
         content = rrd_bytes(chunks, picture_id)
         report.add({DRAWING: time.perf_counter() - began_s})

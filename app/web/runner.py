@@ -33,13 +33,14 @@ class Runner:
     ----------
     recording : OpenRecording
         What is run; another one takes its place when the scene is simulated again.
-    result : Result or None
-        Result of the last request that was completed.
+    result, pinned : Result or None
+        Results of the last request that was completed: B, and A beside it.
     """
 
     def __init__(self, recording: OpenRecording, requests: RequestQueue, publisher: Publisher) -> None:
         self.recording = recording
         self.result: Result | None = None
+        self.pinned: Result | None = None
         self._requests, self._publisher = requests, publisher
         self._slow = ThreadPoolExecutor(1, "slow stages")
         self._thread = threading.Thread(target=self._work, name="runner", daemon=True)
@@ -76,7 +77,7 @@ class Runner:
                 a = None
                 if request.pinned is not None:
                     a = Result.of(_with(clip, request.pinned), list(self._ticks(clip, request.pinned, request, report)))
-                self.result = self._complete(clip, request, report, a)
+                self.result, self.pinned = self._complete(clip, request, report, a), a
                 self._show(self.result, a, request, report)
         except Superseded:
             return

@@ -18,7 +18,9 @@ Receive = Callable[[], Awaitable[Message]]
 Send = Callable[[Message], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
-DROP_PATH = "/api/drop"  # files dropped onto the page: streamed, and bounded by who keeps them
+DROP_PATH = "/api/drop"  # files dropped onto the page
+VIDEO_PATH = "/api/video"  # pictures of a video
+STREAMED = (DROP_PATH, VIDEO_PATH)  # bounded by who keeps them
 BODY_BYTES = 256 * 1024  # a preset of every parameter is 4 kB
 BODY_S = 10.0  # for the whole body: a client that trickles it holds no connection for ever
 OWN_HOSTS = ("127.0.0.1", "localhost")
@@ -68,7 +70,7 @@ class SecurityMiddleware:
         if refusal is not None:
             await _answer(send, *refusal)
             return
-        if scope["path"] == DROP_PATH:
+        if scope["path"] in STREAMED:
             await self._app(scope, _in_time(receive), _with_headers(send, None))
             return
         try:
@@ -137,10 +139,10 @@ def _refusal(scope: Scope, headers: dict[str, str]) -> tuple[int, str] | None:
         return 403, "requests from other origins are refused"
     if scope["method"] == "POST":
         # Both are kinds that a form of another page cannot send.
-        kind = "application/octet-stream" if scope["path"] == DROP_PATH else "application/json"
+        kind = "application/octet-stream" if scope["path"] in STREAMED else "application/json"
         if headers.get("content-type", "").partition(";")[0].strip() != kind:
             return 415, f"the request is not {kind}"
-        if scope["path"] == DROP_PATH:
+        if scope["path"] in STREAMED:
             return None
         length = headers.get("content-length", "0")
         if not length.isdecimal() or int(length) > BODY_BYTES:

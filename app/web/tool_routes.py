@@ -184,7 +184,8 @@ def _add_exports(app: FastAPI, session_of: SessionOf) -> None:
             raise HTTPException(404, f"there is no {name}: there are {', '.join(exports.EXPORTS)}")
         if session.runner.result is None:
             raise HTTPException(409, "nothing has been computed yet")
-        content = await run_in_threadpool(made.make, session.runner.result)
+        beside = {"pinned": session.runner.pinned} if made.compares else {}
+        content = await run_in_threadpool(made.make, session.runner.result, **beside)
         stem = "".join(c if c.isalnum() or c in "-_." else "_" for c in session.runner.recording.original.stem)
         headers = {"content-disposition": f'attachment; filename="{stem}.{made.suffix}"'}
         return Response(content, media_type=made.media_type, headers=headers)

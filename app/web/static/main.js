@@ -118,6 +118,7 @@ function describe(/** @type {RecordingDescription} */ recording) {
   const length = seconds < 1 ? `${(1000 * seconds).toFixed(0)} ms` : `${seconds.toFixed(1)} s`;
   const size = `${recording.width_px} x ${recording.height_px}`;
   byId("about").textContent = `${recording.events.toLocaleString("en")} events, ${length}, ${size}`;
+  byId("about").title = byId("about").textContent; // where it is cut
   for (const warning of recording.warnings) notice(warning, "warning");
 }
 

@@ -4,10 +4,11 @@
 
 import { attempt, byId, download, element, notice } from "./elements.js";
 import { linkOf } from "./link.js";
+import { filmed } from "./video.js";
 
 export class Saving {
   /**
-   * @param {Linked & {connection: any, viewer: any}} app
+   * @param {Linked & {connection: any, viewer: any, runner: any, overview: any}} app
    * @param {string[]} builtIn names of the presets that a file must not replace
    */
   constructor(app, builtIn) {
@@ -23,6 +24,7 @@ export class Saving {
     const entries = [
       ...exports,
       ["Picture of the view (PNG)", () => this.#picture()],
+      ["Video of the view (MP4)", () => this.#video()],
       ["Copy the link to this view", () => this.#copyLink()],
       ["Copy as command line", () => this.#copyCommand()],
       ["Save as preset (TOML)", () => this.#savePreset()],
@@ -42,8 +44,16 @@ export class Saving {
   }
 
   async #picture() {
-    const blob = await this.app.viewer.picture();
-    download(`${this.app.connection.recording.replace(/\.\w+$/, "")}.png`, blob, "image/png");
+    download(this.#named("png"), await this.app.viewer.picture(), "image/png");
+  }
+
+  async #video() {
+    const video = await filmed(this.app);
+    if (video) download(this.#named("mp4"), video, "video/mp4");
+  }
+
+  #named(/** @type {string} */ suffix) {
+    return `${this.app.connection.recording.replace(/\.\w+$/, "")}.${suffix}`;
   }
 
   async #copyLink() {

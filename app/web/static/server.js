@@ -57,9 +57,21 @@ export async function get(path, query) {
  * @returns {Promise<Dropped>}
  */
 export async function upload(file) {
+  return (await sent(`/api/drop?${new URLSearchParams({ name: file.name })}`, file)).json();
+}
+
+/**
+ * Has the server put pictures together to a video.
+ * @param {Blob[]} pictures JPEG
+ * @returns {Promise<Blob>}
+ */
+export async function videoOf(pictures) {
+  return (await sent("/api/video", new Blob(pictures))).blob();
+}
+
+async function sent(/** @type {string} */ path, /** @type {Blob} */ body) {
   const headers = { "content-type": "application/octet-stream" };
-  const path = `/api/drop?${new URLSearchParams({ name: file.name })}`;
-  return (await answered(await fetch(path, { method: "POST", headers, body: file }))).json();
+  return answered(await fetch(path, { method: "POST", headers, body }));
 }
 
 // The session on the server: opens it, listens to its messages, opens it anew when the server comes back.

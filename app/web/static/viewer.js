@@ -8,6 +8,7 @@ const PATIENCE_MS = 120_000; // without a graphics card a picture may take secon
 const PICTURE_MS = 10_000;
 const LAYOUT_MS = 30_000;
 const ANSWER_MS = 3000;
+const JPEG_QUALITY = 0.92;
 const APPLICATION = "spinscope";
 
 /** @typedef {Record<string, any>} Blueprint */
@@ -303,10 +304,11 @@ export class Viewer extends EventTarget {
     this.dispatchEvent(new CustomEvent("turned", { detail: title }));
   }
 
-  // PNG of what is seen. The canvas keeps its picture until the browser has shown it: it is copied right after it
-  // was drawn, which a change of the playhead to where it is makes happen.
-  picture() {
+  // What is seen, as PNG or JPEG. The canvas keeps its picture until the browser has shown it: it is copied right after
+  // it was drawn, which a change of the playhead to where it is makes happen.
+  picture(type = "image/png") {
     return this.#next(async () => {
+      if (this.#shown === null) throw new Error("the viewer shows nothing yet, or cannot run in this browser");
       const { canvas } = this.#viewer;
       const copy = document.createElement("canvas");
       [copy.width, copy.height] = [canvas.width, canvas.height];
@@ -315,7 +317,7 @@ export class Viewer extends EventTarget {
         canvas.dispatchEvent(new PointerEvent("pointermove", { bubbles: true, clientX: Math.random(), clientY: 1 }));
         await new Promise((resolve) => requestAnimationFrame(resolve));
         copy.getContext("2d")?.drawImage(canvas, 0, 0);
-        if (hasContent(copy)) return new Promise((resolve) => copy.toBlob(resolve, "image/png"));
+        if (hasContent(copy)) return new Promise((resolve) => copy.toBlob(resolve, type, JPEG_QUALITY));
       }
       throw new Error("the browser does not give the picture: take a screenshot instead");
     });

@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
 from spinscope.app.viewer import entities
-from spinscope.app.viewer.comparison import compared, note_with_a
+from spinscope.app.viewer.comparison import compared, difference_chunks, note_with_a
 from spinscope.app.viewer.drawers import run_chunks
+from spinscope.app.viewer.entities import COMPARED_AXES, DIFFERENCE, OFF, ON
 from spinscope.app.viewer.rrd import layout_bytes, rrd_bytes
-from spinscope.app.viewer.run import ViewedRun
+from spinscope.app.viewer.run import ViewedRun, shown_estimate, vector_of
 from spinscope.app.viewer.views import views
+from spinscope.pipeline.chain import Tick
+
+from .conftest import with_results
+from .reading import Rows, read_back
 
 
 def test_a_stands_beside_b_with_names_of_its_own(flight: ViewedRun) -> None:
@@ -34,3 +47,53 @@ def test_the_page_has_a_tab_for_two_runs_only_where_there_can_be_two(flight: Vie
     assert [view.label for view in views()] == [label for label in labels if label != "Compare"]
     for tab in ("", "Coach", "nothing"):
         assert layout_bytes(flight, tab).startswith(b"RRF2")
+
+
+def logged(a: ViewedRun, b: ViewedRun, folder: Path) -> dict[str, Rows]:
+    """What shows the differences of two runs, read back."""
+    path = folder / "compared.rrd"
+    path.write_bytes(rrd_bytes(difference_chunks(a, b), "compared"))
+    return read_back(path)
+
+
+def decoded(blobs: Any) -> NDArray[np.generic]:
+    """The only picture of a row, RGB."""
+    (blob,) = blobs
+    picture = cv2.imdecode(np.array(blob, np.uint8), cv2.IMREAD_COLOR)
+    assert picture is not None
+    return picture[..., ::-1]
+
+
+def test_equal_runs_differ_nowhere(flight: ViewedRun, tmp_path: Path) -> None:
+    found = logged(flight, flight, tmp_path)
+    pictures = [decoded(blobs) for blobs in found[DIFFERENCE].values["blob"]]
+    assert len(pictures) == len(flight.times_us) and not any(picture.any() for picture in pictures)
+    angles = {label for row in found[f"{COMPARED_AXES}/angle"].values["labels"] for label in row or ()}
+    assert angles == {"0.0°"}
+    arrows = [found[f"{COMPARED_AXES}/{name}"].values for name in "AB"]
+    assert arrows[0]["vectors"] == arrows[1]["vectors"] and f"{COMPARED_AXES}/truth" in found
+
+
+def test_what_one_surface_lacks_has_the_others_colour(flight: ViewedRun, tmp_path: Path) -> None:
+    def dark(tick: Tick) -> Tick:
+        return with_results(tick, surface=dataclasses.replace(tick.surface, values=np.zeros_like(tick.surface.values)))
+
+    darkened = dataclasses.replace(flight, ticks=[dark(tick) for tick in flight.ticks])
+    for a, b, colour in ((flight, darkened, OFF), (darkened, flight, ON)):
+        picture = decoded(logged(a, b, tmp_path)[DIFFERENCE].at("blob", int(flight.opening_us)))
+        brightest = picture.reshape(-1, 3)[picture.sum(axis=2).argmax()]
+        assert brightest.max() > 100 and np.allclose(
+            brightest / brightest.max(), np.divide(colour, max(colour)), atol=0.02
+        )
+
+
+def test_the_angle_between_the_axes_is_told(flight: ViewedRun, spinner: ViewedRun, tmp_path: Path) -> None:
+    row = next(i for i, tick in enumerate(flight.ticks) if tick.best is not None)
+    at_us = int(flight.ends_us[row])
+    before = spinner.ticks[int(np.searchsorted(spinner.ends_us, at_us, side="right")) - 1]
+    first, last = (vector_of(shown_estimate(tick)[0]) for tick in (before, flight.ticks[row]))
+    angle_deg = np.degrees(np.arccos(first @ last / np.linalg.norm(first) / np.linalg.norm(last)))
+    found = logged(spinner, flight, tmp_path)[f"{COMPARED_AXES}/angle"]
+    assert found.at("labels", at_us) == [f"{angle_deg:.1f}°"] and angle_deg > 1
+    ((strip,),) = (found.at("strips", at_us),)
+    assert np.allclose(np.linalg.norm(strip, axis=1), 1) and np.allclose(strip[-1], last / np.linalg.norm(last))

@@ -11,13 +11,16 @@ import time
 from pathlib import Path
 from typing import Any
 
+import cv2
 import httpx
+import numpy as np
 import pytest
 from click.testing import CliRunner
 from pyarrow import parquet
 from rerun.chunk import RrdReader
 
 from spinscope.app.cli import cli
+from spinscope.app.web import video_routes
 from spinscope.app.web.app_state import SESSIONS_MOST, AppState
 from spinscope.app.web.open_recording import OpenRecording
 from spinscope.pipeline.registry import STAGES, Parameters, default_stages, needed_stages
@@ -333,12 +336,27 @@ def test_results_go_out_as_tables_and_as_a_recording(client: Client, tmp_path: P
     assert len(series) > 10 and float(series[0]["radius_px"]) > 5 and float(series[-1]["contrast_magnitude_rps"]) > 1
     columns = parquet.read_table(io.BytesIO(client.http.get(client.path("export/series.parquet")).content))
     assert columns.column("radius_px").to_pylist() == [float(row["radius_px"]) for row in series]
+    assert client.http.get(client.path("export/series.pdf")).content.startswith(b"%PDF")
     answer = client.http.get(client.path("export/run.rrd"))
     assert 'filename="flight_fast_top.rrd"' in answer.headers["content-disposition"]
     path = tmp_path / "run.rrd"
     path.write_bytes(answer.content)
     assert {chunk.entity_path for chunk in RrdReader(path).stream()} >= {"/image/events"}
     assert client.http.get(client.path("export/nothing")).status_code == 404
+
+
+def test_pictures_of_a_view_become_a_video(tuner: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    def sent(content: bytes) -> httpx.Response:
+        headers = {"content-type": "application/octet-stream"}
+        return httpx.post(f"{tuner.address}api/video", content=content, headers=headers, timeout=60)
+
+    pictures = [cv2.imencode(".jpg", np.full((31, 45, 3), level, np.uint8))[1].tobytes() for level in (0, 128, 255)]
+    answer = sent(b"".join(pictures))
+    assert answer.headers["content-type"] == "video/mp4" and answer.content[4:8] == b"ftyp"
+    refused = sent(b"no picture at all")
+    assert refused.status_code == 400 and "the video cannot be written" in refused.json()["error"]
+    monkeypatch.setattr(video_routes, "VIDEO_BYTES", 100)
+    assert sent(b"".join(pictures)).status_code == 413
 
 
 def test_a_fixed_ball_is_found_and_its_picture_shown(tuner: Served) -> None:
