@@ -24,7 +24,8 @@ A = "/A"
 # Series of A are drawn in the colour of the same series of B, mixed with this.
 PALE, PALENESS = (235, 235, 235), 0.55
 GRID_DEG, GRID_POINTS = 30, 49  # of the sphere on which the axes stand
-TIP_RADII = 1.3  # of an axis on the unit sphere
+# Length and thickness of the axes on the unit sphere: where they agree, each still looks out of the next.
+AXES = {"A": (1.2, 0.06), "B": (1.35, 0.04), "truth": (1.5, 0.02)}
 ARC_POINTS = 17  # of the arc between two axes
 
 
@@ -55,7 +56,8 @@ def note_with_a(run: ViewedRun, text: str) -> list[Chunk]:
         "event rate's zero crossings": at.RATE_COLOUR,
     }
     legend = ", ".join(f"{label} {at.colour_name(colour)}" for label, colour in colours.items())
-    return _note(run, f"{text}\n\nCurves: {legend}. A is paler.")
+    told = f"Curves: {legend}. A is paler. Axes: B yellow, truth violet."
+    return _note(run, f"{text}\n\n{told} Difference: red where B is brighter, blue where A is.")
 
 
 def difference_chunks(a: ViewedRun, b: ViewedRun) -> list[Chunk]:
@@ -65,41 +67,24 @@ def difference_chunks(a: ViewedRun, b: ViewedRun) -> list[Chunk]:
 
 def comparison(run: ViewedRun) -> rrb.Container:
     """Pictures of A and B side by side and as a difference, their curves in the same plots."""
+    surfaces = [panes.close_up(run, "A", prefix=A), panes.close_up(run, "B"), panes.difference(run, "B − A")]
+    logos = [panes.derotated_logo("A: logo", prefix=A), panes.derotated_logo("B: logo")]
+    curves = [_plot("x", "x [px], A pale"), _plot("radius", "Radius [px]"), _plot("spin", "Spin [rps]")]
+    answers = [panes.compared_axes("Axes"), panes.text(at.COMPARISON, "Differences")]
     return rrb.Vertical(
-        rrb.Horizontal(*_surfaces(run), *_logos(), column_shares=[3, 3, 3, 4, 4]),
-        rrb.Horizontal(*_plots(), panes.compared_axes("Axes"), _differences(), column_shares=[3, 3, 3, 3, 3]),
+        rrb.Horizontal(
+            rrb.Horizontal(*surfaces, name="Surfaces"),
+            rrb.Horizontal(*logos, name="Logo"),
+            column_shares=[9, 8],
+            name="Pictures",
+        ),
+        rrb.Horizontal(
+            rrb.Horizontal(*curves, name="Curves"),
+            rrb.Horizontal(*answers, name="Answers"),
+            column_shares=[3, 2],
+            name="Numbers",
+        ),
     )
-
-
-def narrow_comparison(run: ViewedRun) -> rrb.Container:
-    """The same in fewer columns."""
-    return rrb.Vertical(
-        rrb.Horizontal(*_surfaces(run)),
-        rrb.Horizontal(*_logos(), panes.compared_axes("Axes"), column_shares=[3, 3, 2]),
-        rrb.Horizontal(*_plots()),
-        _differences(),
-        row_shares=[3, 3, 3, 2],
-    )
-
-
-def _surfaces(run: ViewedRun) -> list[rrb.View]:
-    return [
-        panes.close_up(run, "A: surface", prefix=A),
-        panes.close_up(run, "B: surface"),
-        panes.difference(run, "B red, A blue"),
-    ]
-
-
-def _logos() -> list[rrb.View]:
-    return [panes.derotated_logo("A: derotated logo", prefix=A), panes.derotated_logo("B: derotated logo")]
-
-
-def _plots() -> list[rrb.View]:
-    return [_plot("x", "x [px], A pale"), _plot("radius", "Radius [px]"), _plot("spin", "Spin [rps]")]
-
-
-def _differences() -> rrb.View:
-    return panes.text(at.COMPARISON, "Differences")
 
 
 def _plot(quantity: str, name: str) -> rrb.View:
@@ -114,19 +99,22 @@ def _plot(quantity: str, name: str) -> rrb.View:
 
 
 def _surface_difference(a: ViewedRun, b: ViewedRun) -> list[Chunk]:
-    """Surface of B less that of A at every tick of B, around B's ball: red where B is brighter, blue where A is."""
+    """Surface of B less that of A at every tick of B, around B's ball: red where B is brighter, blue where A is.
+
+    The root of the difference is the brightness: small ones are seen, too.
+    """
     half_px = int(np.ceil(panes.CLOSE_UP_RADII * b.largest_radius_px))
     before = np.searchsorted(a.ends_us, b.ends_us, side="right") - 1
     pictures = [png(np.zeros((2 * half_px + 1, 2 * half_px + 1, 3), np.uint8))]
     for tick, row, (x, y) in zip(b.ticks, before, ball_places(b)[1:], strict=True):
         own = _around(tick.surface.values, x, y, half_px)
         other = _around(a.ticks[row].surface.values, x, y, half_px) if row >= 0 else np.zeros_like(own)
-        more, less = (np.clip(sign * (own - other) / 255, 0, 1)[..., None] for sign in (1, -1))
+        more, less = (np.sqrt(np.clip(sign * (own - other) / 255, 0, 1))[..., None] for sign in (1, -1))
         pictures.append(png((more * np.array(at.ON) + less * np.array(at.OFF)).astype(np.uint8)))
     corner = rr.Transform3D(translation=[-half_px - 0.5, -half_px - 0.5, 0.0])
     return [
-        once(at.DIFFERENCE, corner, rr.EncodedImage.from_fields(media_type="image/png")),
-        columns_at(at.DIFFERENCE, b.times_us, rr.EncodedImage.columns(blob=pictures)),
+        once(at.SURFACE_DIFFERENCE, corner, rr.EncodedImage.from_fields(media_type="image/png")),
+        columns_at(at.SURFACE_DIFFERENCE, b.times_us, rr.EncodedImage.columns(blob=pictures)),
     ]
 
 
@@ -158,17 +146,17 @@ def _sphere() -> Chunk:
     steps = np.radians(np.arange(-180 + GRID_DEG, 180, GRID_DEG))
     circles = [sphere(step, turn / 2) for step in [*steps, np.pi]]
     circles += [sphere(turn, step) for step in steps if abs(step) < np.pi / 2]
-    return once(f"{at.COMPARED_AXES}/sphere", rr.LineStrips3D(circles, colors=[at.MASK_COLOUR], radii=[-0.4]))
+    return once(f"{at.COMPARED_AXES}/sphere", rr.LineStrips3D(circles, colors=[(*at.MASK_COLOUR, 90)], radii=[-0.4]))
 
 
 def _arrow(run: ViewedRun, name: str, spins_rps: Floats, colour: at.Colour) -> list[Chunk]:
     """Axis of a run at every tick at which it is known."""
     magnitudes = np.linalg.norm(spins_rps, axis=1)
     known = magnitudes > 0
-    axes = TIP_RADII * spins_rps[known] / magnitudes[known, None]
-    labels = [f"{name} {magnitude:.1f} rps" for magnitude in magnitudes[known]]
-    entity, columns = f"{at.COMPARED_AXES}/{name}", rr.Arrows3D.columns(vectors=axes, labels=labels)
-    style = styled(entity, rr.Arrows3D, colors=colour, radii=0.03, show_labels=True)
+    length, radius = AXES[name]
+    axes = length * spins_rps[known] / magnitudes[known, None]
+    entity, columns = f"{at.COMPARED_AXES}/{name}", rr.Arrows3D.columns(vectors=axes)
+    style = styled(entity, rr.Arrows3D, colors=colour, radii=radius)
     return [style, columns_at(entity, run.times_us, columns, [0, *known.astype(int)])]
 
 

@@ -21,6 +21,8 @@ HOUGH = "/image/hough"
 MEASURED = "/image/measured"
 KALMAN = "/image/kalman"
 TRUE_CIRCLE = "/image/truth"
+CIRCLE_NAMES = "/image/names"
+POLARITY_NAMES = "/image/polarities"
 # All balls, numbered by their shots.
 BALLS = "/image/balls"
 TRACKS = "/image/tracks"
@@ -32,6 +34,7 @@ LOGO_OUTLINE = "/image/ball/outline"
 LOGO_MASK = "/image/ball/mask"
 FLOW = "/image/ball/flow"
 FLOW_WHEEL = "/image/ball/wheel"
+FLOW_SPEED = "/image/ball/wheel/speed"
 DEROTATED_LOGO = "/derotated_logo"
 UNROLLED = "/unrolled"
 GRATICULE = "/unrolled/graticule"
@@ -75,6 +78,7 @@ COMPARISON = "/compare"
 
 # Of two runs A and B: their surfaces' difference around the ball, and their axes on a unit sphere.
 DIFFERENCE = "/difference"
+SURFACE_DIFFERENCE = "/difference/surface"
 COMPARED_AXES = "/axes"
 
 # Colours of series, of ON and OFF, and of the spin methods are told apart by red-green-blind eyes, too: a test.
@@ -126,5 +130,8 @@ HUES_DEG |= {"violet": 282, "pink": 335}
 
 def colour_name(colour: Colour) -> str:
     """Name of a colour for captions, by its hue."""
-    hue_deg = 360 * colorsys.rgb_to_hsv(*colour)[0]
+    hue, saturation, _ = colorsys.rgb_to_hsv(*colour)
+    if saturation < 0.1:
+        return "white"
+    hue_deg = 360 * hue
     return min(HUES_DEG, key=lambda name: abs((HUES_DEG[name] - hue_deg + 180) % 360 - 180))

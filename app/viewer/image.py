@@ -46,7 +46,8 @@ def filter_chunks(run: ViewedRun) -> list[Chunk]:
         classes.append(4 * is_flicker.astype(np.uint16) + 2 * is_kept + events.on[chosen])
     width, height = run.camera.width_px, run.camera.height_px
     frame = rr.Boxes2D(mins=[[-0.5, -0.5]], sizes=[[width, height]], colors=[at.MASK_COLOUR], radii=[-0.5])
-    return [once(at.FRAME, frame), *_events(run, at.EVENTS, positions, classes, radius_ui=1.0)]
+    names = _names(run, at.POLARITY_NAMES, {"ON": at.ON, "OFF": at.OFF})
+    return [once(at.FRAME, frame), names, *_events(run, at.EVENTS, positions, classes, radius_ui=1.0)]
 
 
 def frame_chunks(run: ViewedRun) -> list[Chunk]:
@@ -83,12 +84,14 @@ def track_chunks(run: ViewedRun) -> list[Chunk]:
         for mean, ball in zip(run.means, run.has_ball, strict=True)
     ]
     statuses = ["searching", *(track.status for track in tracks)]
+    circles = {"Hough": at.HOUGH_COLOUR, "refined": at.MEASURED_COLOUR, "Kalman": at.KALMAN_COLOUR}
     chunks = [
         *_circles(run, at.HOUGH, [track.hough for track in tracks], at.HOUGH_COLOUR, 0.8),
         *_circles(run, at.MEASURED, [track.measured for track in tracks], at.MEASURED_COLOUR, 1.2),
         *_circles(run, at.KALMAN, kalman, at.KALMAN_COLOUR, 1.6),
         *_balls(run),
         _ball_place(run),
+        _names(run, at.CIRCLE_NAMES, circles | ({} if run.truth is None else {"truth": at.TRUTH_COLOUR})),
         *states(at.STATUS, run.times_us, statuses, at.STATUS_COLOURS),
     ]
     if run.truth is not None:
@@ -129,10 +132,14 @@ def flow_chunks(run: ViewedRun) -> list[Chunk]:
     blobs = [png(picture) for picture in (np.zeros_like(pictures[0]), *pictures)]
     corner = rr.Transform3D(translation=[-half_px - 0.5, -half_px - 0.5, 0.0])
     beside = rr.Transform3D(translation=[1.2 * half_px, -0.4 * half_px, 0.0], scale=0.8 * half_px / WHEEL_PX)
+    speed = rr.Points2D(
+        [[WHEEL_PX / 2, WHEEL_PX]], labels=[f"{bound_px_s / 1000:.1f} kpx/s"], colors=[at.MASK_COLOUR], show_labels=True
+    )
     return [
         once(at.FLOW, corner, rr.EncodedImage.from_fields(media_type="image/png", draw_order=-10.0)),
         columns_at(at.FLOW, run.times_us, rr.EncodedImage.columns(blob=blobs)),
         once(at.FLOW_WHEEL, beside, rr.EncodedImage(contents=png(hsv_wheel(WHEEL_PX)), media_type="image/png")),
+        once(at.FLOW_SPEED, speed),
     ]
 
 
@@ -177,6 +184,15 @@ def _circles(
         styled(entity, rr.Ellipses2D, colors=colour, line_radii=-width_ui),
         columns_at(entity, run.times_us, columns, lengths),
     ]
+
+
+def _names(run: ViewedRun, entity: str, colours: dict[str, at.Colour]) -> Chunk:
+    """Names in their colours along the image's upper edge."""
+    columns = run.camera.width_px * (np.arange(len(colours)) + 0.5) / len(colours)
+    places = np.column_stack([columns, np.zeros(len(colours))])
+    return once(
+        entity, rr.Points2D(places, labels=list(colours), colors=list(colours.values()), radii=-0.1, show_labels=True)
+    )
 
 
 def _balls(run: ViewedRun) -> list[Chunk]:

@@ -37,16 +37,17 @@ def text(origin: str, name: str) -> rrb.View:
 
 def events(run: ViewedRun) -> rrb.View:
     """Raw events in the whole image, over the camera's own pictures where it took any."""
-    contents = [at.FRAME, at.CAMERA_FRAMES, at.EVENTS, *ALL_BALLS]
-    return picture(at.IMAGE, "Events: ON red, OFF blue", contents, _image_bounds(run))
+    contents = [at.FRAME, at.CAMERA_FRAMES, at.EVENTS, at.POLARITY_NAMES, *ALL_BALLS]
+    return picture(at.IMAGE, "Events", contents, _image_bounds(run))
 
 
-def surface(run: ViewedRun, name: str = "Surface: Hough yellow, Kalman green") -> rrb.View:
-    """The surface with the circles in the whole image."""
-    return picture(at.IMAGE, name, [at.FRAME, at.SURFACE, *CIRCLES, *ALL_BALLS], _image_bounds(run))
+def surface(run: ViewedRun) -> rrb.View:
+    """The surface with the circles and the names of their colours, in the whole image."""
+    contents = [at.FRAME, at.SURFACE, at.CIRCLE_NAMES, *CIRCLES, *ALL_BALLS]
+    return picture(at.IMAGE, "Surface", contents, _image_bounds(run))
 
 
-def close_up(run: ViewedRun, name: str = "Surface around the ball", prefix: str = "") -> rrb.View:
+def close_up(run: ViewedRun, name: str = "Close-up", prefix: str = "") -> rrb.View:
     """The surface with the circles around the ball, moving along with it."""
     contents = [prefix + path for path in (at.SURFACE, *CIRCLES)]
     return picture(prefix + at.BALL_PLACE, name, contents, _square(CLOSE_UP_RADII * run.largest_radius_px))
@@ -55,37 +56,36 @@ def close_up(run: ViewedRun, name: str = "Surface around the ball", prefix: str 
 def logo_events(run: ViewedRun) -> rrb.View:
     """Events of the logo in the ball's frame."""
     contents = [at.BALL_CENTRE, at.LOGO, at.LOGO_OUTLINE, at.LOGO_MASK]
-    return picture(at.BALL_PLACE, "Logo events, ball's frame", contents, _square(1.25 * run.largest_radius_px))
+    return picture(at.BALL_PLACE, "Logo events", contents, _square(1.25 * run.largest_radius_px))
 
 
 def flow(run: ViewedRun) -> rrb.View:
     """Flow in the ball's frame, beside the wheel of its colours."""
-    speed = "" if run.fast_flow_px_s is None else f": full colour = {run.fast_flow_px_s:,.0f} px/s"
-    bounds = run.largest_radius_px * np.array([[-1.2, 2.3], [-1.2, 1.2]])
-    return picture(at.BALL_PLACE, f"Flow{speed}", [at.FLOW, at.LOGO_OUTLINE, at.FLOW_WHEEL], bounds)
+    bounds = run.largest_radius_px * np.array([[-1.2, 2.5], [-1.2, 1.2]])
+    return picture(at.BALL_PLACE, "Flow", [at.FLOW, at.LOGO_OUTLINE, f"{at.FLOW_WHEEL}/**"], bounds)
 
 
-def derotated_logo(name: str = "Derotated logo: sharp if spin is right", prefix: str = "") -> rrb.View:
+def derotated_logo(name: str = "Derotated logo", prefix: str = "") -> rrb.View:
     """The logo with the spin taken out, both halves of the ball."""
     return picture(prefix + at.DEROTATED_LOGO, name)
 
 
 def score_over_magnitude() -> rrb.View:
     """Score of contrast over magnitudes along the best axis."""
-    corner = rrb.PlotLegend(corner="LeftTop")  # the maximum is in the middle
-    return rrb.BarChartView(origin=at.SCORE_MAGNITUDE, name="Contrast over spin [rps]", plot_legend=corner)
+    without = rrb.PlotLegend(visible=False)  # in a small pane it would hide the bars; the colours are the methods'
+    return rrb.BarChartView(origin=at.SCORE_MAGNITUDE, name="Contrast over rps", plot_legend=without)
 
 
 def witnesses() -> rrb.View:
     """Axis and magnitude that each witness tells."""
-    return picture(at.WITNESSES, "Witnesses: axis and magnitude, 2 sigma", bounds=witness_bounds())
+    return picture(at.WITNESSES, "Witnesses, 2 sigma", bounds=witness_bounds())
 
 
 def status() -> rrb.View:
     """Lanes of the tracker's status and of the shots, one below the other for balls in flight at the same time."""
     return rrb.StateTimelineView(
         origin=at.TRACKER,
-        name="State of the tracker, shots by how they began",
+        name="Tracker and shots",
         time_view=rrb.TimeAxis(link="LinkToGlobal"),
     )
 
@@ -93,10 +93,10 @@ def status() -> rrb.View:
 def contacts() -> rrb.View:
     """List of the contacts: which shot began or ended when, and how."""
     columns = rrb.TextLogColumns(timeline_columns=[at.TIMELINE], text_log_columns=["Body"])
-    return rrb.TextLogView(origin=at.CONTACTS, name="Shots and contacts", columns=columns)
+    return rrb.TextLogView(origin=at.CONTACTS, name="Contacts", columns=columns)
 
 
-def ball(run: ViewedRun, name: str = "Ball with derotated logo", *, methods: bool = True) -> rrb.View:
+def ball(run: ViewedRun, name: str = "Ball", *, methods: bool = True) -> rrb.View:
     """The ball from close by, from above the line of sight, moving along with it; with every method's arrow or not."""
     arrows = [at.SPIN_SHOWN, *([f"{at.SPIN_ARROWS}/**"] if methods else [])]
     return _space(
@@ -110,7 +110,7 @@ def ball(run: ViewedRun, name: str = "Ball with derotated logo", *, methods: boo
 
 def compared_axes(name: str) -> rrb.View:
     """Axes of two runs on a unit sphere, seen as the ball is."""
-    return _space(at.COMPARED_AXES, name, ["$origin/**"], _tilted(np.zeros(3), 3.6), rrb.LineGrid3D(visible=False))
+    return _space(at.COMPARED_AXES, name, ["$origin/**"], _tilted(np.zeros(3), 5.0), rrb.LineGrid3D(visible=False))
 
 
 def difference(run: ViewedRun, name: str) -> rrb.View:
@@ -118,7 +118,7 @@ def difference(run: ViewedRun, name: str) -> rrb.View:
     return picture(at.DIFFERENCE, name, bounds=_square(CLOSE_UP_RADII * run.largest_radius_px))
 
 
-def flight(run: ViewedRun, name: str = "Flight path, grid 0.1 m", hidden: tuple[str, ...] = ()) -> rrb.View:
+def flight(run: ViewedRun, name: str = "Flight path", hidden: tuple[str, ...] = ()) -> rrb.View:
     """The flight from above, tilted: right is the image's right, near is the image's lower edge."""
     low, high = path_bounds_m(run)
     middle, size_m = (low + high) / 2, max(float(np.linalg.norm(high - low)), 0.3)

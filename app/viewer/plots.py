@@ -213,13 +213,13 @@ STATE_PLOTS = tuple(
     for i, c in enumerate(STATE)
 )
 RESIDUAL_PLOTS = tuple(
-    Plot(f"{at.RESIDUAL}/{c.name}", f"{c.name} minus Kalman [px]", partial(_state_curves, i, True))
+    Plot(f"{at.RESIDUAL}/{c.name}", f"Δ {c.name} [px]", partial(_state_curves, i, True))
     for i, c in enumerate(STATE)
     if c.circle is not None
 )
 EVENT_PLOT = Plot(at.EVENT_COUNT, "Event rate [Mev/s]", _event_curves, "top", with_zero=True)
-RATE_PLOT = Plot(at.RATE, "Logo event rate [kev/s]", _rate_curves, "top", with_zero=True)
-CROSSING_PLOT = Plot(at.RATE_CROSSINGS, "Zero crossings of the rate", _crossing_curves, "top")
+RATE_PLOT = Plot(at.RATE, "Logo rate [kev/s]", _rate_curves, "top", with_zero=True)
+CROSSING_PLOT = Plot(at.RATE_CROSSINGS, "Zero crossings", _crossing_curves, "top")
 MAGNITUDE_PLOT = Plot(at.SPIN_MAGNITUDE, "Spin [rps] ± 1σ", _magnitude_curves, "bottom", _magnitude_range)
-COMPONENT_PLOT = Plot(at.SPIN_COMPONENTS, "Trusted spin [rps]", _component_curves, "top", with_zero=True)
+COMPONENT_PLOT = Plot(at.SPIN_COMPONENTS, "Trusted [rps]", _component_curves, "top", with_zero=True)
 AXIS_ERROR_PLOT = Plot(at.AXIS_ERROR, "Axis error [°]", _axis_error_curves, "top", lambda _: (0.0, 40.0))

@@ -12,6 +12,7 @@ from spinscope.pipeline.files import atomic_file
 
 from . import entities as at
 from .drawers import run_chunks
+from .fitting import ViewerSize
 from .rerun_api import Chunk, file_content
 from .run import ViewedRun
 from .views import VIEWS, blueprint
@@ -32,7 +33,7 @@ def rrd_bytes(chunks: Sequence[Chunk], recording_id: str) -> bytes:
         return path.read_bytes()
 
 
-def layout_bytes(run: ViewedRun, tab: str, *, compare: bool = True, is_narrow: bool = False) -> bytes:
+def layout_bytes(run: ViewedRun, tab: str, *, compare: bool = True, size: ViewerSize | None = None) -> bytes:
     """Blueprint of the page's viewer.
 
     Parameters
@@ -43,11 +44,11 @@ def layout_bytes(run: ViewedRun, tab: str, *, compare: bool = True, is_narrow: b
         Label of the view in front; the first one when there is none of that label.
     compare : bool
         Whether there are the views of two runs.
-    is_narrow : bool
+    size : ViewerSize or None
         See `blueprint`.
     """
     layout = next((view.name for view in VIEWS if view.label == tab), "")
     with TemporaryDirectory() as folder:
         path = Path(folder) / "page.rbl"
-        blueprint(run, layout, compare=compare, is_lasting=True, is_narrow=is_narrow).save(at.APPLICATION, path)
+        blueprint(run, layout, compare=compare, is_lasting=True, size=size).save(at.APPLICATION, path)
         return path.read_bytes()

@@ -12,7 +12,8 @@ from spinscope.pipeline.extensions import Registry
 
 from . import entities as at
 from . import panes, plots
-from .comparison import comparison, narrow_comparison
+from .comparison import comparison
+from .fitting import ViewerSize
 from .run import ViewedRun
 from .summary import CARD_PX
 
@@ -33,8 +34,6 @@ class View:
         What it shows, in one sentence.
     panes : callable
         `panes(run) -> Container`: its panes, side by side and below each other.
-    narrow_panes : callable, optional
-        The same in fewer columns, for a viewer in which the titles of many would be cut.
     compares : bool
         Whether it shows two runs beside each other: for the page, where a second run can be pinned.
     """
@@ -43,7 +42,6 @@ class View:
     label: str
     help: str
     panes: Callable[[ViewedRun], rrb.Container]
-    narrow_panes: Callable[[ViewedRun], rrb.Container] | None = None
     compares: bool = False
 
 
@@ -53,7 +51,7 @@ def views(*, compare: bool = False) -> tuple[View, ...]:
 
 
 def blueprint(
-    run: ViewedRun, layout: str, *, compare: bool = False, is_lasting: bool = False, is_narrow: bool = False
+    run: ViewedRun, layout: str, *, compare: bool = False, is_lasting: bool = False, size: ViewerSize | None = None
 ) -> rrb.Blueprint:
     """All tabs over a run, in slow motion and paused.
 
@@ -68,11 +66,11 @@ def blueprint(
     is_lasting : bool
         Whether other recordings are to be shown with it: all of each is played, for the viewer forgets the selection.
         Otherwise the followed shot, by default the first, is played over and over.
-    is_narrow : bool
-        Whether the viewer has no room for many columns.
+    size : ViewerSize or None
+        Of the viewer, to which the panes are fitted; None where it is not known.
     """
     shown = views(compare=compare)
-    tabs = [(view.narrow_panes if is_narrow and view.narrow_panes else view.panes)(run) for view in shown]
+    tabs = [view.panes(run) if size is None else size.fitted(view.panes(run)) for view in shown]
     for tab, view in zip(tabs, shown, strict=True):
         tab.name = view.label
     front = next((i for i, view in enumerate(shown) if view.name == layout), 0)
@@ -100,7 +98,12 @@ def _all(run: ViewedRun) -> rrb.Container:
     state = rrb.Tabs(*(plot.view(run) for plot in plots.STATE_PLOTS), active_tab=0)
     return rrb.Vertical(
         rrb.Horizontal(
-            panes.events(run), panes.surface(run), panes.close_up(run), panes.flight(run), column_shares=[4, 4, 3, 3]
+            panes.events(run),
+            panes.surface(run),
+            panes.close_up(run),
+            panes.flight(run),
+            column_shares=[4, 4, 3, 3],
+            name="Image",
         ),
         rrb.Horizontal(
             rrb.Vertical(panes.status(), state, row_shares=[4, 5]),
@@ -108,6 +111,7 @@ def _all(run: ViewedRun) -> rrb.Container:
             panes.flow(run),
             panes.derotated_logo(),
             column_shares=[4, 3, 3, 4],
+            name="Tracker and logo",
         ),
         rrb.Horizontal(
             plots.RATE_PLOT.view(run, legend=False),
@@ -115,56 +119,52 @@ def _all(run: ViewedRun) -> rrb.Container:
             panes.ball(run),
             panes.text(at.SUMMARY, "Summary"),
             column_shares=[4, 4, 3, 5],
+            name="Spin",
         ),
         row_shares=[4, 4, 5],
     )
 
 
-def _all_narrow(run: ViewedRun) -> rrb.Container:
-    state = rrb.Tabs(*(plot.view(run) for plot in plots.STATE_PLOTS), active_tab=0)
-    magnitude = plots.MAGNITUDE_PLOT.view(run, legend=False)
-    return rrb.Vertical(
-        rrb.Horizontal(panes.events(run), panes.surface(run), panes.close_up(run)),
-        rrb.Horizontal(panes.logo_events(run), panes.flow(run), panes.derotated_logo()),
-        rrb.Horizontal(panes.flight(run), panes.ball(run), panes.text(at.SUMMARY, "Summary")),
-        rrb.Horizontal(
-            rrb.Vertical(panes.status(), state, row_shares=[4, 5]), plots.RATE_PLOT.view(run, legend=False), magnitude
-        ),
-    )
-
-
 def _tracker(run: ViewedRun) -> rrb.Container:
-    truth = "" if run.truth is None else ", truth violet"
-    surface = panes.surface(run, f"Surface: Hough yellow, refined orange, Kalman green{truth}")
-    pictures = rrb.Horizontal(panes.close_up(run), panes.events(run), column_shares=[2, 3])
+    pictures = rrb.Horizontal(panes.close_up(run), panes.events(run))
     state, residuals = ([plot.view(run) for plot in some] for some in (plots.STATE_PLOTS, plots.RESIDUAL_PLOTS))
     return rrb.Horizontal(
-        rrb.Vertical(surface, pictures, row_shares=[3, 2]),
-        rrb.Vertical(panes.status(), *state, row_shares=[3, *(2 for _ in state)]),
-        rrb.Vertical(*residuals, plots.EVENT_PLOT.view(run)),
-        column_shares=[5, 4, 3],
+        rrb.Vertical(panes.surface(run), pictures, row_shares=[3, 2], name="Images"),
+        rrb.Vertical(panes.status(), *state, row_shares=[3, *(2 for _ in state)], name="State"),
+        rrb.Vertical(*residuals, plots.EVENT_PLOT.view(run), name="Residuals"),
+        column_shares=[5, 4, 4],
     )
 
 
 def _logo(run: ViewedRun) -> rrb.Container:
     return rrb.Horizontal(
-        rrb.Vertical(panes.logo_events(run), panes.close_up(run)),
-        rrb.Vertical(panes.flow(run), panes.derotated_logo()),
-        rrb.Vertical(*(plot.view(run) for plot in (plots.RATE_PLOT, plots.CROSSING_PLOT, plots.MAGNITUDE_PLOT))),
+        rrb.Vertical(panes.logo_events(run), panes.close_up(run), name="Events"),
+        rrb.Vertical(panes.flow(run), panes.derotated_logo(), name="Flow and logo"),
+        rrb.Vertical(
+            *(plot.view(run) for plot in (plots.RATE_PLOT, plots.CROSSING_PLOT, plots.MAGNITUDE_PLOT)), name="Curves"
+        ),
         column_shares=[3, 4, 4],
     )
 
 
 def _spin(run: ViewedRun) -> rrb.Container:
-    shown = [plots.MAGNITUDE_PLOT, plots.COMPONENT_PLOT, *([] if run.truth is None else [plots.AXIS_ERROR_PLOT])]
-    unrolled = panes.picture(at.UNROLLED, "Logo unrolled about the axis, grid 90°")
-    score = panes.picture(at.SCORE_AXES, "Contrast over axes: towards camera, away")
+    unrolled = panes.picture(at.UNROLLED, "Logo unrolled")
+    score = panes.picture(at.SCORE_AXES, "Contrast over axes")
+    errors = [] if run.truth is None else [plots.AXIS_ERROR_PLOT.view(run, legend=False)]
+    text = rrb.Tabs(panes.text(at.SUMMARY, "Summary"), panes.contacts(), active_tab=0)
     return rrb.Horizontal(
-        rrb.Vertical(panes.ball(run), unrolled, row_shares=[3, 2]),
-        rrb.Vertical(panes.score_over_magnitude(), score, panes.witnesses(), row_shares=[4, 3, 5]),
-        rrb.Vertical(*(plot.view(run) for plot in shown)),
-        rrb.Vertical(panes.text(at.SUMMARY, "Summary"), panes.contacts(), row_shares=[4, 1]),
-        column_shares=[4, 4, 3, 4],
+        rrb.Vertical(panes.ball(run), unrolled, score, row_shares=[3, 2, 2], name="Ball"),
+        rrb.Vertical(
+            panes.witnesses(),
+            plots.MAGNITUDE_PLOT.view(run),
+            panes.score_over_magnitude(),
+            row_shares=[6, 4, 3],
+            name="Evidence",
+        ),
+        rrb.Vertical(
+            text, plots.COMPONENT_PLOT.view(run), *errors, row_shares=[6, 3, *(3 for _ in errors)], name="Answer"
+        ),
+        column_shares=[4, 5, 4],
     )
 
 
@@ -180,7 +180,7 @@ def _coach(run: ViewedRun) -> rrb.Container:
 
 VIEWS: Registry[View] = Registry("view")
 for _view in (
-    View(name="all", label="All stages", help="Every stage side by side.", panes=_all, narrow_panes=_all_narrow),
+    View(name="all", label="All stages", help="Every stage side by side.", panes=_all),
     View(name="tracker", label="Tracker", help="Circles on the surface, state and residuals.", panes=_tracker),
     View(name="logo", label="Logo and flow", help="Logo events, their flow and their rate.", panes=_logo),
     View(
@@ -189,14 +189,7 @@ for _view in (
         help="Every method's estimate and what speaks for it.",
         panes=_spin,
     ),
-    View(
-        name="compare",
-        label="Compare",
-        help="Two settings A and B side by side.",
-        panes=comparison,
-        narrow_panes=narrow_comparison,
-        compares=True,
-    ),
+    View(name="compare", label="Compare", help="Two settings A and B side by side.", panes=comparison, compares=True),
     View(name="coach", label="Coach", help="Spin and speed in large letters, ball and flight.", panes=_coach),
 ):
     VIEWS.register(_view)

@@ -22,11 +22,11 @@ from .run import ViewedRun
 Floats = NDArray[np.float64]
 
 # Two discs of axes, those towards the camera and those away from it, and below them bars over magnitude.
-DISC_RADIUS_PX, GAP_PX = 100.0, 20.0
+DISC_RADIUS_PX, GAP_PX = 60.0, 20.0
 WIDTH_PX = 4 * DISC_RADIUS_PX + GAP_PX
-BARS_TOP_PX, ROW_PX = 2 * DISC_RADIUS_PX + 30.0, 30.0
-NAMES_X_PX, MARGIN_PX = -118.0, 240.0
-ODDS_X_PX, ODDS_MARGIN_PX, MOST_ODDS = WIDTH_PX + 90.0, 190.0, 1e6
+BARS_TOP_PX, ROW_PX = 2 * DISC_RADIUS_PX + 30.0, 40.0  # words are as large in a small pane: they need their rows
+NAMES_X_PX, MARGIN_PX = -150.0, 300.0
+ODDS_X_PX, ODDS_MARGIN_PX, MOST_ODDS = WIDTH_PX + 130.0, 260.0, 1e6
 MAX_RPS, GRID_RPS = 150.0, 50.0
 SIGMAS = 2.0
 ELLIPSE_POINTS = 49
@@ -161,8 +161,8 @@ def _frame() -> list[Chunk]:
     scale = [np.array([[x, BARS_TOP_PX], [x, bottom]]) for x in _bar_x(marks)]
     rims = [rim, rim + np.array([2 * DISC_RADIUS_PX + GAP_PX, 0.0])]
     labels = [(f"{mark:.0f} rps", (x, bottom + 16)) for mark, x in zip(marks, _bar_x(marks), strict=True)]
-    labels += [("towards the camera", (DISC_RADIUS_PX, -16.0)), ("away from it", (3 * DISC_RADIUS_PX + GAP_PX, -16.0))]
-    labels.append(("odds over the next best spin", (ODDS_X_PX, BARS_TOP_PX - 18.0)))
+    labels += [("towards", (DISC_RADIUS_PX, -16.0)), ("away", (3 * DISC_RADIUS_PX + GAP_PX, -16.0))]
+    labels.append(("odds over the next", (ODDS_X_PX, BARS_TOP_PX - 18.0)))
     names = [*("Logo seen or not" if name == SIGHTINGS else STAGES[name].label for name in NAMES), "Truth"]
     colours = [*map(_colour, NAMES), at.TRUTH_COLOUR]
     places = [(NAMES_X_PX, BARS_TOP_PX + ROW_PX * (row + 0.2)) for row in range(len(names))]

@@ -6,13 +6,15 @@ import asyncio
 import time
 from collections.abc import AsyncIterator, Callable, Collection
 from contextlib import asynccontextmanager, suppress
+from typing import Annotated
 
-from fastapi import FastAPI, HTTPException, Response
+from fastapi import FastAPI, HTTPException, Query, Response
 from fastapi.responses import FileResponse, StreamingResponse
 from fastapi.staticfiles import StaticFiles
 from starlette.concurrency import run_in_threadpool
 
 from spinscope.app.tuning.bias_sweep import bias_state
+from spinscope.app.viewer.fitting import ViewerSize
 from spinscope.app.viewer.rrd import layout_bytes
 from spinscope.app.viewer.run import ViewedRun
 
@@ -33,6 +35,7 @@ SWEEP_UP_S = 5.0
 FOREVER = {"cache-control": "max-age=31536000, immutable"}
 NO_STORE = {"cache-control": "no-store"}
 
+Side = Annotated[float, Query(gt=0, allow_inf_nan=False)]
 SessionOf = Callable[[str], ClientSession]
 
 
@@ -140,11 +143,14 @@ def _add_session_routes(app: FastAPI, state: AppState, session_of: SessionOf) ->
         return await run_in_threadpool(preview_message, ticks, 0, is_whole=True)
 
     @app.get("/api/sessions/{session_id}/layout")
-    async def layout(session_id: str, tab: str = "", tools: bool = True, narrow: bool = False) -> Response:
+    async def layout(
+        session_id: str, tab: str = "", tools: bool = True, width_px: Side = 1000.0, height_px: Side = 600.0
+    ) -> Response:
         result = session_of(session_id).runner.result
         if result is None:
             raise HTTPException(409, "nothing has been computed yet")
-        made = await run_in_threadpool(layout_bytes, ViewedRun.of(result), tab, compare=tools, is_narrow=narrow)
+        size = ViewerSize(width_px, height_px)
+        made = await run_in_threadpool(layout_bytes, ViewedRun.of(result), tab, compare=tools, size=size)
         return Response(made, media_type="application/octet-stream", headers=NO_STORE)
 
 

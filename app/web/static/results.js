@@ -125,13 +125,17 @@ function compared(both, metric) {
   const values = both.map((one) => shown(one, metric));
   if (both.length < 2) return values;
   const [a, b] = both.map((one) => one?.[metric.name] ?? NaN);
-  const more = Number.isFinite(b - a) ? shown({ [metric.name]: b - a }, metric) : "–";
+  // As fine as the values are shown: what is below that is no difference to look at.
+  const step = 10 ** (Math.floor(Math.log10(Math.max(Math.abs(a), Math.abs(b)))) - 2);
+  const difference = step > 0 && Math.abs(b - a) < step / 2 ? 0 : b - a;
+  const more = Number.isFinite(difference) ? shown({ [metric.name]: difference }, metric) : "–";
   return [...values, more.replace("-", "−")];
 }
 
 function spinDifference(/** @type {(EstimateMetrics | undefined)[]} */ [a, b]) {
   if (!a?.magnitude_rps || !b?.magnitude_rps) return "–";
-  return `${(b.magnitude_rps - a.magnitude_rps).toFixed(2).replace("-", "−")} rps`;
+  const more = (b.magnitude_rps - a.magnitude_rps).toFixed(2);
+  return `${Number(more) ? more.replace("-", "−") : "0.00"} rps`;
 }
 
 // Angle between the signed axes.

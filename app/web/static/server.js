@@ -8,7 +8,7 @@ import { byId, notice, pause } from "./elements.js";
 
 const REOPEN_MS = 700;
 const PATIENCE_MS = 5000; // as long as a picture takes to draw where there is no graphics card
-const NARROW_PX = 900; // a pane's buttons take 120 px of its title: a quarter of less leaves too few letters
+const SIZE_STEP_PX = 50; // the layout is made anew for a viewer that is larger or smaller by more
 const NUMBERS_MS = 1000; // as long as numbers wait for their picture
 
 export class Refused extends Error {
@@ -306,13 +306,17 @@ export class RunRequests extends EventTarget {
       if (this.#latest !== picture.id) return false;
       // Ranges and panes of the layout are those of a clip, and of a ball in flight or in place.
       const { ball, fixed_radius_px } = this.settings.parameters.track;
-      const narrow = byId("viewer").clientWidth < NARROW_PX;
-      const layoutOf = JSON.stringify([this.settings.clip, ball, fixed_radius_px, narrow]);
+      const { clientWidth, clientHeight } = byId("viewer");
+      const [width, height] = [clientWidth, clientHeight].map((px) =>
+        SIZE_STEP_PX * Math.max(1, Math.floor(px / SIZE_STEP_PX))
+      );
+      const layoutOf = JSON.stringify([this.settings.clip, ball, fixed_radius_px, width, height]);
       if (layoutOf !== this.#layoutOf && (isWhole || !this.#hasLayout)) {
         const query = new URLSearchParams({
           tab: this.viewer.front ?? this.start.tab,
           tools: String(this.start.hasTools),
-          narrow: String(narrow),
+          width_px: String(width),
+          height_px: String(height),
         });
         await this.viewer.layout(await this.connection.bytes(`layout?${query}`));
         this.#layoutOf = layoutOf;

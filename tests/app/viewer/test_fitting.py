@@ -1,0 +1,67 @@
+"""Layouts fitted to the size of the viewer."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+import rerun.blueprint as rrb
+
+from spinscope.app.viewer.fitting import MIN_PLOT_HEIGHT_PX, MIN_WIDTH_PX, ViewerSize, fitted
+from spinscope.app.viewer.run import ViewedRun
+from spinscope.app.viewer.views import views
+
+CONTAINERS = ("Horizontal", "Vertical", "Tabs")
+
+
+def kind(part: Any) -> str:
+    return type(part).__name__
+
+
+def names(part: Any) -> list[str]:
+    """Names of all views, in order."""
+    if kind(part) not in CONTAINERS:
+        return [str(part.name)]
+    return [name for one in part.contents for name in names(one)]
+
+
+def row(*names: str) -> Any:
+    return rrb.Horizontal(*(rrb.Spatial2DView(name=name) for name in names), column_shares=[3, 1, 1][: len(names)])
+
+
+def smallest(part: Any, width: float, height: float) -> tuple[float, float]:
+    """Width and height of the smallest view."""
+    if kind(part) not in CONTAINERS:
+        return width, height
+    shares = part.column_shares if kind(part) == "Horizontal" else part.row_shares
+    parts = [1 / len(part.contents)] * len(part.contents) if shares is None else [one / sum(shares) for one in shares]
+    across, down = kind(part) == "Horizontal", kind(part) == "Vertical"
+    sizes = [(width * one if across else width, height * one if down else height) for one in parts]
+    found = [smallest(one, *size) for one, size in zip(part.contents, sizes, strict=True)]
+    return min(width for width, _ in found), min(height for _, height in found)
+
+
+def test_what_has_room_stays_as_it_is() -> None:
+    found: Any = fitted(row("a", "b", "c"), 5 * MIN_WIDTH_PX, 400)
+    assert kind(found) == "Horizontal" and [len(names(one)) for one in found.contents] == [1, 1, 1]
+    assert list(found.column_shares) == pytest.approx([3 * MIN_WIDTH_PX, MIN_WIDTH_PX, MIN_WIDTH_PX])
+
+
+def test_shares_give_way_before_neighbours_become_tabs() -> None:
+    found: Any = fitted(row("a", "b", "c"), 3 * MIN_WIDTH_PX, 400)
+    assert list(found.column_shares) == pytest.approx([MIN_WIDTH_PX] * 3)
+    found = fitted(row("a", "b", "c"), 2.9 * MIN_WIDTH_PX, 400)
+    tabs, alone = found.contents
+    assert kind(tabs) == "Tabs" and names(tabs) == ["a", "b"] and names(alone) == ["c"]
+    only: Any = fitted(row("a", "b", "c"), 0.5 * MIN_WIDTH_PX, 400)
+    assert [kind(one) for one in only.contents] == ["Tabs"]
+
+
+@pytest.mark.parametrize("size", [(600, 400), (800, 600), (950, 650), (1600, 900)])
+def test_no_pane_of_any_view_is_too_small_and_none_is_lost(flight: ViewedRun, size: tuple[int, int]) -> None:
+    for view in views(compare=True):
+        whole = view.panes(flight)
+        found = ViewerSize(*size).fitted(whole)
+        assert names(found) == names(whole), view.name
+        width, height = smallest(found, size[0], size[1])
+        assert width >= MIN_WIDTH_PX - 1 and height >= MIN_PLOT_HEIGHT_PX - 1, view.name
