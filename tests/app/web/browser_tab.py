@@ -20,7 +20,7 @@ FLAGS = [
     "--enable-unsafe-swiftshader",
     "--disable-dev-shm-usage",
 ]
-SIZE = {"width": 1000, "height": 620}  # software drawing is slow: a small window
+SIZE = {"width": 760, "height": 480}  # software drawing is slow: a small window
 PATIENCE_MS = 240_000  # a loaded machine draws a hundred times slower
 
 needs_browser = [

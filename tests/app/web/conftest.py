@@ -18,7 +18,7 @@ from spinscope.app.web.application import application
 from spinscope.app.web.server import listening_socket
 from spinscope.pipeline.session import Choices
 
-from .browser_tab import CHROMIUM, FLAGS, SIZE, Tab
+from .browser_tab import CHROMIUM, FLAGS, SIZE, Tab, bare_tab
 
 PATIENCE_S = 120.0  # the first run on a machine compiles the kernels
 
@@ -162,19 +162,21 @@ def browser() -> Iterator[Any]:
 
 
 @pytest.fixture(scope="module")
-def server(flight: Path) -> Iterator[Served]:
-    """A tuner of its own: the tests stop and start it."""
-    made = served(flight)
-    yield made
-    made.stop()
-
-
-@pytest.fixture(scope="module")
-def tab(browser: Any, server: Served) -> Iterator[Tab]:
+def tab(browser: Any, tuner: Served) -> Iterator[Tab]:
     """The page with its viewer, on the tracker's tab, which draws fastest."""
     context = browser.new_context(viewport=SIZE)
     made = Tab(context.new_page())
-    made.open(f"{server.address}#tab=Tracker")
+    made.open(f"{tuner.address}#tab=Tracker")
     made.settled("shown")
     yield made
     context.close()
+
+
+@pytest.fixture(scope="module")
+def bare(browser: Any, tuner: Served) -> Iterator[Tab]:
+    """The page without the viewer, whose pictures take seconds each."""
+    made = bare_tab(browser, tuner.address)
+    for notice in made.page.locator(".notice").all():  # that the viewer does not run
+        notice.click()
+    yield made
+    made.page.context.close()

@@ -1,27 +1,13 @@
-"""The page by keyboard alone, and what axe-core finds in it; without the viewer, whose part is in test_browser."""
+"""The page by keyboard alone, and what axe-core finds in it; without the viewer, whose part is in test_browser.py."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
-
 import pytest
 
-from .browser_tab import Tab, bare_tab, needs_browser, serious
-from .conftest import Served
+from .browser_tab import Tab, needs_browser, serious
 
 pytestmark = needs_browser
 FOCUSED = "document.activeElement.id || document.activeElement.textContent"
-
-
-@pytest.fixture(scope="module")
-def bare(browser: Any, server: Served) -> Iterator[Tab]:
-    """The page without the viewer's picture."""
-    made = bare_tab(browser, server.address)
-    for notice in made.page.locator(".notice").all():  # that the viewer does not run
-        notice.click()
-    yield made
-    made.page.context.close()
 
 
 def test_a_list_of_all_keys_opens_and_closes(bare: Tab) -> None:

@@ -2,25 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
-
 import pytest
 
-from .browser_tab import Tab, bare_tab, needs_browser
-from .conftest import Served
+from .browser_tab import Tab, needs_browser
 
 pytestmark = needs_browser
 # Of laptops, of screens on desks, of one at a zoom of 150 %, of a tablet upright.
 SIZES = [(1280, 800), (1366, 768), (1920, 1080), (2560, 1440), (911, 512), (820, 1180)]
-
-
-@pytest.fixture(scope="module")
-def bare(browser: Any, server: Served) -> Iterator[Tab]:
-    """The page without the viewer's picture."""
-    made = bare_tab(browser, server.address)
-    yield made
-    made.page.context.close()
 
 
 @pytest.mark.parametrize("size", SIZES)

@@ -15,9 +15,9 @@ pytestmark = needs_browser
 
 
 @pytest.fixture
-def bare(browser: Any, server: Served) -> Iterator[Tab]:
+def bare(browser: Any, tuner: Served) -> Iterator[Tab]:
     """The page without the viewer's picture."""
-    made = bare_tab(browser, f"{server.address}#set=logo.pad_px=3")
+    made = bare_tab(browser, f"{tuner.address}#set=logo.pad_px=3")
     yield made
     made.page.context.close()
 

@@ -214,7 +214,7 @@ function statisticsTable(series, open) {
         {},
         best ? element("button.link", { onclick: () => open(best) }, spinWords(statistics.best_rps)) : "–",
       ),
-      element("td", {}, speedWords(statistics.median_speed_m_s)),
+      element("td.speed", {}, speedWords(statistics.median_speed_m_s)),
     );
   });
   return element("table.statistics", {}, element("thead", {}, element("tr", {}, head)), element("tbody", {}, rows));

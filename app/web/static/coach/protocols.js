@@ -115,7 +115,7 @@ export class Protocols {
             spinWords(statistics.best_rps),
           ),
         ),
-        element("td", {}, speedWords(statistics.median_speed_m_s)),
+        element("td.speed", {}, speedWords(statistics.median_speed_m_s)),
         element(
           "td",
           {},
