@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...kernels.arrays import Floats
-from ...kernels.lift import lift_likelihood, spin_grid, spin_log_likelihoods
+from ...kernels.lift import lift_at, lift_likelihood, spin_grid, spin_log_likelihoods
 from ...kernels.rotation import orthonormal_axes
 from ...results import ReadOnlyArrays
 from .motion import FittedMotion
@@ -23,6 +23,8 @@ DIRECTIONS, MAGNITUDES = 20, 16
 DIRECTION_CELLS, MAGNITUDE_CELLS = np.arange(DIRECTIONS) + 0.5, np.arange(MAGNITUDES) + 0.5
 # Degrees of freedom of the nine accelerations less those of the spin across the flight.
 FREEDOM = 7.0
+# A spin whose lift has saturated whatever the speed, and the directions in which it is tried: 5 degrees apart.
+SATURATED_RPS, TRIED_DIRECTIONS = 1e4, 72
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -190,3 +192,26 @@ def spin_across(likelihood: FlightLikelihood, max_spin_rps: float) -> SpinAcross
         float(magnitudes[np.searchsorted(summed, 0.975)]) * math.exp(step / 2),
         misfit,
     )
+
+
+def bend_over_largest_lift(likelihood: FlightLikelihood) -> tuple[float, float]:
+    """Bend of a flight that may be stronger than any spin's.
+
+    Returns
+    -------
+    times : float
+        How many times as large as the largest lift of a spin the lift is that fits best, with its direction free.
+    misfit : float
+        Chi-squared per degree of freedom of that lift.
+    """
+    velocity = likelihood.velocity_m_s[1]
+    _, first, second = orthonormal_axes(*(velocity / math.sqrt(velocity @ velocity)))
+    angles = 2 * math.pi / TRIED_DIRECTIONS * np.arange(TRIED_DIRECTIONS)[:, None]
+    lifts = np.empty((TRIED_DIRECTIONS, 9))
+    for lift, spin_rps in zip(lifts, SATURATED_RPS * (np.cos(angles) * first + np.sin(angles) * second), strict=True):
+        lift_at(lift, spin_rps, likelihood.velocity_m_s, likelihood.air)
+    slopes = lifts @ likelihood.pull
+    bows = np.einsum("ki,ij,kj->k", lifts, likelihood.information, lifts)
+    best = int(np.argmax(np.where(slopes > 0, slopes**2 / bows, 0.0)))
+    gain = slopes[best] ** 2 / (2 * bows[best])
+    return float(slopes[best] / bows[best]), max(2 * (likelihood.most - float(gain)) / FREEDOM, 0.0)

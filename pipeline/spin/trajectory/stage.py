@@ -14,10 +14,13 @@ from ...parameters import ParameterGroup, tunable
 from ...results import Packet, ReadOnlyArrays, SpinEstimate
 from ...stage import Context, SpinMethod
 from ...stages.track_result import BallTrack
-from .likelihood import FlightLikelihood, SetUp, SpinAcross, spin_across
+from .likelihood import LIFT_MAX, FlightLikelihood, SetUp, SpinAcross, bend_over_largest_lift, spin_across
 from .motion import FittedMotion, fit_flight
 
 METHOD = "trajectory"
+# A lift stronger than any spin's explains a bend if it leaves a quarter of the misfit: one that does not saturate
+# leaves 0.03 to 0.15 of it (six flights of a simulator that is not ours), a wrong camera.up or a contact most.
+STRONG_LIFT_SHARE = 0.25
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,14 +161,26 @@ def _estimated(parameters: TrajectoryParameters, state: TrajectoryState) -> Traj
     likelihood = FlightLikelihood.of(motion, set_up, context.ball_radius_m)
     across = spin_across(likelihood, context["spin.max_spin_rps"])
     if across.misfit > parameters.misfit:
-        reason = (
-            f"no spin bends a flight like this one ({math.sqrt(across.misfit):.1f} sigma): check camera.up and the "
-            "optics, or the ball touched something"
-        )
+        reason = _unexplained(parameters, likelihood, across.misfit)
         return TrajectoryResult(SpinEstimate.refused(METHOD, reason, count), motion)
     likelihood = likelihood.scaled(max(across.misfit, 1.0))
     estimate = _estimate(parameters, across, count)
     return TrajectoryResult(estimate, motion, likelihood, across)
+
+
+def _unexplained(parameters: TrajectoryParameters, likelihood: FlightLikelihood, misfit: float) -> str:
+    """Reason why a flight's bend is no spin's, in words."""
+    times, misfit_by_lift = bend_over_largest_lift(likelihood)
+    if times > 1.0 and misfit_by_lift <= STRONG_LIFT_SHARE * misfit:
+        return (
+            f"the flight is bent like a spinning ball's, but {times:.1f} times as strongly as any spin bends a real "
+            f"one (lift coefficient up to {LIFT_MAX * parameters.lift_scale:.2g}): a simulation whose lift does not "
+            "saturate, or wrong optics or ball.diameter_mm"
+        )
+    return (
+        f"no spin bends a flight like this one ({math.sqrt(misfit):.1f} sigma): check camera.up and the optics, or the "
+        "ball touched something"
+    )
 
 
 def _estimate(parameters: TrajectoryParameters, across: SpinAcross, count: int) -> SpinEstimate:

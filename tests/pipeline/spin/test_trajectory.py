@@ -4,16 +4,30 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from spinscope.pipeline.camera import Camera, CameraParameters
 from spinscope.pipeline.kernels.rotation import rotations
+from spinscope.pipeline.recordings import open_recording
 from spinscope.pipeline.results import SpinEstimate
 from spinscope.pipeline.spin.trajectory import calibration, stage
 from spinscope.pipeline.spin.trajectory.stage import TrajectoryParameters
-from tests.flown_circles import CAMERA, RADIUS_M, FlownCircles, angle_deg, answer, ball_at, changed, context, flown
+from tests.flown_circles import (
+    CAMERA,
+    RADIUS_M,
+    TICK_US,
+    FlownCircles,
+    angle_deg,
+    answer,
+    ball_at,
+    changed,
+    context,
+    flown,
+)
 
 SIDE = {"kind": "left", "magnitude_rps": 14.0, "speed_m_s": 8.0}
 ONE_SET_UP = 31
@@ -153,6 +167,35 @@ def test_a_contact_in_the_middle_is_refused(change_px: float) -> None:
     circles[half:, 0] += change_px * np.arange(len(circles) - half)
     reason = answer(changed(shown, circles_px=circles)).estimate.reason
     assert reason is not None and ("off one free flight" in reason or "no spin bends" in reason)
+
+
+@pytest.mark.parametrize("name", ["back", "fast_top", "mixed", "side", "slow_top"])
+def test_a_lift_that_no_ball_has_is_told_apart(samples: Path, name: str) -> None:
+    """The simulator of these samples lets lift grow with the spin: its coefficient is 0.6 to 1.3 in their middles."""
+    truth = open_recording(samples / f"flight_{name}.h5").truth
+    assert truth is not None
+    rows = np.flatnonzero(truth.t_us % TICK_US == 0)
+    circles = np.column_stack([truth.x_px, truth.y_px, truth.radius_px])[rows]
+    seen = (circles[:, :2] > circles[:, 2:]).all(axis=1) & (circles[:, :2] < [1280, 720] - circles[:, 2:]).all(axis=1)
+    noise = np.random.default_rng(1).normal(0.0, 0.05, circles.shape)
+    middle = rows[seen][seen.sum() // 2]
+    spin_rps, velocity_m_s = truth.spin_rps[middle], truth.velocity_m_s[middle]
+    shown = FlownCircles(
+        truth.t_us[rows][seen].astype(np.float64),
+        (circles + noise)[seen],
+        spin_rps,
+        velocity_m_s,
+        1.0,
+        0.125,
+        np.array(CAMERA.up),
+    )
+    reason = answer(shown).estimate.reason
+    assert reason is not None and "as any spin bends a real one" in reason
+    spin_parameter = (
+        2 * math.pi * RADIUS_M * np.linalg.norm(np.cross(spin_rps, velocity_m_s)) / (velocity_m_s @ velocity_m_s)
+    )
+    stated = float(re.search(r"but ([\d.]+) times", reason)[1])  # type: ignore[index]
+    assert stated == pytest.approx(0.805 * spin_parameter / 0.26, rel=0.25)
 
 
 def test_a_wrong_up_direction_is_refused_and_corrected_by_the_flights() -> None:
