@@ -9,6 +9,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from spinscope.app.viewer.drawing_cache import DrawingCache
+from spinscope.pipeline.calibration.ball_labels import labels_beside
+from spinscope.pipeline.calibration.label_file import LabelFile
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.recordings.recording import file_identity
 from spinscope.pipeline.session import Choices, Progress
@@ -43,6 +45,8 @@ class AppState:
         Number of the shot, from 1, whose ball the detail views follow.
     live : LiveSource, optional
         Running camera that the recordings of the folder come from.
+    labels : Path, optional
+        Labels of the ball in the recording that was asked for, which the page shows at once (`label --view`).
 
     Attributes
     ----------
@@ -61,16 +65,19 @@ class AppState:
         layout: str = "all",
         followed: int | None = None,
         live: LiveSource | None = None,
+        labels: Path | None = None,
     ) -> None:
         self.path = path.absolute()
         self.folder = RecordingFolder(self.path.parent)
         self.tools, self.layout, self.followed, self.live = tools, layout, followed, live
+        self.labels = labels
         self.drawings = DrawingCache()
         self._choices = choices
         self._recordings: OrderedDict[Path, OpenRecording] = OrderedDict()
         self._detections: dict[Path, ShotDetectionJob] = {}
         self._summaries: dict[str, RecordingSummary] = {}
         self._summarizing = threading.Lock()
+        self._label_files: dict[Path, LabelFile] = {}
         self._scratch: TemporaryDirectory[str] | None = None
         self.sessions: dict[str, ClientSession] = {}
         self._lock = threading.Lock()
@@ -100,6 +107,12 @@ class AppState:
                 choices = self._choices if path == self.path else self._choices.for_others
                 self._summaries[identity] = summarize(path, choices, self._make_way)
             return self._summaries[identity]
+
+    def labels_of(self, recording: OpenRecording) -> LabelFile:
+        """The file of a recording's labels, whether it is there or not; one for all sessions."""
+        chosen = self.labels if recording.original == self.path else None
+        path = chosen or labels_beside(recording.original)
+        return self._label_files.setdefault(path, LabelFile(path))
 
     def _make_way(self, share: float, text: str) -> None:
         """Progress of work in the background: it waits while somebody waits for a picture."""

@@ -23,6 +23,7 @@ from .assets import STATIC, chart_script, viewer_script, viewer_version, viewer_
 from .client_session import ClientSession
 from .error_answers import add_error_handlers
 from .folder_routes import add_folder_routes
+from .label_routes import add_label_routes
 from .live_routes import add_live_routes
 from .opening import opening, recording_description
 from .publisher import preview_message
@@ -76,6 +77,7 @@ def application(state: AppState, token: str | None = None, hosts: Collection[str
     _add_session_routes(app, state, session_of)
     add_folder_routes(app, state)
     add_tool_routes(app, state, session_of)
+    add_label_routes(app, state, session_of)
     add_live_routes(app, state.live)
     add_video_routes(app)
     return app

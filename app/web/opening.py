@@ -56,6 +56,8 @@ def opening(state: AppState, session: ClientSession) -> Opening:
         renamed=opened.renamed(),
         biases=bias_state(recording.session.recording) if state.live is None else state.live.bias_state(),
         is_live=state.live is not None,
+        has_labels=state.labels_of(recording).path.is_file(),
+        shows_labels=state.labels is not None and recording.original == state.path,
     )
 
 

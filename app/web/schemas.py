@@ -196,7 +196,8 @@ class SectionInfo(Response):
 class Opening(Response):
     """Everything that the page needs to know at first; without `tools` it shows the viewer alone, `tab` in front.
 
-    The detail views follow the ball of shot number `followed`, if given. `is_live` where a camera runs behind it.
+    The detail views follow the ball of shot number `followed`, if given. `is_live` where a camera runs behind it,
+    `has_labels` where labels of the ball can be gone through, which `shows_labels` does at once.
     """
 
     session: str
@@ -220,6 +221,8 @@ class Opening(Response):
     renamed: dict[str, str]
     biases: BiasState
     is_live: bool
+    has_labels: bool
+    shows_labels: bool
 
 
 class ListedRecording(Response):

@@ -57,6 +57,7 @@ def serve(
     layout: str = "all",
     followed: int | None = None,
     live: LiveSource | None = None,
+    labels: Path | None = None,
 ) -> None:
     """Open a recording and serve its page until Ctrl-C.
 
@@ -68,7 +69,7 @@ def serve(
         Whether to open the page where there is a browser; the address is printed in any case.
     hosts : collection of str
         Names besides 127.0.0.1 and localhost by which the page may be reached.
-    tools, layout, followed, live
+    tools, layout, followed, live, labels
         See AppState.
 
     Raises
@@ -76,7 +77,7 @@ def serve(
     SpinscopeError
         For a recording or choices that cannot be used, or when no port can be opened.
     """
-    state = AppState(path, choices, tools=tools, layout=layout, followed=followed, live=live)
+    state = AppState(path, choices, tools=tools, layout=layout, followed=followed, live=live, labels=labels)
     with ProgressBar() as bar:
         recording = state.recording(on_progress=bar)
     # While the browser loads the page and the viewer, which takes longer.

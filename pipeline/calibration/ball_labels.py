@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -40,6 +40,7 @@ DEGREE = 4  # in time, of the path of a ball in the image: gravity, drag and per
 LEAST_LABELS = 8  # of one ball: fewer have no error of their own
 LEAST_STD_PX = 0.05  # what scatter along a smooth path does not show
 MOST_BYTES = 100_000_000
+DETECTED, ACCEPTED, MOVED = STATES = "detected", "accepted", "moved"
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +57,8 @@ class BallLabels:
         1 sigma of the place in each direction, by the scatter about a smooth path.
     ball : (n,) int64
         Number of the flight, from 1.
+    state : (n,) str
+        DETECTED by the program, ACCEPTED by somebody as it is, or MOVED by hand.
     """
 
     t_us: Floats
@@ -64,14 +67,27 @@ class BallLabels:
     radius_px: Floats
     std_px: Floats
     ball: NDArray[np.int64]
+    state: NDArray[np.str_]
 
     def of_ball(self, number: int) -> BallLabels:
         """The labels of one flight."""
-        mine = self.ball == number
-        return BallLabels(**{field.name: getattr(self, field.name)[mine] for field in fields(self)})
+        return self._at(self.ball == number)
+
+    def spliced(self, first: int, removed: int, others: BallLabels) -> BallLabels:
+        """The labels with `others` in the place of `removed` of them from `first` on."""
+        before, after = self._at(slice(first)), self._at(slice(first + removed, None))
+        return BallLabels.concatenate([before, others, after])
+
+    @classmethod
+    def concatenate(cls, parts: Sequence[BallLabels]) -> BallLabels:
+        """All labels of several parts, in their order."""
+        return cls(**{field.name: np.concatenate([getattr(one, field.name) for one in parts]) for field in fields(cls)})
+
+    def _at(self, chosen: slice | NDArray[np.bool_]) -> BallLabels:
+        return BallLabels(**{field.name: getattr(self, field.name)[chosen] for field in fields(self)})
 
     def write(self, path: Path) -> None:
-        """Write a CSV with these columns; raises RecordingError."""
+        """Write a CSV with these columns, which appears whole or not at all; raises RecordingError."""
         text = io.StringIO(newline="")
         writer = csv.writer(text, lineterminator="\n")
         names = [field.name for field in fields(self)]
@@ -83,13 +99,19 @@ class BallLabels:
 
     @classmethod
     def read(cls, path: Path) -> BallLabels:
-        """Labels from a CSV with these columns; raises RecordingError for anything else."""
-        names = [field.name for field in fields(cls)]
+        """Labels from a CSV with these columns, DETECTED without `state`; raises RecordingError for anything else."""
+        return cls.of_csv(label_bytes(path), path)
+
+    @classmethod
+    def of_csv(cls, content: bytes, path: Path) -> BallLabels:
+        """The same from the content of the file at a path."""
+        *names, state = (field.name for field in fields(cls))
         try:
-            lines = list(csv.DictReader(file_bytes(path, MOST_BYTES).decode("utf-8-sig").splitlines()))
+            lines = list(csv.DictReader(content.decode("utf-8-sig").splitlines()))
             columns = [np.array([float(line[name]) for line in lines]) for name in names]
-        except OSError as error:
-            raise RecordingError(f"labels cannot be read ({error.strerror}): {path}") from error
+            states = [line.get(state, DETECTED) for line in lines]
+            if wrong := set(states).difference(STATES):
+                raise ValueError(f"state {wrong.pop()} is none of {', '.join(STATES)}")
         except (KeyError, TypeError, ValueError) as error:
             raise RecordingError(
                 f"labels are a CSV with the columns {', '.join(names)}, as `spinscope label` writes them "
@@ -98,7 +120,20 @@ class BallLabels:
         if not lines or not all(np.isfinite(column).all() for column in columns):
             raise RecordingError(f"labels hold no line, or no number in one: {path}")
         read: dict[str, Any] = dict(zip(names, columns, strict=True))
-        return cls(**{**read, "ball": columns[-1].astype(np.int64)})
+        return cls(**{**read, "ball": columns[-1].astype(np.int64), state: np.array(states)})
+
+
+def label_bytes(path: Path) -> bytes:
+    """Content of a file of labels; raises RecordingError."""
+    try:
+        return file_bytes(path, MOST_BYTES)
+    except OSError as error:
+        raise RecordingError(f"labels cannot be read ({error.strerror}): {path}") from error
+
+
+def labels_beside(recording: Path) -> Path:
+    """Path of the labels of a recording, NAME.labels.csv beside it."""
+    return recording.with_suffix(".labels.csv")
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,10 +183,7 @@ def ball_labels(events: EventBatch, size: tuple[int, int]) -> BallLabels:
             "no ball in flight leaves a blob in accumulated frames: labels need balls of 1.5 m/s or more that cross "
             "the image alone, before a background that is at rest"
         )
-    parts = [_labels(flight, number) for number, flight in enumerate(kept, start=1)]
-    return BallLabels(
-        **{field.name: np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(BallLabels)}
-    )
+    return BallLabels.concatenate([_labels(flight, number) for number, flight in enumerate(kept, start=1)])
 
 
 def _labels(flight: list[_Blob], number: int) -> BallLabels:
@@ -180,6 +212,7 @@ def _labels(flight: list[_Blob], number: int) -> BallLabels:
         radius_px=np.array([blob.radius_px for blob in flight]),
         std_px=np.full(len(flight), math.hypot(std_px, LEAST_STD_PX)),
         ball=np.full(len(flight), number, np.int64),
+        state=np.full(len(flight), DETECTED),
     )
 
 

@@ -11,6 +11,7 @@ import { Controls } from "./controls.js";
 import { ask, byId, element, notice } from "./elements.js";
 import { Keyboard } from "./keyboard.js";
 import { carriedSettings, linked, linkOf, linkTo, settingsOf } from "./link.js";
+import { Labels } from "./labels.js";
 import { Live } from "./live.js";
 import { Notices } from "./notices.js";
 import { Optimization } from "./optimization.js";
@@ -213,6 +214,7 @@ function addTools(/** @type {Opening} */ opening) {
   app.sweep = new Sweep(panel("Parameter sweep"), app);
   app.optimization = new Optimization(panel("Optimization"), app);
   app.ball = new Ball(panel("Fixed ball"), app);
+  if (opening.has_labels) new Labels(panel("Labels", true), app);
   app.coach = new Coach(app);
   new Saving(app, builtIn);
   app.controls = new Controls(byId("controls"), opening, settings);

@@ -45,6 +45,14 @@ export type FolderListing = { root: string; folder: string; folders: string[]; r
 export type HeldOut = { clips: number; before: number; after: number; objection: string | null };
 /** Revision after a change. */
 export type Kept = { revision: number };
+/** A labelled place of the ball: scene time, silhouette, its error, number of the flight from 1. */
+export type Label = { t_us: number; x_px: number; y_px: number; radius_px: number; std_px: number; ball: number; state: "detected" | "accepted" | "moved" };
+/** Put labels in the place of `removed` others from number `first` on, which counts from 0. */
+export type LabelChangeRequest = { version: string; first: number; removed: number; labels: Label[] };
+/** Version of the labels after a change. */
+export type LabelVersion = { version: string };
+/** All labels of the recording, in order of time, flight by flight; a change names the `version` that it is of. */
+export type Labels = { path: string; version: string; labels: Label[] };
 /** Places where shots bounced, by id: metres along the table with the flight from the net, and to the left. */
 export type Landings = { landings: Record<string, [number, number]> };
 /** A recording of a folder, or a dropped one; `name` opens it. */
@@ -72,7 +80,7 @@ export type NamesRequest = { ids: number[]; values: Record<string, string | bool
 /** Open a session on a recording of the folder; None for the one the program was started with. */
 export type OpenRequest = { recording?: string | null };
 /** Everything that the page needs to know at first; without `tools` it shows the viewer alone, `tab` in front. */
-export type Opening = { session: string; viewer_version: string; tools: boolean; tab: string; followed: number | null; recording: RecordingDescription; sections: SectionInfo[]; stages: Choice[]; methods: MethodInfo[]; run_metrics: MetricInfo[]; shot_metrics: MetricInfo[]; estimate_metrics: MetricInfo[]; tabs: Choice[]; exports: Choice[]; objectives: Choice[]; suggested: string[]; colours: Record<string, string>; presets: Record<string, Record<string, Record<string, any>>>; renamed: Record<string, string>; biases: BiasState; is_live: boolean };
+export type Opening = { session: string; viewer_version: string; tools: boolean; tab: string; followed: number | null; recording: RecordingDescription; sections: SectionInfo[]; stages: Choice[]; methods: MethodInfo[]; run_metrics: MetricInfo[]; shot_metrics: MetricInfo[]; estimate_metrics: MetricInfo[]; tabs: Choice[]; exports: Choice[]; objectives: Choice[]; suggested: string[]; colours: Record<string, string>; presets: Record<string, Record<string, Record<string, any>>>; renamed: Record<string, string>; biases: BiasState; is_live: boolean; has_labels: boolean; shows_labels: boolean };
 /** The trials of an optimization so far. */
 export type Optimization = { objective: string; total: number; clips: number; trials: Trial[]; best: number | null; values: Record<string, boolean | number | string | null>; held_out: HeldOut | null; skipped: string[] };
 /** Progress of an optimization. */
@@ -157,6 +165,7 @@ export interface SessionPosts {
   "biases": { sent: BiasRequest; answered: Done };
   "cancel": { sent: CancelRequest; answered: Done };
   "find_ball": { sent: SettingsRequest; answered: Record<string, number> };
+  "labels": { sent: LabelChangeRequest; answered: LabelVersion };
   "optimization": { sent: OptimizationRequest; answered: Done };
   "presets/read": { sent: TextRequest; answered: PresetValues };
   "presets/write": { sent: SettingsRequest; answered: WrittenSettings };
@@ -165,6 +174,7 @@ export interface SessionPosts {
 }
 /** GET requests of a session: what is sent and answered. */
 export interface SessionGets {
+  "labels": { sent: null; answered: Labels };
   "preview": { sent: null; answered: PreviewMessage };
   "recording": { sent: null; answered: Reopened };
 }

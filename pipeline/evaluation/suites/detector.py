@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...calibration.ball_labels import BallLabels
+from ...calibration.ball_labels import STEP_US, BallLabels, labels_beside
 from ...camera import BallParameters
 from ...chain import Chain
 from ...errors import RecordingError
@@ -77,7 +77,7 @@ def measure(context: TaskContext, scene: str, speed_m_s: float, seed: int) -> li
 
 def real(context: TaskContext, recording: LabRecording) -> list[Row]:
     """The same against the labels `NAME.labels.csv` of a real flight, as `spinscope label` makes them."""
-    path, session = recording.path.with_suffix(".labels.csv"), recording.session
+    path, session = labels_beside(recording.path), recording.session
     if not path.is_file():
         raise RecordingError(f"no labels of the ball: make them with `spinscope label`: {path.name}")
     labels = BallLabels.read(path)
@@ -163,9 +163,15 @@ def _found(tick: Tick, truth: BallState | None) -> dict[str, BallState | None]:
 
 
 def _truth_at(truth: Truth | BallLabels, size_px: tuple[int, int], t_us: float) -> BallState | None:
-    """The true ball at a time; None unless all of it is in the image, and for a while on both sides."""
+    """The true ball at a time; None unless all of it is in the image, and for a while on both sides.
+
+    Labels that were deleted leave a gap: beyond a single one it is not bridged.
+    """
     around = np.array([t_us - ASIDE_US, t_us, t_us + ASIDE_US])
     if around[0] < truth.t_us[0] or around[2] > truth.t_us[-1]:
+        return None
+    first, last = np.searchsorted(truth.t_us, around[0], "right") - 1, np.searchsorted(truth.t_us, around[2])
+    if np.diff(truth.t_us[first : last + 1]).max(initial=0) > 2 * STEP_US:
         return None
     x, y, radius = (np.interp(around, truth.t_us, column) for column in (truth.x_px, truth.y_px, truth.radius_px))
     most = radius.max()

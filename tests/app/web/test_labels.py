@@ -1,0 +1,127 @@
+"""Labels of the ball on the page: told, drawn, changed, undone, and refused where the file is another one by now."""
+
+from __future__ import annotations
+
+import re
+import time
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from spinscope.app.cli import cli
+from spinscope.app.web.label_routes import EXPOSED, IN_THE_MIDDLE, exposure_picture
+from spinscope.pipeline.calibration.ball_labels import LATENCY_US, BallLabels, labels_beside
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.recordings import open_recording
+
+from .browser_tab import PATIENCE_MS, bare_tab, needs_browser
+from .conftest import Client, Served
+
+
+@pytest.fixture
+def path(tuner: Served, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Labels of the tuner's recording on the true ball, in another place than beside it."""
+    truth = open_recording(tuner.state.path).truth
+    assert truth is not None
+    made = tmp_path / "made.csv"
+    at = np.arange(truth.t_us.size // 3, 2 * truth.t_us.size // 3, truth.t_us.size // 15)
+    rows = [(truth.t_us[i], truth.x_px[i], truth.y_px[i], truth.radius_px[i], 0.1, 1) for i in at]
+    lines = ["t_us,x_px,y_px,radius_px,std_px,ball", *(",".join(f"{one:.3f}" for one in row) for row in rows)]
+    made.write_text("\n".join(lines))
+    monkeypatch.setattr(tuner.state, "labels", made)
+    return made
+
+
+def test_labels_are_told_and_changed_and_a_change_of_another_version_is_refused(client: Client, path: Path) -> None:
+    told = client.http.get(client.path("labels")).json()
+    assert told["path"] == str(path) and {one["state"] for one in told["labels"]} == {"detected"}
+    moved = {**told["labels"][1], "x_px": 12.5, "state": "moved"}
+    change = {"version": told["version"], "first": 1, "removed": 1, "labels": [moved]}
+    version = client.post("labels", **change).json()["version"]
+    assert BallLabels.read(path).x_px[1] == 12.5
+    refused = client.post("labels", **change)
+    assert refused.status_code == 400 and "changed elsewhere" in refused.json()["error"]
+    wrong = {**change, "version": version, "labels": [{**moved, "radius_px": -1.0}]}
+    assert client.post("labels", **wrong).status_code == 422
+    picture = client.http.get(client.path("label.png"), params={"t_us": moved["t_us"]}).content
+    assert cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_GRAYSCALE).max() == IN_THE_MIDDLE
+
+
+def test_the_middle_of_an_exposure_is_bright() -> None:
+    t_us = np.array([1000, 5400, 5600, 9000])
+    events = EventBatch(t_us, np.arange(4, dtype=np.uint16), np.zeros(4, np.uint16), np.ones(4, bool))
+    content = np.frombuffer(exposure_picture(events, 5000, (2, 5)), np.uint8)
+    grey = cv2.imdecode(content, cv2.IMREAD_GRAYSCALE)
+    assert grey[0].tolist() == [EXPOSED, IN_THE_MIDDLE, EXPOSED, EXPOSED, 0] and not grey[1].any()
+    assert LATENCY_US < 100  # far less than an exposure
+
+
+def test_the_command_goes_on_with_labels_and_overwrites_none_that_were_looked_at(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    asked: list[tuple[tuple[Any, ...], dict[str, Any]]] = []
+    monkeypatch.setattr("spinscope.app.web.serve", lambda *given, **named: asked.append((given, named)))
+    recording = tmp_path / "a.raw"
+    recording.touch()
+    beside = labels_beside(recording)
+    text = "t_us,x_px,y_px,radius_px,std_px,ball,state\n1,2,3,4,0.1,1,accepted\n"
+    beside.write_text(text)
+    done = CliRunner().invoke(cli, ["label", str(recording), "--view", "--port", "0", "--no-browser"])
+    assert done.exit_code == 0, done.output
+    assert [given["labels"] for _, given in asked] == [beside]
+    refused = CliRunner().invoke(cli, ["label", str(recording)])
+    assert refused.exit_code != 0 and "--view" in str(refused.exception) and beside.read_text() == text
+
+
+@needs_browser[0]
+@needs_browser[1]
+def test_labels_are_gone_through_by_key_and_mouse(browser: Any, tuner: Served, path: Path) -> None:
+    before = BallLabels.read(path)
+    tab = bare_tab(browser, tuner.address)
+    page = tab.page
+    dialog = page.locator("dialog.labels")
+    dialog.wait_for()
+    rows = dialog.locator("nav button")
+    assert rows.count() == before.ball.size
+
+    def saved(words: str, *states: str) -> BallLabels:
+        tab.until(f"document.querySelector('#side [data-title=Labels]').textContent.includes('{words}')")
+        end_s = time.monotonic() + PATIENCE_MS / 1000
+        while (found := BallLabels.read(path)).state.tolist()[: len(states)] != list(states):
+            assert time.monotonic() < end_s, found.state
+            page.wait_for_timeout(30)
+        return found
+
+    def radius() -> str:
+        return str(re.search(r"radius ([\d.]+)", dialog.locator("[role=status]").inner_text())[1])
+
+    page.keyboard.press("Enter")
+    page.keyboard.press("Shift+ArrowRight")
+    box = dialog.locator("svg").bounding_box()
+    page.mouse.move(box["x"] + 50, box["y"] + 50)
+    was = radius()
+    page.mouse.wheel(0, -100)
+    tab.until(f"!document.querySelector('dialog.labels [role=status]').textContent.includes('radius {was}')")
+    page.keyboard.press("n")
+    moved = saved("1 moved by hand", "accepted", "moved")
+    assert moved.x_px[1] == pytest.approx(before.x_px[1] + 5.0, abs=0.01)
+    assert moved.radius_px[1] == pytest.approx(before.radius_px[1] + 0.5, abs=0.01)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 90, box["y"] + 50)
+    page.mouse.up()
+    page.keyboard.press("p")
+    page.keyboard.press("x")
+    dragged = saved("1 moved by hand", "accepted", "moved", "detected")
+    assert dragged.x_px[1] > before.x_px[2] + 1 and dragged.ball.size == before.ball.size - 1
+    for _ in range(6):  # key and wheel are one change or two, as the machine is fast or slow
+        page.keyboard.press("Control+z")
+    back = saved("0 accepted, 0 moved", "detected", "detected")
+    assert back.x_px == pytest.approx(before.x_px, abs=1e-3) and back.ball.size == before.ball.size
+    page.keyboard.press("Escape")
+    dialog.wait_for(state="hidden")
+    assert tab.errors == []
+    page.context.close()
