@@ -17,6 +17,7 @@ from spinscope.pipeline.live_spins import Answers, LiveSpins, SpinRun, _EndedSho
 from spinscope.pipeline.results import SpinEstimate
 from spinscope.pipeline.session import Session
 from spinscope.pipeline.spin_so_far import SpinsInFlight, SpinSoFar
+from spinscope.pipeline.tick import Tick
 
 QUICK = "triplet"
 

@@ -17,7 +17,7 @@ from spinscope.app.viewer.entities import COMPARED_AXES, OFF, ON, SURFACE_DIFFER
 from spinscope.app.viewer.rrd import layout_bytes, rrd_bytes
 from spinscope.app.viewer.run import ViewedRun, shown_estimate, vector_of
 from spinscope.app.viewer.views import views
-from spinscope.pipeline.chain import Tick
+from spinscope.pipeline.tick import Tick
 
 from .conftest import with_results
 from .reading import Rows, read_back
