@@ -26,7 +26,7 @@ from .errors import CameraError, ParameterError
 from .event_source import EventsInMemory
 from .events import EventBatch
 from .live_outputs import LiveBall, LiveNotice, LiveOutput, LiveStatus
-from .live_spins import SWITCH_S, SpinRun, Stretch, TrackedTick, load_stages
+from .live_spins import SWITCH_S, SegmentStart, SpinRun, TrackedTick, load_stages
 from .recordings import RawWriter
 from .recordings.in_memory import RecordingInMemory
 from .registry import STAGES, Parameters
@@ -206,7 +206,7 @@ class LiveRun:
     def _track_segment(self, coming: _Ticks) -> None:
         """Track the ticks up to the next gap. The stages' memory is there before the first one comes."""
         at_work, chain, parameters = deque[ArrivedTick](), self._new_chain(), self.parameters
-        self._spins.put(Stretch(parameters))
+        self._spins.put(SegmentStart(parameters))
 
         def packets() -> Iterator[Packet]:
             for one in coming.segment(lambda: self.parameters is not parameters):

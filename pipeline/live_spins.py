@@ -48,8 +48,8 @@ class SpinRun(NamedTuple):
     height_px: int
 
 
-class Stretch(NamedTuple):
-    """Beginning of a stretch of ticks without gaps, with these parameters; the one before has ended."""
+class SegmentStart(NamedTuple):
+    """Beginning of a segment, ticks without gaps, with these parameters; the one before has ended."""
 
     parameters: Parameters
 
@@ -77,7 +77,7 @@ class Numbered(NamedTuple):
     """Message to the process, with its number in the run; None ends the run."""
 
     number: int
-    message: Stretch | TrackedTick | None
+    message: SegmentStart | TrackedTick | None
 
 
 class Answers(NamedTuple):
@@ -131,7 +131,7 @@ class _Ticks:
     @property
     def parameters(self) -> Parameters:
         """Values of all stages."""
-        assert isinstance(self.begin.message, Stretch)
+        assert isinstance(self.begin.message, SegmentStart)
         return self.begin.message.parameters
 
     def __iter__(self) -> Iterator[tuple[int, TrackedTick]]:

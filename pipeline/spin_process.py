@@ -16,7 +16,7 @@ from .cameras.clock import now_s
 from .child_process import ChildProcess, IdleProcesses
 from .errors import SpinscopeError
 from .live_outputs import LiveNotice, LiveOutput, LiveShot, LiveSpin
-from .live_spins import Answers, Numbered, SpinRun, Stretch, TrackedTick, serve
+from .live_spins import Answers, Numbered, SegmentStart, SpinRun, TrackedTick, serve
 
 # Ticks with a ball that wait for their spins, at the most; then the tracker waits, too: 3 s of flight at 200 Hz, which
 # at 5 Mev/s is some 600 MB. Ticks without a ball are next to nothing.
@@ -92,7 +92,7 @@ class SpinProcess:
         for thread in self._threads:
             thread.start()
 
-    def put(self, message: Stretch | TrackedTick | None) -> None:
+    def put(self, message: SegmentStart | TrackedTick | None) -> None:
         """Hand over a message, as soon as there is room for it; None ends the run."""
         with self._changed:
             self._changed.wait_for(lambda: self._flying < MOST_FLYING or self._is_over)
@@ -211,7 +211,7 @@ class SpinProcess:
         """Keep the messages no longer that come before one, the end of the run excepted."""
         while self._kept and self._kept[0].number < number and self._kept[0].message is not None:
             one = self._kept.popleft()
-            if isinstance(one.message, Stretch):
+            if isinstance(one.message, SegmentStart):
                 self._stretch = one
         self._given = {key for key in self._given if key[0] >= number}
 
@@ -223,5 +223,5 @@ def _key(number: int, output: LiveSpin | LiveShot) -> _Key:
     return number, "spin", output.shot, output.ended_by is not None
 
 
-def _has_ball(message: Stretch | TrackedTick | None) -> bool:
+def _has_ball(message: SegmentStart | TrackedTick | None) -> bool:
     return isinstance(message, TrackedTick) and message.tick.track.has_ball

@@ -61,7 +61,7 @@ def note_with_a(run: ViewedRun, text: str) -> list[Chunk]:
 
 
 def difference_chunks(a: ViewedRun, b: ViewedRun) -> list[Chunk]:
-    """What differs between the runs: surfaces around B's ball, and the axes of the shown spins on a unit sphere."""
+    """Differences between the runs: surfaces around B's ball, and the axes of the shown spins on a unit sphere."""
     return [*_surface_difference(a, b), *_axes(a, b)]
 
 
