@@ -155,7 +155,7 @@ class IdleProcesses(Generic[Kept]):
 
 
 def pipes_to_parent() -> tuple[BinaryIO, BinaryIO]:
-    """What the parent sends and where it takes answers, in a child process; prints then go nowhere.
+    """Pipe of the parent's requests and pipe of the answers, in a child process; prints then go nowhere.
 
     Ctrl-C is the parent's, who then ends the process.
     """
