@@ -141,7 +141,7 @@ class _Ticks:
         self.end = one
 
     def came_s(self, end_us: int) -> float:
-        """When the last events before a time of these ticks came."""
+        """Arrival of the last events before a time of these ticks."""
         return next((last_s for upto_us, last_s in self._arrivals if upto_us >= end_us), self._arrivals[-1][1])
 
 
