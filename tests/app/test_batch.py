@@ -107,7 +107,8 @@ def test_a_folder_of_everything_becomes_one_table(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", ["csv", "jsonl", "parquet"])
-def test_all_formats_hold_the_same(folder: Path, suffix: str) -> None:
+def test_all_formats_hold_the_same(folder: Path, suffix: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("spinscope.app.table_files.ROWS_TOGETHER", 7)
     analyze(["in"], f"out.{suffix}", series=f"ticks.{suffix}")
     if suffix == "parquet":
         table = parquet.read_table("out.parquet")
