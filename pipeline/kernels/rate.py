@@ -164,7 +164,8 @@ def lag_sums(rows: Floats) -> tuple[Floats, Floats, float]:
     sums = np.fft.irfft(np.sum(spectrum.real**2 + spectrum.imag**2, axis=1), 2 * n)[:n]
     energies = np.sum(rows**2, axis=1)
     bounds = np.sqrt(np.cumsum(energies)[::-1] * np.cumsum(energies[::-1])[::-1])
-    squares = float(np.sum((rows.T @ rows) ** 2))  # a quarter of einsum's time; so small a product starts no threads
+    # einsum, for the matrix product's threads would take longer to start than to compute.
+    squares = float(np.sum(np.einsum("ni,nj->ij", rows, rows) ** 2))
     near = np.sum(energies**2) + 2.0 * np.sum(np.sum(rows[1:] * rows[:-1], axis=1) ** 2)
     return sums, bounds, max(squares - float(near), 0.0) / max((n - 1) * (n - 2), 1)
 

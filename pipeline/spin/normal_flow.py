@@ -134,8 +134,8 @@ class NormalFlowSpin:
 
     def estimate(self, end_us: int, logo: LogoResult, flow: FlowResult, rate: RateResult) -> SpinEstimate:
         """The estimate at the end of a tick."""
-        came = self._add(logo, flow)
-        went = self._forget(end_us - self.parameters.window_us)
+        self._add(logo, flow)
+        self._forget(end_us - self.parameters.window_us)
         count, deep = len(self.seen), int(self.seen.deep.sum())
         if count < FEWEST_EVENTS:
             return self._refused(f"the logo is hardly seen: {count} events, {FEWEST_EVENTS} are needed")
@@ -143,8 +143,7 @@ class NormalFlowSpin:
             return self._refused(f"the logo is hardly seen: {deep} events off the rim, {FEWEST_DEEP} are needed")
         if len(self.planes) < FEWEST_PLANES:
             return self._refused(f"{len(self.planes)} events with normal flow, {FEWEST_PLANES} are needed")
-        if self.last is None or came or went:
-            self.last = self._fit()
+        self.last = self._fit()
         if self.last is None:
             return self._refused("the normal flow agrees on no spin")
         return self._judged(self.last, rate)
@@ -153,8 +152,8 @@ class NormalFlowSpin:
         self.last = None
         return SpinEstimate.refused("normal_flow", reason, len(self.seen))
 
-    def _add(self, logo: LogoResult, flow: FlowResult) -> bool:
-        """Take in the tick's events, less those that may be the outline's; whether there are any."""
+    def _add(self, logo: LogoResult, flow: FlowResult) -> None:
+        """Take in the tick's events, less those that may be the outline's."""
         own = ~logo.of_outline
         normals, points = logo.normals[own], logo.points_m[own]
         away = points - self.context.ball_radius_m * normals
@@ -169,17 +168,12 @@ class NormalFlowSpin:
         self.planes = _Planes.concatenate([self.planes, planes])
         tick = [logo.radius_px, logo.position_std_px, logo.radius_std_px, logo.velocity_std_px_s]
         self.tracks = np.concatenate([self.tracks, [tick]])
-        return len(seen) > 0 or len(planes) > 0
 
-    def _forget(self, before_us: int) -> bool:
-        """Drop what is older; whether there is any."""
-        old_seen = len(self.seen) > 0 and self.seen.t_us[0] < before_us
-        old_planes = len(self.planes) > 0 and self.planes.t_us[0] < before_us
-        if old_seen:
+    def _forget(self, before_us: int) -> None:
+        if len(self.seen) and self.seen.t_us[0] < before_us:
             self.seen = self.seen.between(before_us, math.inf)
-        if old_planes:
+        if len(self.planes) and self.planes.t_us[0] < before_us:
             self.planes = self.planes[self.planes.t_us >= before_us]
-        return bool(old_seen or old_planes)
 
     def _fit(self) -> _Fit | None:
         """The best spin: last tick's brought up to date if that is good, else the best of all starts.

@@ -32,8 +32,6 @@ from .trust import RETURNED_TURNS, change_doubt, doubt, judged, misses_rhythm, s
 # followed, which costs a tenth.
 STAGES_US = (5000, 10_000, 20_000, 50_000)
 LATER = 1.5
-# An answer waits with it for new events, so large a share of those of the last full estimate: the same say the same.
-NEWS = 0.1
 # After a refusal it is worth trying again with so many more events.
 MORE = 1.5
 # A search over all spins is repeated with so many times the events of the last one.
@@ -61,10 +59,6 @@ class ContrastState:
         Age of the shot, us, at which the next full estimate is due.
     tried, searched : int
         Number of events at the last full estimate and at the last search over all spins.
-    news : int
-        Number of events taken since the last full estimate.
-    is_stale : bool
-        Whether events came or went since the last answer.
     scanned_turns, followed_contrast : float
         Turns that the last alias scan saw, and the best contrast of following since the last full estimate.
     changes : bool
@@ -78,8 +72,6 @@ class ContrastState:
     full_us: float = STAGES_US[0]
     tried: int = 0
     searched: int = 0
-    news: int = 0
-    is_stale: bool = False
     scanned_turns: float = 0.0
     followed_contrast: float = 0.0
     answer: ContrastEstimate | None = None
@@ -122,7 +114,7 @@ def step(
         min_events=parameters.fewest_events,
     )
     events = _joined(state)
-    if not full and state.answer is not None and state.reason is None and state.is_stale:
+    if not full and state.answer is not None and state.reason is None:
         state.answer = follow_spin(events, _uncertainty(state.ball_stds), settings, state.answer)
         state.reason = doubt(parameters, state.answer)
         full = state.answer.contrast < LOST * state.followed_contrast
@@ -131,9 +123,8 @@ def step(
         state.followed_contrast = max(state.followed_contrast, state.answer.contrast)
     if full:
         _estimate(parameters, state, events, settings, rate.period_spins_rps, normal_flow.estimate)
-        state.tried, state.news, state.followed_contrast = count, 0, 0.0
+        state.tried, state.followed_contrast = count, 0.0
         state.score_map = score_map(events, state.answer, settings) if parameters.curves else ScoreMap.empty()
-    state.is_stale = False
     return _result(parameters, state, count, full, rate, normal_flow.estimate)
 
 
@@ -156,12 +147,9 @@ def take(
         np.full(len(turning), logo.radius_px),
     )
     state.parts.append((packet.end_us, part))
-    state.news += len(part)
-    state.is_stale = state.is_stale or len(part) > 0
     speed_px_s = math.hypot(ball.mean[2], ball.mean[3])
     state.ball_stds.append((logo.position_std_px, logo.radius_std_px, logo.velocity_std_px_s, speed_px_s))
     while state.parts[0][0] <= packet.end_us - parameters.window_us:
-        state.is_stale = state.is_stale or len(state.parts[0][1]) > 0
         del state.parts[0], state.ball_stds[0]
     return packet.end_us - state.start_us
 
@@ -185,11 +173,11 @@ def _uncertainty(ball_stds: Sequence[tuple[float, float, float, float]]) -> Ball
 
 def _due(state: ContrastState, age_us: int, count: int) -> bool:
     """Whether a full estimate is due: by the shot's age, or after a refusal as soon as there is much more to see."""
-    refused = state.answer is None or state.reason is not None
-    if age_us >= state.full_us and (refused or state.news >= NEWS * state.tried):
+    if age_us >= state.full_us:
         later = [stage for stage in STAGES_US if stage > age_us]
         state.full_us = later[0] if later else LATER * age_us
         return True
+    refused = state.answer is None or state.reason is not None
     return refused and count >= MORE * state.tried
 
 

@@ -90,15 +90,6 @@ def test_each_tick_says_what_is_known_so_far(case: str) -> None:
             assert off_deg < 4 and abs(off_rps) < 4
 
 
-def test_ticks_without_events_leave_the_normal_flow_as_it_is() -> None:
-    events, motion = events_of("top, in place"), CASES["top, in place"][2]
-    until_us = int(events.t_us[-1]) + 15_000
-    ticks = [(packet, known_track(packet.end_us, **motion)) for packet in packets(events, until_us=until_us)]
-    results = after_track(ticks, parameters=SpinParameters(magnitude_from="flow"))
-    before, after = (result[3]["normal_flow"].vector_rps for result in results[-2:])
-    np.testing.assert_array_equal(before, after)
-
-
 def mirrored(events: EventBatch) -> EventBatch:
     """Left and right exchanged about the middle of the image."""
     return EventBatch(events.t_us.copy(), (1279 - events.x_px).astype(np.uint16), events.y_px.copy(), events.on.copy())
