@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -29,13 +30,19 @@ def session(request: pytest.FixtureRequest) -> Session:
 
 
 def live(session: Session, killed_at_us: int | None = None) -> list[LiveOutput]:
-    """Outputs of a run whose process is killed when a tick has been tracked."""
-    recording = session.recording
+    """Outputs of a run whose process is killed when a tick has been tracked and a spin was told."""
+    recording, has_told = session.recording, threading.Event()
     camera = ReplayCamera(recording.chunks, recording.width_px, recording.height_px, speed=float("inf"))  # type: ignore[union-attr]
 
     def on_tick(arrived: ArrivedTick, tick: Tick, latency_ms: float) -> None:
         if arrived.packet.end_us == killed_at_us:
+            assert has_told.wait(60.0)
             run._spins._process.kill()
+
+    def put(output: LiveOutput | BaseException | None) -> None:
+        if isinstance(output, LiveSpin):
+            has_told.set()
+        run._outputs.put(output)
 
     run = LiveRun(
         lambda tick_us, on_notice: EventStream(camera, tick_us, on_notice=on_notice),
@@ -44,6 +51,7 @@ def live(session: Session, killed_at_us: int | None = None) -> list[LiveOutput]:
         with_balls=True,
         on_tick=on_tick,
     )
+    run._spins._put = put
     return list(run.outputs())
 
 

@@ -180,6 +180,12 @@ FORMATS = [
         "tests/pipeline/test_isolation.py",
     ),
     Mutant(
+        "pipeline/spin_process.py",
+        "not in self._given:",
+        "is not None:",
+        "tests/pipeline/test_spin_process.py -k killed",
+    ),
+    Mutant(
         "pipeline/recording_folders.py",
         "these = [path for path in below if path.absolute() not in not_these]",
         "these = list(below)",
