@@ -62,11 +62,10 @@ def _acceleration_m_s2(points: list[PathPoint], camera: Camera, ball_radius_m: f
     least_px = np.hypot([EDGE_STD_PX, EDGE_STD_PX, RADIUS_STD_PX], [shake_px, shake_px, 0.0])
     noise_px = np.maximum(least_px, (circles - design @ np.stack([bend, slope, circle])).std(axis=0))
     bend_std = np.sqrt(np.linalg.inv(design.T @ design)[0, 0]) * noise_px
-
-    def by_bend(bent: Floats) -> Floats:
-        ends = np.stack([circle + bent - slope, circle, circle + bent + slope])
-        start, centre, end = camera.ball_centre_m(ends[:, 0], ends[:, 1], ends[:, 2], ball_radius_m)
-        return np.asarray((start - 2 * centre + end) / half**2)
-
-    acceleration = by_bend(bend)
-    return acceleration, np.stack([by_bend(bend + step) - acceleration for step in np.diag(bend_std)])
+    # The bend as it is, and with each of its errors: one call of the camera takes two thirds of the time of four.
+    bends = bend + np.vstack([np.zeros(3), np.diag(bend_std)])
+    ends = circle + np.stack([bends - slope, np.zeros_like(bends), bends + slope])
+    places_m = camera.ball_centre_m(ends[..., 0].ravel(), ends[..., 1].ravel(), ends[..., 2].ravel(), ball_radius_m)
+    start, centre, end = places_m.reshape(3, 4, 3)
+    accelerations = (start - 2 * centre + end) / half**2
+    return accelerations[0], accelerations[1:] - accelerations[0]
