@@ -53,9 +53,10 @@ def encode_video(pictures: Iterable[bytes], source: Sequence[str], path: Path) -
                 for picture in pictures:
                     process.stdin.write(picture)
                 process.stdin.close()
+                said = process.stderr.read().decode(errors="replace")
             except BrokenPipeError:
-                pass  # the encoder says why
-            said = process.stderr.read().decode(errors="replace")
-            limit.cancel()
+                said = process.stderr.read().decode(errors="replace")  # the encoder says why
+            finally:
+                limit.cancel()
         if process.returncode:
             raise RecordingError(f"the video cannot be written ({' '.join(said.split())[:200]}): {path}")

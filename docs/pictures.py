@@ -27,7 +27,8 @@ def shown(page: Any) -> None:
 def swept(page: Any) -> None:
     """Have the pad swept."""
     shown(page)
-    page.locator("#side details[data-title='Parameter sweep'] > summary").click()
+    for title in ("Result", "Parameter sweep"):  # the one closed, the other opened
+        page.locator(f"#side details[data-title='{title}'] > summary").click()
     panel = page.locator("#side details[data-title='Parameter sweep']")
     panel.locator("button.primary").click()
     panel.locator(".chart .point").first.wait_for()
@@ -61,7 +62,7 @@ PICTURES = {
     "viewer_all_stages": PagePicture(("view",), "t=60000", 1920, 1080, shown),
     "viewer_spin": PagePicture(("view", "--layout", "spin"), "t=90000", 1920, 1080, shown),
     "tuner": PagePicture(("tune",), "t=60000&tab=Tracker", 1600, 1000, swept),
-    "tuner_coach": PagePicture(("tune",), "t=90000&tab=Coach", 1280, 720, alone),
+    "tuner_coach": PagePicture(("tune",), "t=60000&tab=Coach", 1280, 720, alone),
     "coach_shot": PagePicture(("coach",), "shot/28", 1280, 800, turning),
 }
 DEFAULT = str(DOCS.parent / "sample_recordings/flight_fast_top.h5")

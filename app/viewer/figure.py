@@ -12,9 +12,9 @@ from .curves import Curve, Plot
 from .entities import Colour
 from .run import ViewedRun
 
+STATE = ("x", "y", "radius")
 PANELS = (
-    *plots.STATE_PLOTS[:2],
-    plots.STATE_PLOTS[4],
+    *(plot for plot, component in zip(plots.STATE_PLOTS, plots.STATE, strict=True) if component.name in STATE),
     plots.MAGNITUDE_PLOT,
     plots.COMPONENT_PLOT,
     plots.AXIS_ERROR_PLOT,
