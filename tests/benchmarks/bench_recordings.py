@@ -37,8 +37,7 @@ def scene(n: int) -> EventBatch:
 def best_seconds(run: Callable[[], Any], times: int = 3, clock: Callable[[], float] = time.process_time) -> float:
     """Seconds of the fastest of several runs.
 
-    Processor time, for which other work on the machine does not count; time.perf_counter where threads or processes
-    work side by side.
+    Processor time, for which other work on the machine does not count; time.perf_counter where another process reads.
     """
     seconds = []
     for _ in range(times):
@@ -160,10 +159,7 @@ def test_summary_against_reading_alone(benchmark: Any, tmp_path: Path) -> None:
     recording = open_recording(path)
     recording.scan()
     benchmark.pedantic(lambda: summary(recording), rounds=3)
-    seconds, reading_seconds = (
-        best_seconds(run, 7, time.perf_counter) for run in (lambda: summary(recording), recording.read)
-    )
-    say("summary of EVT3", seconds, "reading", reading_seconds)
+    say("summary of EVT3", best_seconds(lambda: summary(recording), 7), "reading", best_seconds(recording.read, 7))
 
 
 def test_seeking_in_an_indexed_file(tmp_path: Path) -> None:
