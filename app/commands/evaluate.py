@@ -89,6 +89,7 @@ def evaluate(
     events on simulated balls with their true spin.
     """
     from spinscope.pipeline.evaluation import SceneChoices
+    from spinscope.pipeline.evaluation.suite import check_choices
     from spinscope.pipeline.session import Choices
 
     from .. import evaluate as running
@@ -111,6 +112,8 @@ def evaluate(
         raise click.UsageError("name a suite: `spinscope evaluate --list` lists them")
     if real is not None and quick:
         raise click.UsageError("--quick thins simulated suites: leave it out with --real")
+    for suite in suites:
+        check_choices(suite, choices, scene, is_real=real is not None)
     done, pictures = [], []
     for suite in suites:
         with ProgressBar() as bar:

@@ -1,4 +1,4 @@
-"""Frames of a real frame camera: a folder of pictures that are named by their time."""
+"""Frames of a real frame camera: a folder with pictures that are named by their time, or with a video."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from ..camera import Camera, CameraParameters
 from ..errors import ParameterError, RecordingError
 from ..pictures import grey_picture
 from ..toml import toml_tables
+from . import frame_video
 from .frame_camera import Frame
 
 Floats = NDArray[np.float64]
@@ -48,24 +49,18 @@ class FrameFolder:
 
     @classmethod
     def read(cls, folder: Path) -> FrameFolder:
-        """The frames of a folder of pictures `TIME.png`, TIME in microseconds or nanoseconds; raises RecordingError."""
-        named = {path: path.stem for path in sorted(folder.glob("*")) if path.suffix.lower() in SUFFIXES}
-        wrong = [path.name for path, stem in named.items() if not stem.isdecimal()]
-        if wrong:
+        """The frames of a folder; raises RecordingError.
+
+        It holds pictures `TIME.png`, TIME in microseconds or nanoseconds, or one video, see `read_video`.
+        """
+        videos = [path for path in sorted(folder.glob("*")) if path.suffix.lower() in frame_video.SUFFIXES]
+        if len(videos) > 1:
+            raise RecordingError(f"{len(videos)} videos are of one flight, keep one of them: {folder}")
+        times_us, pictures = frame_video.read_video(videos[0]) if videos else _named_pictures(folder)
+        if len(pictures) < LEAST_FRAMES:
             raise RecordingError(
-                f"pictures are named by their time in whole microseconds or nanoseconds, {wrong[0]} is not: {folder}"
+                f"{len(pictures)} pictures of a flight are too few, give {LEAST_FRAMES} or more: {folder}"
             )
-        if len(named) < LEAST_FRAMES:
-            raise RecordingError(
-                f"{len(named)} pictures of a flight are too few, give {LEAST_FRAMES} or more: {folder}"
-            )
-        paths = sorted(named, key=lambda path: int(path.stem))
-        times = np.array([int(path.stem) for path in paths], np.float64)
-        step = float(np.median(np.diff(times)))
-        if step <= 0:
-            raise RecordingError(f"two pictures have the same time: {folder}")
-        step_us = step / 1000.0 if step > SLOWEST_STEP_US else step
-        pictures = [grey_picture(path) for path in paths]
         if len({picture.shape for picture in pictures}) > 1:
             raise RecordingError(f"the pictures are not all of one size: {folder}")
         white = max(1.0, *(float(np.quantile(picture, WHITE_SHARE)) for picture in pictures))
@@ -73,11 +68,27 @@ class FrameFolder:
         background = np.partition(np.array(pictures), middle, axis=0)[middle] / white  # the median, in a byte a pixel
         found = [
             frame
-            for time, picture in zip((times - times[0]) * step_us / step * 1e-6, pictures, strict=True)
-            if (frame := _around_ball(float(time), picture / white, background)) is not None
+            for time_us, picture in zip(times_us - times_us[0], pictures, strict=True)
+            if (frame := _around_ball(float(time_us) * 1e-6, picture / white, background)) is not None
         ]
         height, width = pictures[0].shape
-        return cls(found, 1e6 / step_us, (width, height))
+        return cls(found, 1e6 / float(np.median(np.diff(times_us))), (width, height))
+
+
+def _named_pictures(folder: Path) -> tuple[Floats, list[NDArray[np.uint8]]]:
+    """Times (n,), us, and pictures of a folder in order of time."""
+    named = {path: path.stem for path in sorted(folder.glob("*")) if path.suffix.lower() in SUFFIXES}
+    wrong = [path.name for path, stem in named.items() if not stem.isdecimal()]
+    if wrong:
+        raise RecordingError(
+            f"pictures are named by their time in whole microseconds or nanoseconds, {wrong[0]} is not: {folder}"
+        )
+    paths = sorted(named, key=lambda path: int(path.stem))
+    times = np.array([int(path.stem) for path in paths], np.float64)
+    step = float(np.median(np.diff(times))) if times.size > 1 else 1.0
+    if step <= 0:
+        raise RecordingError(f"two pictures have the same time: {folder}")
+    return times / (1000.0 if step > SLOWEST_STEP_US else 1.0), [grey_picture(path) for path in paths]
 
 
 def _around_ball(t_s: float, image: Floats, background: Floats) -> Frame | None:

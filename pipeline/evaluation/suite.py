@@ -13,6 +13,7 @@ from ..errors import ParameterError, SpinscopeError
 from ..extensions import Registry
 from ..recordings import is_recording
 from ..recordings.recording import file_identity
+from ..session import Choices
 from .lab_recordings import LabFolder, LabRecording, recordings_table
 from .plots import Figures
 from .tables import ResultTable, Row
@@ -35,6 +36,8 @@ class Suite:
         Whether the tasks measure run times, so that they run one by one in this process.
     takes_scene_choices : bool
         Whether another ball or lens can be chosen for the scenes.
+    takes_rivals : bool
+        Whether it compares spin methods, so that those of other publications can be added.
     real_kinds : tuple of str
         Kinds of real recordings that the suite runs on; empty where it runs on simulated ones only.
     real : callable or None
@@ -50,6 +53,7 @@ class Suite:
     figures: Callable[[Sequence[Row]], Figures]
     timed: bool = False
     takes_scene_choices: bool = False
+    takes_rivals: bool = False
     real_kinds: tuple[str, ...] = ()
     real: Callable[[TaskContext, LabRecording], list[Row]] | None = None
 
@@ -87,6 +91,20 @@ class Report:
         }
 
 
+def check_choices(name: str, choices: Choices, scene: SceneChoices, *, is_real: bool) -> Suite:
+    """The registered suite of this name; raises ParameterError for an unknown one, and for what it does not take."""
+    suite = SUITES[name]
+    if is_real and suite.real is None:
+        able = ", ".join(one.name for one in SUITES if one.real)
+        raise ParameterError(f"the suite {name} runs on simulated recordings only: real ones are for {able}")
+    if not is_real and scene != SceneChoices() and not suite.takes_scene_choices:
+        raise ParameterError(f"the suite {name} has balls and lenses of its own: leave --ball and --lens-mm out")
+    if choices.rivals and not suite.takes_rivals:
+        able = ", ".join(one.name for one in SUITES if one.takes_rivals)
+        raise ParameterError(f"the suite {name} compares no spin methods: leave --rival out, or run it with {able}")
+    return suite
+
+
 def evaluate(
     name: str,
     context: TaskContext,
@@ -111,11 +129,9 @@ def evaluate(
     Raises
     ------
     SpinscopeError
-        For an unknown suite, or a cache that cannot be written.
+        As of `check_choices`, or for a cache that cannot be written.
     """
-    suite = SUITES[name]
-    if context.scene != SceneChoices() and not suite.takes_scene_choices:
-        raise ParameterError(f"the suite {name} has balls and lenses of its own: leave --ball and --lens-mm out")
+    suite = check_choices(name, context.choices, context.scene, is_real=False)
     rows = run(suite.tasks(quick), context, None if suite.timed else parallel, on_progress)
     return Report(suite, quick, rows, suite.tables(rows))
 
@@ -143,12 +159,9 @@ def evaluate_real(
     Raises
     ------
     SpinscopeError
-        For an unknown suite, one of simulated recordings only, or a folder without recordings.
+        As of `check_choices`, or for a folder without recordings.
     """
-    suite = SUITES[name]
-    if suite.real is None:
-        able = ", ".join(one.name for one in SUITES if one.real)
-        raise ParameterError(f"the suite {name} runs on simulated recordings only: real ones are for {able}")
+    suite = check_choices(name, context.choices, context.scene, is_real=True)
     found = LabFolder.of(folder, context.choices, context.scene.ball)
     beside = {one: digest(_beside(one)) for one in {recording.path.parent for recording in found.recordings}}
     tasks = [

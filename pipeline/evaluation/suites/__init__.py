@@ -18,6 +18,7 @@ for _found in iter_modules(__path__):
             figures=_module.figures,
             timed=getattr(_module, "TIMED", False),
             takes_scene_choices=getattr(_module, "TAKES_SCENE_CHOICES", False),
+            takes_rivals=getattr(_module, "TAKES_RIVALS", False),
             real_kinds=getattr(_module, "REAL_KINDS", ()),
             real=getattr(_module, "real", None),
         )

@@ -43,6 +43,8 @@ from ..uncertainty_calibration import (
 LABEL = "Flights and their witnesses"
 HELP = "Flights with visible, rim and hidden logos, people's shots and weak sensors; what each method says of them."
 
+TAKES_RIVALS = True
+
 CHOICE_SEED, SEED = 76_000, 237_689
 SEEDS = 8  # flights of each class
 VISIBLE = 60  # logo events of a flight that shows its logo at all

@@ -24,6 +24,8 @@ from . import thrower
 LABEL = "Frame camera against event camera: the paper's table 2"
 HELP = "A frame camera beside the event camera on the same flights (table 2)."
 
+TAKES_RIVALS = True
+
 REAL_KINDS = (FLIGHT,)
 
 STEREO = "stereo.toml"  # of `spinscope calibrate stereo`
@@ -55,14 +57,14 @@ def measure(context: TaskContext, velocity: int, spin: int, side: bool, seed: in
 
 
 def real(context: TaskContext, recording: LabRecording) -> list[Row]:
-    """The same of a real flight, of which pictures lie in the folder `NAME.frames` beside `NAME.raw`.
+    """The same of a real flight, of which pictures or a video lie in the folder `NAME.frames` beside `NAME.raw`.
 
     `stereo.toml` there or beside the recording tells of the frame camera; `logo.png` beside the recording is the
     ball's logo, the simulator's where it is absent.
     """
     folder = recording.path.with_suffix(".frames")
     if not folder.is_dir():
-        raise RecordingError(f"no pictures of the frame camera: put them, named by time, in the folder {folder.name}")
+        raise RecordingError(f"no pictures of the frame camera: put them, named by time, or a video into {folder.name}")
     rows = thrower.real(context, recording)
     truth, session = recording.stated, recording.session
     read = FrameFolder.read(folder)

@@ -18,6 +18,8 @@ from ..uncertainty_calibration import ERRORS
 LABEL = "Sample recordings of an independent simulator"
 HELP = "Every method, and the paper's with its own preset, on the sample recordings."
 
+TAKES_RIVALS = True
+
 SPINNER = "spinner"  # begins the names of a ball spinner's samples
 QUICK = ("flight_back.h5",)
 

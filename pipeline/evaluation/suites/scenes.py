@@ -23,6 +23,8 @@ from ..uncertainty_calibration import ERRORS, FLIGHT_NOTE, RIGHT_NOTE, calibrati
 LABEL = "Real scenes"
 HELP = "Every flight in scenes like a lab's or a club's: backgrounds, clutter, bounces, several balls, sensors."
 
+TAKES_RIVALS = True
+
 CHOICE_SEED, SEED = 75_000, 621_237
 SEEDS = 2  # scenes of each kind
 QUICK = ("davis346", "bounce", "crossing")

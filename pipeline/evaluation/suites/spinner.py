@@ -24,6 +24,7 @@ LABEL = "Ball spinner: the paper's table 1"
 HELP = "Spin of a mounted ball: 7 logos, 10 to 100 rps, windows of 10 and 100 ms (table 1)."
 
 TAKES_SCENE_CHOICES = True
+TAKES_RIVALS = True
 REAL_KINDS = (SPINNER,)
 
 SEED = 284_876  # of this suite alone

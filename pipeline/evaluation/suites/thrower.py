@@ -27,6 +27,7 @@ LABEL = "Ball thrower: the paper's table 2"
 HELP = "Spin of flying balls: the thrower's settings and shots as people play them (table 2)."
 
 TAKES_SCENE_CHOICES = True
+TAKES_RIVALS = True
 REAL_KINDS = (FLIGHT,)
 
 SEED = 360_550  # of this suite alone

@@ -44,6 +44,47 @@ def test_frames_are_cut_around_the_ball(tmp_path: Path, unit: int) -> None:
         assert frame.background == pytest.approx(40 / 240)
 
 
+def video(folder: Path, rate_hz: float) -> Path:
+    """Eight pictures of a disc, as a video in the folder."""
+    disc_pictures(folder, [f"{number}.png" for number in range(8)])
+    path = folder / "flight.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), rate_hz, SIZE)
+    for number in range(8):
+        picture = cv2.imread(str(folder / f"{number}.png"))
+        assert picture is not None
+        writer.write(picture)
+        (folder / f"{number}.png").unlink()
+    writer.release()
+    return path
+
+
+def test_a_video_has_the_frames_of_its_pictures(tmp_path: Path) -> None:
+    video(tmp_path, 400.0)
+    read = FrameFolder.read(tmp_path)
+    assert read.rate_hz == pytest.approx(400.0) and read.size_px == SIZE
+    assert [frame.t_s for frame in read.frames] == pytest.approx([0.0025 * number for number in range(1, 7)])
+    y, x = np.nonzero(read.frames[2].image > 0.5)
+    assert (x.mean() + read.frames[2].x0_px, y.mean() + read.frames[2].y0_px) == pytest.approx((140, 100), abs=0.2)
+    (tmp_path / "times.csv").write_text("t_us\n" + "\n".join(str(5000 + 1000 * number) for number in range(8)))
+    assert FrameFolder.read(tmp_path).rate_hz == pytest.approx(1000.0)
+
+
+def test_a_video_without_times_is_refused_in_words(tmp_path: Path) -> None:
+    path = video(tmp_path, 30.0)
+    with pytest.raises(RecordingError, match=r"states 30 frames a second, which is that of a playback; put times\.csv"):
+        FrameFolder.read(tmp_path)
+    for text, words in [("t_us\n1\n2", "2 times are stated of the 8 pictures"), ("t_s\n1", "a column t_us")]:
+        (tmp_path / "times.csv").write_text(text)
+        with pytest.raises(RecordingError, match=words):
+            FrameFolder.read(tmp_path)
+    (tmp_path / "times.csv").write_text("t_us\n" + "\n".join("11111111"))
+    with pytest.raises(RecordingError, match="grow from row to row"):
+        FrameFolder.read(tmp_path)
+    path.write_bytes(b"RIFF" + bytes(100))
+    with pytest.raises(RecordingError, match="no video, or a damaged one"):
+        FrameFolder.read(tmp_path)
+
+
 @pytest.mark.parametrize(
     ("names", "words"),
     [

@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tomli_w
+from click.testing import CliRunner
 
+from spinscope.app.cli import cli
 from spinscope.app.evaluate import check_folder, evaluate_suite, write_page
 from spinscope.pipeline.api import estimate
 from spinscope.pipeline.biases import PAPER, write_biases
@@ -245,3 +247,14 @@ def test_folders_and_suites_that_do_not_go(tmp_path: Path) -> None:
         evaluate_real("spinner", tmp_path / "none", TaskContext())
     with pytest.raises(ParameterError, match="simulated recordings only: real ones are for"):
         evaluate_real("scenes", tmp_path, TaskContext())
+
+
+def test_rivals_are_refused_by_every_suite_without_spin_methods_before_any_runs(tmp_path: Path) -> None:
+    able = {suite.name for suite in SUITES if suite.takes_rivals}
+    assert able == {"spinner", "thrower", "flights", "scenes", "frames", "samples"}
+    for name in set(SUITES.names) - able:
+        with pytest.raises(ParameterError, match="compares no spin methods: leave --rival out"):
+            evaluate(name, TaskContext(choices=Choices(rivals=("s_cmax",))), quick=True)
+    both = ["evaluate", "spinner", "detector", "--real", str(tmp_path), "--rival", "s_cmax"]
+    refused = CliRunner().invoke(cli, both)
+    assert isinstance(refused.exception, ParameterError) and "the suite detector" in str(refused.exception)
