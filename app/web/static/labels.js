@@ -38,7 +38,8 @@ export class Labels {
     this.connection = connection;
     this.recording = opening.recording;
     this.summary = element("p.note");
-    parent.append(this.summary, element("button", { onclick: () => this.#show() }, "Go through the labels"));
+    this.begin = element("button", { disabled: true, onclick: () => this.#show() }, "Go through the labels");
+    parent.append(this.summary, this.begin);
     this.actions = [
       { keys: ["Enter", "a"], shown: "Enter, a", label: "Accept", act: () => this.#accept() },
       { keys: ["A"], shown: "Shift+A", label: "Accept the rest of the flight", act: () => this.#acceptFlight() },
@@ -119,6 +120,7 @@ export class Labels {
     this.#moved = null;
     this.#history = [];
     this.dialog.title = path;
+    this.begin.disabled = false; // of a damaged file it stays
     this.#drawList();
     this.#select(this.#place);
   }
