@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -258,3 +260,16 @@ def test_rivals_are_refused_by_every_suite_without_spin_methods_before_any_runs(
     both = ["evaluate", "spinner", "detector", "--real", str(tmp_path), "--rival", "s_cmax"]
     refused = CliRunner().invoke(cli, both)
     assert isinstance(refused.exception, ParameterError) and "the suite detector" in str(refused.exception)
+
+
+def test_a_process_of_its_own_knows_the_suites(tmp_path: Path) -> None:
+    """Workers load the function of their task, and nothing else."""
+    path = tmp_path / "none.raw"  # its sidecar is missed before it is opened
+    arguments = {"suite": "spinner", "recording": "none.raw", "path": str(path), "content": []}
+    code = (
+        "from spinscope.pipeline.evaluation.suite import real_rows\n"
+        "from spinscope.pipeline.evaluation.tasks import TaskContext\n"
+        f"print(real_rows(TaskContext(), **{arguments!r})[0]['error'])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "no truth: state [truth]" in done.stdout
