@@ -29,7 +29,8 @@ export class Preview {
     this.words = element("figcaption");
     this.node = element("figure", { id: "preview", hidden: true }, titles, this.image, this.words);
     byId("middle").append(this.node);
-    connection.on("preview", (message) => message.serial === runner.serial && this.#show(message));
+    // Also one of an earlier request than the newest: while a slider is dragged the next one is on its way already.
+    connection.on("preview", (message) => this.#show(message));
     runner.addEventListener("shown", () => (this.node.hidden = true));
     runner.addEventListener("numbers", (event) => {
       const { state } = /** @type {CustomEvent} */ (event).detail;

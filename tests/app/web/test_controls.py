@@ -46,6 +46,33 @@ def test_every_group_of_sliders_changes_its_stages_and_nothing_above(bare: Tab) 
     assert bare.value("surface.cleaning") == "isolated"
 
 
+def test_previews_follow_a_slider_that_is_dragged_without_a_rest(bare: Tab) -> None:
+    bare.page.evaluate(
+        """(() => {
+            const slider = document.querySelector("[data-name='logo.pad_px'] input[type=range]");
+            const start = Number(slider.value);
+            let moves = 0;
+            window.previews = 0;
+            const watch = new MutationObserver(() => ++window.previews);
+            watch.observe(document.querySelector("#preview img"), { attributeFilter: ["src"] });
+            const move = () => {
+                slider.value = start + (++moves % 9) * slider.step;
+                slider.dispatchEvent(new Event("input", { bubbles: true }));
+            };
+            const drag = setInterval(move, 10);
+            window.letGo = () => {
+                clearInterval(drag);
+                watch.disconnect();
+                slider.dispatchEvent(new Event("change", { bubbles: true }));
+            };
+        })()"""
+    )
+    bare.until("window.previews >= 5")
+    bare.page.evaluate("window.letGo()")
+    bare.settled()
+    bare.after(lambda: bare.page.locator("[data-name='logo.pad_px'] .reset").click())
+
+
 def test_typing_reset_undo_and_redo(bare: Tab) -> None:
     start = bare.value("logo.pad_px")
     box = bare.page.locator("[data-name='logo.pad_px'] input.number")
