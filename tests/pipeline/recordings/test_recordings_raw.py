@@ -272,6 +272,13 @@ def test_other_encodings_are_refused(tmp_path: Path, head: bytes) -> None:
         open_recording(tmp_path / "a.raw")
 
 
+def test_an_unknown_order_of_halves_is_refused_in_one_short_line(tmp_path: Path) -> None:
+    (tmp_path / "a.raw").write_bytes(b"% format EVT21;endianness=lit\xff\x0b" + bytes(3000) + b"\n% end\n")
+    with pytest.raises(RecordingError, match=r"^EVT2\.1 with endianness 'lit.*is not read.*a\.raw$") as error:
+        open_recording(tmp_path / "a.raw")
+    assert len(str(error.value)) < 400
+
+
 @pytest.mark.parametrize("stated", ["legacy", "little", ""])
 @pytest.mark.parametrize("legacy", [True, False])
 def test_evt21_finds_the_order_of_its_halves(tmp_path: Path, stated: str, legacy: bool) -> None:

@@ -59,7 +59,9 @@ class RawReader(FormatReader):
         if endianness in ("legacy", "little"):
             return endianness == "legacy"
         if endianness:
-            raise RecordingError(f"EVT2.1 with endianness {endianness} is not read: little and legacy are: {self.path}")
+            raise RecordingError(
+                f"EVT2.1 with endianness {endianness[:20]!r} is not read: little and legacy are: {self.path}"
+            )
         halves = np.frombuffer(data[: len(data) // 8 * 8], "<u4").reshape(-1, 2)
         steady = []
         for head in (halves[:, 0], halves[:, 1]):
