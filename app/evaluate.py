@@ -31,12 +31,12 @@ from spinscope.pipeline.evaluation import (
     SceneChoices,
     TaskContext,
     evaluate,
-    evaluate_real,
     executor,
 )
 from spinscope.pipeline.evaluation.best_methods import best_methods
 from spinscope.pipeline.evaluation.plots import draw
 from spinscope.pipeline.evaluation.protocol import protocol_findings
+from spinscope.pipeline.evaluation.real_recordings import evaluate_real
 from spinscope.pipeline.evaluation.suites import SUITES
 from spinscope.pipeline.evaluation.tasks import Progress, write_whole
 from spinscope.pipeline.evaluation.training_set import write_training_set

@@ -1,10 +1,11 @@
 """The paper's experiments on simulated and real recordings, as suites; `spinscope evaluate` runs them.
 
-`pipeline.evaluation.suites` loads and registers them: batches of recordings need the tasks alone.
+`pipeline.evaluation.suites` loads and registers them, and `real_recordings` runs them on recordings of a laboratory:
+batches of recordings need the tasks alone.
 """
 
 from .lab_recordings import LabFolder, LabRecording
-from .suite import Report, Suite, evaluate, evaluate_real
+from .suite import Report, Suite, evaluate
 from .tables import ResultTable, Row, Summary
 from .tasks import SceneChoices, Task, TaskContext, executor
 
@@ -20,6 +21,5 @@ __all__ = [
     "Task",
     "TaskContext",
     "evaluate",
-    "evaluate_real",
     "executor",
 ]

@@ -11,7 +11,8 @@ from click.testing import CliRunner
 from spinscope.app.cli import cli
 from spinscope.pipeline.calibration.ball_labels import EXPOSURE_US, LAG_PX, BallLabels, _Blob, _labels, ball_labels
 from spinscope.pipeline.errors import RecordingError
-from spinscope.pipeline.evaluation import TaskContext, evaluate_real
+from spinscope.pipeline.evaluation import TaskContext
+from spinscope.pipeline.evaluation.real_recordings import evaluate_real
 from spinscope.pipeline.evaluation.suites import SUITES
 from spinscope.pipeline.evaluation.tables import where
 from spinscope.pipeline.events import EventBatch

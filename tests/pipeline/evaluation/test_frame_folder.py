@@ -10,9 +10,10 @@ import pytest
 import tomli_w
 
 from spinscope.pipeline.errors import RecordingError
-from spinscope.pipeline.evaluation import TaskContext, evaluate_real
+from spinscope.pipeline.evaluation import TaskContext
 from spinscope.pipeline.evaluation.frame_camera import FrameCamera, frames
 from spinscope.pipeline.evaluation.frame_folder import FrameFolder, frame_camera_beside
+from spinscope.pipeline.evaluation.real_recordings import evaluate_real
 from spinscope.pipeline.evaluation.rendering import render
 from spinscope.pipeline.evaluation.suites.frames import FRAME, STEREO
 from spinscope.pipeline.evaluation.tables import where

@@ -18,8 +18,9 @@ from spinscope.app.evaluate import check_folder, evaluate_suite, write_page
 from spinscope.pipeline.api import estimate
 from spinscope.pipeline.biases import PAPER, write_biases
 from spinscope.pipeline.errors import ParameterError, RecordingError
-from spinscope.pipeline.evaluation import LabFolder, SceneChoices, TaskContext, evaluate, evaluate_real
+from spinscope.pipeline.evaluation import LabFolder, SceneChoices, TaskContext, evaluate
 from spinscope.pipeline.evaluation.protocol import protocol_findings
+from spinscope.pipeline.evaluation.real_recordings import evaluate_real
 from spinscope.pipeline.evaluation.rendering import render
 from spinscope.pipeline.evaluation.suites import SUITES, biases, filters, runtime, spinner, thrower
 from spinscope.pipeline.evaluation.suites.biases import picture_of
@@ -267,7 +268,7 @@ def test_a_process_of_its_own_knows_the_suites(tmp_path: Path) -> None:
     path = tmp_path / "none.raw"  # its sidecar is missed before it is opened
     arguments = {"suite": "spinner", "recording": "none.raw", "path": str(path), "content": []}
     code = (
-        "from spinscope.pipeline.evaluation.suite import real_rows\n"
+        "from spinscope.pipeline.evaluation.real_recordings import real_rows\n"
         "from spinscope.pipeline.evaluation.tasks import TaskContext\n"
         f"print(real_rows(TaskContext(), **{arguments!r})[0]['error'])"
     )

@@ -226,7 +226,7 @@ def test_format_beats_evt(tmp_path: Path, lines: list[str], format: str) -> None
 
 def test_an_unknown_order_of_halves_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.raw").write_bytes(b"% format EVT21;endianness=big\n% end\n")
-    with pytest.raises(RecordingError, match=r"endianness big is not read.*a\.raw$"):
+    with pytest.raises(RecordingError, match=r"endianness 'big' is not read.*a\.raw$"):
         open_recording(tmp_path / "a.raw")
 
 
