@@ -1,8 +1,9 @@
 """Fixtures, options and workers of all tests.
 
-A run of everything has two workers. Numba keeps machine code beside the sources, so what one of them compiles the other
-one loads; a lock for each function has the second one wait for the first instead of compiling the same. So that it
-need not wait, one begins with the file that compiles most and the other with files that need hardly any kernel.
+A run of everything has three workers on two cores, for browsers and limits of time leave a core idle. Numba keeps
+machine code beside the sources, so what one of them compiles the others load; a lock for each function has them wait
+for it instead of compiling the same. So that they need not wait, one begins with the file that compiles most and the
+others with files that need hardly any kernel.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ settings.register_profile("spinscope", deadline=None, max_examples=50, derandomi
 settings.load_profile("spinscope")
 
 SAMPLES = Path(__file__).parents[1] / "sample_recordings"
-WORKERS = 2
+WORKERS = 3
 FIRST = (
     "pipeline/stages/test_contract.py",  # compiles all kernels of the stages
     "pipeline/recordings/test_recordings_fuzz.py",
@@ -49,7 +50,7 @@ def samples() -> Path:
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """Two workers for a run of everything; none where files are named, so that a single test starts at once."""
+    """Several workers for a run of everything; none where files are named, so that a single test starts at once."""
     if config.args_source == pytest.Config.ArgsSource.TESTPATHS and "slow" not in config.option.markexpr.split()[:1]:
         return WORKERS
     config.option.dist = "no"
@@ -65,7 +66,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Let this worker wait for what the other one is compiling."""
+    """Let this worker wait for what another one is compiling."""
     if hasattr(config, "workerinput") and fcntl is not None:
         _compile_once(Path(tempfile.gettempdir()) / f"spinscope-{config.workerinput['testrunuid']}")
 
