@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -60,7 +61,7 @@ class GrowingColumns:
         """Add events, wherever they are."""
         first, self.events = self.events, self.events + len(batch)
         self._grow(self.events)
-        for place, values in zip(self._columns.rows(first, self.events), batch.columns, strict=True):
+        for place, values in _pairs(self._columns.rows(first, self.events), batch.columns):
             if _address(place) != _address(values):
                 place[:] = values
 
@@ -75,9 +76,14 @@ class GrowingColumns:
             return
         larger = DecodedColumns.empty(max(2 * room, events))
         appended = min(self.events, room)
-        for new, old in zip(larger, self._columns, strict=True):
+        for new, old in _pairs(larger, self._columns):
             new[:appended] = old[:appended]
         self._columns = larger
+
+
+def _pairs(some: Sequence[NDArray[Any]], others: Sequence[NDArray[Any]]) -> Iterator[tuple[NDArray[Any], NDArray[Any]]]:
+    """The columns of the same name."""
+    return zip(some, others, strict=True)
 
 
 def _address(column: NDArray[Any]) -> int:
