@@ -101,9 +101,21 @@ def test_all_before_and_after_a_damaged_block_is_kept(tmp_path: Path, content: s
     assert kept(tmp_path / "a.dat", words, sound) >= N - events - 1
 
 
+@pytest.mark.parametrize("start_us", [40_000, (1 << 32) - 20_000])
 @pytest.mark.parametrize("at", [1, 700, N - 9])
-def test_gaps_are_believed(tmp_path: Path, at: int) -> None:
-    words = sound_words()
-    words[at:, 0] += 1_500_000_000
+def test_gaps_are_believed(tmp_path: Path, at: int, start_us: int) -> None:
+    """Also where the clock has turned before."""
+    words, gap_us = sound_words(start_us), 1_500_000_000
+    times_us = start_us + np.cumsum(np.diff(words[:, 0], prepend=np.uint32(start_us)).astype(np.int64))
+    words[at:, 0] += np.uint32(gap_us)
+    times_us[at:] += gap_us
     write_dat(tmp_path / "a.dat", words)
-    assert open_recording(tmp_path / "a.dat").read().t_us.tolist() == words[:, 0].tolist()
+    assert open_recording(tmp_path / "a.dat").read().t_us.tolist() == times_us.tolist()
+
+
+@pytest.mark.parametrize(("step_us", "believed"), [(900_000, True), (1_500_000, False)])
+def test_nothing_confirms_the_time_of_the_last_event(tmp_path: Path, step_us: int, believed: bool) -> None:
+    words = sound_words()
+    words[-1, 0] += step_us
+    write_dat(tmp_path / "a.dat", words)
+    assert len(open_recording(tmp_path / "a.dat").read()) == N - (not believed)
