@@ -202,6 +202,20 @@ def test_parts_of_an_array_job_make_the_same_table(folder: Path, calls: list[str
     assert Path("out.csv").read_bytes() == Path("whole.csv").read_bytes()
 
 
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"method": "triplet"},
+        {"choices": Choices(rivals=("s_cmax",))},
+        {"choices": Choices(window_us=(0, 5000))},
+        {"choices": Choices(assignments=("logo.pad_px=3",))},
+    ],
+)
+def test_results_of_other_settings_are_told_apart(other: dict[str, Any]) -> None:
+    options: dict[str, Any] = {"choices": Choices(), "method": "contrast", "jobs": 1, "table": Path("a.csv")}
+    assert BatchWork(**options).settings_hash != BatchWork(**options | other).settings_hash
+
+
 def test_two_processes_make_the_same_table(folder: Path) -> None:
     analyze(["in"], "one.csv", series="one.ticks.csv")
     analyze(["in"], "two.csv", series="two.ticks.csv", jobs=2)
