@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -74,9 +75,9 @@ def served(command: tuple[str, ...]) -> Iterator[str]:
     name, *options = command
     recording = [] if name == "coach" else [DEFAULT]
     line = [sys.executable, "-m", "spinscope", name, *recording, *options, "--no-browser", "--port", "0"]
-    with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
         assert process.stdout is not None
-        yield process.stdout.readline().strip()
+        yield next(found[0] for said in process.stdout if (found := re.search(r"http://127\.0\.0\.1:\S+", said)))
         process.terminate()
 
 
