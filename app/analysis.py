@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -82,7 +83,13 @@ def _flights_or_turning_ball(session: Session, method: str, on_progress: Progres
 
 
 def report_on(
-    path: Path, choices: Choices, method: str, on_progress: Progress | None = None, *, cold: bool = True
+    path: Path,
+    choices: Choices,
+    method: str,
+    on_progress: Progress | None = None,
+    on_open: Callable[[Session], None] | None = None,
+    *,
+    cold: bool = True,
 ) -> tuple[dict[str, Any], Result]:
     """The JSON report on one recording (tests/app/analyze.schema.json) and its result; raises SpinscopeError.
 
@@ -96,11 +103,15 @@ def report_on(
         Name of a spin method, or "all".
     on_progress : callable, optional
         Told the share done and what is being done.
+    on_open : callable, optional
+        Given the open recording before it is analyzed, with the warnings known by then.
     cold : bool
         Whether this is the process's first; loading the kernels is then told apart from the work itself.
     """
     begin = time.perf_counter()
     session = Session.open(path, choices, on_progress)
+    if on_open:
+        on_open(session)
     load_seconds = session.load_kernels(method) if cold else 0.0
     result = analyzed_session(session, method, on_progress)
     report = result.to_dict()

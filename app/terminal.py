@@ -33,14 +33,19 @@ def prepare_streams() -> None:
 
 
 def exit_on_signals() -> None:
-    """End as on an error when the system asks the program to: half-written files are removed."""
+    """End as on an error when the system asks the program to: half-written files are removed.
+
+    A signal that comes while it ends, as from a shell that sends it to the whole group, would disturb that.
+    """
+    signals = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
     def end(number: int, _: object) -> None:
+        for one in signals:
+            signal.signal(one, signal.SIG_IGN)
         sys.exit(128 + number)
 
-    for name in ("SIGTERM", "SIGHUP"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), end)
+    for one in signals:
+        signal.signal(one, end)
 
 
 def drop_output() -> None:

@@ -73,7 +73,7 @@ class SpinProcess:
         self._run, self._put = run, put
         self._changed = threading.Condition()
         self._kept = deque[Numbered]()  # from the first message on that another process would need
-        self._stretch: Numbered | None = None  # to which the first of them belongs
+        self._segment: Numbered | None = None  # to which the first of them belongs
         self._next = 0  # number of the next one to be sent
         self._done = 0  # number of the first one without its final answers
         self._flying = 0  # ticks with a ball from there on
@@ -121,11 +121,11 @@ class SpinProcess:
             thread.join()
 
     def _begun(self) -> ChildProcess:
-        """A process that has begun with the run and its present stretch."""
+        """A process that has begun with the run and its present segment."""
         process = _process()
         process.send(self._run)
-        if self._stretch is not None:
-            process.send(self._stretch)
+        if self._segment is not None:
+            process.send(self._segment)
         return process
 
     def _send(self) -> None:
@@ -212,7 +212,7 @@ class SpinProcess:
         while self._kept and self._kept[0].number < number and self._kept[0].message is not None:
             one = self._kept.popleft()
             if isinstance(one.message, SegmentStart):
-                self._stretch = one
+                self._segment = one
         self._given = {key for key in self._given if key[0] >= number}
 
 

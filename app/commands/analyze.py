@@ -160,10 +160,20 @@ def analyze(
 def analyze_one_by_one(recordings: Sequence[Path], choices: Choices, method: str, output: str | None) -> bool:
     """Report on recordings as a table for people or as JSON; whether one of several could not be analyzed."""
     analyzed: list[PrintedRecording] = []
+
+    def warn(session: Session) -> None:
+        """Print the warnings that are not printed yet: the analysis of a mistaken unit of time may take long."""
+        if output is None:
+            for warning in session.warnings[len(printed) :]:
+                note(f"warning: {recording.name}: {warning}")
+                printed.append(warning)
+
     for recording in recordings:
+        printed: list[str] = []
         try:
             with ProgressBar() as bar:
-                report, result = report_on(recording, choices, method, bar, cold=not analyzed)
+                report, result = report_on(recording, choices, method, bar, warn, cold=not analyzed)
+            warn(result.session)
             analyzed.append(PrintedRecording(report, shot_rows(result)))
         except SpinscopeError as error:
             if len(recordings) == 1:
@@ -243,9 +253,6 @@ def print_shots(analyzed: Sequence[PrintedRecording]) -> None:
                 parts = (f"{name} {row[f'{name}_rps']:+.1f}" for name in ("topspin", "sidespin", "corkscrew"))
                 print(f"    {row['kind']}: {', '.join(parts)} rps")
     print("* = trusted; +- is 1 sigma; axis in the camera frame: x right, y down, z into the scene; sidespin + = left")
-    for one in analyzed:
-        for warning in one.report.get("warnings", []):
-            note(f"warning: {Path(one.report['recording']['path']).name}: {warning}")
 
 
 def _truth_heading(row: ResultRow) -> str:
