@@ -15,7 +15,7 @@ import sys
 import threading
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import Any, BinaryIO, Generic, TypeVar
+from typing import Any, BinaryIO, ClassVar, Generic, TypeVar
 
 try:
     import fcntl
@@ -65,6 +65,9 @@ class ChildProcess:
         When it does not start.
     """
 
+    # Referenced until their end: the garbage collector may take a process before the abandoned generator that ends it.
+    _not_ended: ClassVar[set[ChildProcess]] = set()
+
     def __init__(self, program: str, environment: Mapping[str, str] | None = None) -> None:
         path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
         self._process = subprocess.Popen(
@@ -80,11 +83,11 @@ class ChildProcess:
         if hasattr(fcntl, "F_SETPIPE_SZ"):
             with suppress(OSError):  # the user's pipes take too much already
                 fcntl.fcntl(self._requests, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
+        self._not_ended.add(self)
 
     def send(self, value: Any) -> None:
         """Send a value; raises nothing where the process has ended, which `receive` then tells."""
-        # A closed pipe is a ValueError: the garbage collector may close it before it ends an abandoned generator.
-        with suppress(BrokenPipeError, ValueError):
+        with suppress(BrokenPipeError, ValueError):  # a closed pipe is a ValueError
             send_value(self._requests, value)
 
     def receive(self) -> Any:
@@ -110,6 +113,7 @@ class ChildProcess:
         for pipe in (self._requests, self._answers):
             with suppress(OSError):
                 pipe.close()
+        self._not_ended.discard(self)
 
 
 Kept = TypeVar("Kept", bound=ChildProcess)

@@ -44,12 +44,16 @@ def _process() -> ChildProcess:
 def loaded_kernels() -> Iterator[None]:
     """Have a process for the next run load its kernels meanwhile; raises SpinscopeError."""
     process = _process()
-    process.send(None)
-    yield
     try:
-        process.receive()
-    except EOFError as error:
-        raise SpinscopeError(f"the process for the spins ended ({_status_words(process)})") from error
+        process.send(None)
+        yield
+        try:
+            process.receive()
+        except EOFError as error:
+            raise SpinscopeError(f"the process for the spins ended ({_status_words(process)})") from error
+    except BaseException:
+        process.end()
+        raise
     _idle.keep(process)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import threading
@@ -180,3 +181,13 @@ def test_other_threads_go_on_while_a_call_hangs() -> None:
         time.sleep(0.01)
         turns += 1
     assert failed and turns > 20
+
+
+def test_the_garbage_collector_ends_the_process_of_an_abandoned_generator_without_a_warning() -> None:
+    values = iterate(blocks, 5, 10)
+    process = int(next(values)["process"])
+    cycle: list[object] = [values]
+    cycle.append(cycle)
+    del values, cycle
+    gc.collect()
+    assert call(os.getpid) == process  # it waits for the next call
