@@ -64,7 +64,7 @@ def test_previews_follow_a_slider_that_is_dragged_without_a_rest(bare: Tab) -> N
                 clearInterval(drag);
                 watch.disconnect();
                 slider.value = start;
-                slider.dispatchEvent(new Event("change", { bubbles: true }));
+                for (const name of ["input", "change"]) slider.dispatchEvent(new Event(name, { bubbles: true }));
             };
         })()"""
     )
