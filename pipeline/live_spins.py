@@ -28,8 +28,9 @@ from .shots import Shot, ShotLog
 from .spin_so_far import ContrastInFlight, SpinsInFlight
 from .tick import Tick
 
-# After a shot's last events the spin so far is told, which may be from somewhat older ones: 50 ms are promised.
-ANNOUNCED_S = 0.04
+# After a shot's last events the spin so far is told, which may be from somewhat older ones: 50 ms are promised, of
+# which telling it takes up to 15.
+ANNOUNCED_S = 0.035
 MOST_HELD = 100  # ticks held back from the final spins while a ball is in flight: longer than most shots
 ARRIVALS_KEPT = 4000  # ticks whose arrival is remembered: 20 s at 200 Hz, longer than any shot's end takes to be known
 # Python lets a thread run for 5 ms while another waits; with a tick's work in several threads that is many ticks.

@@ -19,8 +19,9 @@ from .live_outputs import LiveNotice, LiveOutput, LiveShot, LiveSpin
 from .live_spins import Answers, Numbered, SegmentStart, SpinRun, TrackedTick, serve
 
 # Ticks with a ball that wait for their spins, at the most; then the tracker waits, too: 3 s of flight at 200 Hz, which
-# at 5 Mev/s is some 600 MB. Ticks without a ball are next to nothing.
+# at 5 Mev/s is some 600 MB. Ticks without a ball take 5 kB each: 30 s of them.
 MOST_FLYING = 600
+MOST_WAITING = 6000
 # Ticks of shots in flight that another process could go on from: a second at 200 Hz, longer than most shots.
 MOST_REPEATED = 200
 MOST_ENDS = 3  # of processes without an answer between
@@ -99,7 +100,9 @@ class SpinProcess:
     def put(self, message: SegmentStart | TrackedTick | None) -> None:
         """Hand over a message, as soon as there is room for it; None ends the run."""
         with self._changed:
-            self._changed.wait_for(lambda: self._flying < MOST_FLYING or self._is_over)
+            self._changed.wait_for(
+                lambda: (self._flying < MOST_FLYING and self.waiting < MOST_WAITING) or self._is_over
+            )
             number = self._kept[-1].number + 1 if self._kept else self._done
             self._kept.append(Numbered(number, message))
             self._flying += _has_ball(message)

@@ -18,7 +18,7 @@ from spinscope.app.terminal import note
 from spinscope.pipeline.errors import RecordingError, SpinscopeError
 from spinscope.pipeline.evaluation.tables import Row
 from spinscope.pipeline.evaluation.tasks import Task, TaskContext, digest, executor, performed
-from spinscope.pipeline.live import load_kernels
+from spinscope.pipeline.live_spins import load_stages
 from spinscope.pipeline.recording_folders import recordings_in
 from spinscope.pipeline.recordings.recording import file_identity
 from spinscope.pipeline.session import Choices
@@ -102,7 +102,7 @@ class SessionAnalysis:
             try:
                 self.run_once()
                 if not is_ready:  # a single new recording is analyzed by this process
-                    load_kernels()
+                    load_stages()
                     is_ready = True
             except SpinscopeError as error:  # of the session itself, as a full disk
                 note(f"warning: {error}")
@@ -122,7 +122,7 @@ class SessionAnalysis:
     def _pending(self) -> Iterator[tuple[Path, KnownRecording]]:
         """Recordings whose results are not known, or of other content, settings or program."""
         all_known = self.session.known()
-        own = self.session.folder.absolute()
+        own = self.session.folder.absolute() / "events"
         for path in self._recordings():
             try:
                 stat = path.stat()

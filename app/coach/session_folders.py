@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Sequence
+from datetime import datetime
 from pathlib import Path
 
 from platformdirs import user_data_path
@@ -31,6 +32,11 @@ def sample_session() -> ShotSession:
         except OSError as error:
             raise RecordingError(f"the sample session cannot be copied ({error.strerror}): {folder}") from error
     return ShotSession(folder)
+
+
+def live_session() -> ShotSession:
+    """The user's session of a running camera's shots of today."""
+    return ShotSession(user_sessions_folder() / f"live {datetime.now():%Y-%m-%d}")
 
 
 def session_for(sources: Sequence[Path]) -> ShotSession:

@@ -27,6 +27,8 @@ from .logo_texture import LogoEvents, logo_texture, spin_proof
 Floats = NDArray[np.float64]
 ToldBy = Literal["logo", "rhythm", "flight"]
 
+# Attributes of the recording of one shot, which holds some of the flights before and after it, too: its time, us.
+SHOT_START, SHOT_END = "shot.start_us", "shot.end_us"
 NEAR_BALL = 1.6  # radii around the ball whose events a shot's recording keeps: outline, logo and some ground
 PARTS = {"topspin_rps": "topspin", "sidespin_rps": "left sidespin", "corkscrew_rps": "corkscrew"}
 PICTURE_PX = 96
@@ -103,7 +105,7 @@ def analyze_for_session(path: Path, recording_hash: str, choices: Choices, folde
     logos = _logo_events(session) if result.shots else {}
     end_s = path.stat().st_mtime
     records = []
-    for number, shot in enumerate(result.shots, start=1):
+    for number, shot in enumerate(_wanted(result), start=1):
         name = f"{recording_hash[:12]}-{number}"
         record = _record(result, shot, logos.get(shot.number), number)
         record |= {"recording": str(path), "recording_hash": recording_hash}
@@ -116,6 +118,30 @@ def analyze_for_session(path: Path, recording_hash: str, choices: Choices, folde
             (folder / record["picture_file"]).write_bytes(_png(picture))
         records.append(ShotRecord(**record))
     return RecordingShots(tuple(records), result.no_shot_reason, tuple(session.warnings))
+
+
+def _wanted(result: Result) -> tuple[Shot, ...]:
+    """The shots of a result; of the recording of one shot, that one."""
+    attributes = result.session.recording.attributes
+    if not result.shots or SHOT_START not in attributes:
+        return result.shots
+    start_us, end_us = float(attributes[SHOT_START]), float(attributes[SHOT_END])
+    return (max(result.shots, key=lambda shot: min(shot.end_us, end_us) - max(shot.start_us, start_us)),)
+
+
+def live_record(result: Result, recording: str, ended_s: float) -> ShotRecord:
+    """Record of the only shot of a result, without logo and files, which nobody has looked for yet.
+
+    Parameters
+    ----------
+    recording : str
+        File of its events.
+    ended_s : float
+        When it ended, seconds since 1970 (UTC).
+    """
+    (shot,) = result.shots
+    record = _record(result, shot, None, 1)
+    return ShotRecord(**record, recording=recording, recording_hash="", recorded_s=ended_s)
 
 
 def _record(result: Result, shot: Shot, logo: LogoEvents | None, number: int) -> dict[str, Any]:

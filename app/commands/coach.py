@@ -11,6 +11,7 @@ import click
 from spinscope.pipeline.session import Choices
 
 from ..terminal import note
+from .live import run_camera, source_options
 from .options import page_options, session_options
 
 
@@ -73,6 +74,25 @@ def open_page(
     if not sessions:
         sessions = [sample_session()]
     serve_coach(CoachState([*sessions, *other_sessions(sessions)], analyses), **page)
+
+
+@coach.command("live")
+@click.option(
+    "--session",
+    "folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Folder of the session that the shots belong to; by default one of the user's own, a day each.",
+)
+@page_options
+@source_options
+@session_options
+def live_page(folder: Path | None, page: dict[str, Any], **options: Any) -> None:
+    """Open the page on a running camera, or on a recording in its place: each shot appears as it ends."""
+    from ..coach.session import ShotSession
+    from ..coach.session_folders import live_session
+
+    session = live_session() if folder is None else ShotSession(folder)
+    run_camera(lines=None, coached={"session": session, **page}, **options)
 
 
 def _words_options(command: Callable[..., None]) -> Callable[..., None]:

@@ -25,7 +25,9 @@ SOURCE_OPTIONS = (
     click.option("--record", type=click.Path(path_type=Path), metavar="NAME.raw", help="Record the events."),
     click.option("--split-mb", type=click.FloatRange(min=1), help="With --record: begin another file at this size."),
     click.option("--split-s", type=click.FloatRange(min=1), help="With --record: begin another file after so long."),
-    click.option("--socket", "port", type=click.IntRange(0, 65535), help="Send lines of every tick to robots here."),
+    click.option(
+        "--socket", "socket_port", type=click.IntRange(0, 65535), help="Send lines of every tick to robots here."
+    ),
     click.option("--method", default="all", show_default=True, help="Which spin method to run."),
 )
 
@@ -72,9 +74,9 @@ def live(
         raise click.UsageError("--sweep goes with --headless; the page has a sweep of its own")
     if headless:
         swept = {"name": sweep, "points": sweep_points, "measured_s": sweep_s, "figure": sweep_figure}
-        _run(lines=lines or "-", sweep=None if sweep is None else swept, **options)
+        run_camera(lines=lines or "-", sweep=None if sweep is None else swept, **options)
     else:
-        _run(lines=lines, page={"port": page_port, "open_browser": not no_browser, "kept_s": keep_s}, **options)
+        run_camera(lines=lines, page={"port": page_port, "open_browser": not no_browser, "kept_s": keep_s}, **options)
 
 
 @click.command()
@@ -87,10 +89,10 @@ def watch(table: Path, lines: str | None, **options: Any) -> None:
 
     The same command goes on with a table that is there.
     """
-    _run(lines=lines, table=table, **options)
+    run_camera(lines=lines, table=table, **options)
 
 
-def _run(
+def run_camera(
     *,
     lines: str | None,
     serial: str | None,
@@ -104,13 +106,15 @@ def _run(
     record: Path | None,
     split_mb: float | None,
     split_s: float | None,
-    port: int | None,
+    socket_port: int | None,
     method: str,
     choices: Choices,
     table: Path | None = None,
     sweep: dict[str, Any] | None = None,
     page: dict[str, Any] | None = None,
+    coached: dict[str, Any] | None = None,
 ) -> None:
+    """Run a camera: with the tuner's page or the coach's (arguments of either), or without one."""
     from ..live.headless import Outputs, SweepChoice, run_headless
     from ..live.opening import CameraChoice
     from ..live.recording import RecordChoice
@@ -128,10 +132,14 @@ def _run(
     )
     recording = None if record is None else RecordChoice(record, split_mb, split_s)
     swept = None if sweep is None else SweepChoice(**sweep)
-    to = Outputs(lines=lines, port=port, table=table, record=recording, sweep=swept)
-    if page is None:
-        run_headless(chosen, choices, check_method(method), to)
-    else:
+    to = Outputs(lines=lines, port=socket_port, table=table, record=recording, sweep=swept)
+    if page is not None:
         from ..live.page import run_with_page
 
         run_with_page(chosen, choices, check_method(method), to, **page)
+    elif coached is not None:
+        from ..live.coach_page import run_with_coach
+
+        run_with_coach(chosen, choices, check_method(method), to, **coached)
+    else:
+        run_headless(chosen, choices, check_method(method), to)

@@ -112,8 +112,10 @@ class CameraView:
                 key = output.shot.number, output.shot.end_us
                 self._add_shot(key, LiveShotRow(text=text, is_final=True, recording=name))
 
-    def end(self) -> None:
+    def end(self, error: Exception | None) -> None:
         """Take note that the camera has ended."""
+        if error is not None:
+            self._notices.append(str(error))
         self._is_running = False
         self.has_events.set()
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 import threading
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,6 +13,7 @@ from spinscope.pipeline.session import Choices
 
 from ..terminal import note
 from ..web import serve
+from .camera_thread import CameraThread
 from .camera_view import CameraView
 from .headless import Outputs, run_headless
 from .opening import CameraChoice
@@ -42,7 +42,7 @@ def run_with_page(
         folder = events_folder(table)
         folder.mkdir()
         view = CameraView(folder, kept_s)
-        work = _CameraThread(lambda: run_headless(chosen, choices, method, replace(to, table=table), view), view)
+        work = CameraThread(lambda: run_headless(chosen, choices, method, replace(to, table=table), view), view)
         work.start()
         try:
             note("the page opens as soon as events have come")
@@ -56,29 +56,3 @@ def run_with_page(
             pass
         finally:
             work.end()
-
-
-class _CameraThread(threading.Thread):
-    """A live run beside the page's server."""
-
-    def __init__(self, work: Callable[[], None], view: CameraView) -> None:
-        super().__init__(name="live", daemon=True)
-        self._work, self._view = work, view
-        self._error: Exception | None = None
-
-    def run(self) -> None:
-        """Body of the thread."""
-        try:
-            self._work()
-        except Exception as error:  # noqa: BLE001  raised by `end`
-            self._error = error
-        finally:
-            self._view.end()
-
-    def end(self) -> None:
-        """Stop the run and wait for it; raises what ended it."""
-        if self._view.is_open:
-            self._view.opened.run.stop()
-            self.join()
-        if self._error is not None:
-            raise self._error

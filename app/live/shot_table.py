@@ -17,6 +17,7 @@ from spinscope.pipeline.recordings import write_recording
 from spinscope.pipeline.result_rows import ResultRow, shot_columns, shot_rows
 from spinscope.pipeline.session import Result, Session
 
+from ..coach.shot_record import SHOT_END, SHOT_START
 from ..table_files import check_table_name, write_table
 
 MARGIN_US = 20_000  # of events before and after a shot: analysed anew it begins and ends as it did
@@ -73,6 +74,7 @@ class ShotTable:
         if len(events):
             camera = {f"camera.{name}": value for name, value in session.parameters.camera.as_dict().items()}
             attributes = {name: value for name, value in camera.items() if isinstance(value, str | float)}
+            attributes |= {SHOT_START: float(shot.shot.start_us), SHOT_END: float(shot.shot.end_us)}
             width_px, height_px = session.source.width_px, session.source.height_px
             write_recording(saved, events, width_px=width_px, height_px=height_px, attributes=attributes)
         row |= {"number": number, "date": datetime.now(UTC).isoformat(), "latency_ms": shot.latency_ms}

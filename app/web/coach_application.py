@@ -67,9 +67,17 @@ class CoachState:
         The first one is shown.
     analyses : sequence of SessionAnalysis
         Started with the server.
+    camera_notice : callable
+        Words on what happened to a running camera; None where nothing did.
     """
 
-    def __init__(self, sessions: Sequence[ShotSession], analyses: Sequence[SessionAnalysis] = ()) -> None:
+    def __init__(
+        self,
+        sessions: Sequence[ShotSession],
+        analyses: Sequence[SessionAnalysis] = (),
+        camera_notice: Callable[[], str | None] = lambda: None,
+    ) -> None:
+        self.camera_notice = camera_notice
         self.sessions: dict[str, ShotSession] = {}
         for session in sessions:
             name, number = session.name, 2
@@ -97,7 +105,11 @@ class CoachState:
         }
         progress = self.progress(session)
         return AnalysisState(
-            total=progress.total, done=progress.done, is_working=progress.is_working, failures=failures
+            total=progress.total,
+            done=progress.done,
+            is_working=progress.is_working,
+            failures=failures,
+            camera_notice=self.camera_notice(),
         )
 
     def progress(self, session: ShotSession) -> AnalysisProgress:
@@ -292,9 +304,9 @@ def coach_shot(session: str, row: Row) -> CoachShot:
 async def _revisions(state: CoachState, session: ShotSession) -> AsyncIterator[str]:
     """Server-sent events: the revision, whenever it or the work in the background has changed."""
     yield "retry: 500\n\n"
-    told: tuple[int, AnalysisProgress] | None = None
+    told: tuple[int, AnalysisProgress, str | None] | None = None
     while not state.is_closed:
-        present = (await asyncio.to_thread(lambda: session.revision), state.progress(session))
+        present = (await asyncio.to_thread(lambda: session.revision), state.progress(session), state.camera_notice())
         if present != told:
             told = present
             yield f"data: {present[0]}\n\n"

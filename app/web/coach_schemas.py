@@ -90,12 +90,13 @@ class CoachShot(Response):
 
 
 class AnalysisState(Response):
-    """Work in the background: recordings done of all, and those that cannot be read."""
+    """Work in the background: recordings done of all, those that cannot be read, and what happened to a camera."""
 
     total: int
     done: int
     is_working: bool
     failures: dict[str, str]
+    camera_notice: str | None
 
 
 class SessionShots(Response):

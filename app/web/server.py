@@ -103,14 +103,19 @@ def serve(
 
 
 def serve_coach(
-    state: CoachState, port: int | None = None, *, open_browser: bool = True, hosts: Collection[str] = ()
+    state: CoachState,
+    port: int | None = None,
+    *,
+    open_browser: bool = True,
+    hosts: Collection[str] = (),
+    place: str = "shots",
 ) -> None:
-    """Serve the coach's page until Ctrl-C; see `serve`."""
+    """Serve the coach's page, at first a place of it, until Ctrl-C; see `serve`."""
     state.start()
     token = _new_token()
 
     def announce(own_port: int) -> None:
-        address = _address(own_port, token)
+        address = f"{_address(own_port, token)}#{place}"
         sys.stdout.write(f"{address}\n")
         sys.stdout.flush()
         if not (open_browser and show_in_browser(address)):

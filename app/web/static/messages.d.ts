@@ -1,6 +1,6 @@
 // Generated from app/web/schemas.py by `python -m tests.app.web.message_types`: do not edit.
-/** Work in the background: recordings done of all, and those that cannot be read. */
-export type AnalysisState = { total: number; done: number; is_working: boolean; failures: Record<string, string> };
+/** Work in the background: recordings done of all, those that cannot be read, and what happened to a camera. */
+export type AnalysisState = { total: number; done: number; is_working: boolean; failures: Record<string, string>; camera_notice: string | null };
 /** Declaration of one bias. */
 export type BiasRange = { low: number; high: number; default: number; help: string };
 /** Biases to simulate the scene with, or to write to a file. */

@@ -136,7 +136,7 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
             lines,
             "Track: from the arrival of a tick's first events to its track, the tick of 5 ms included; spin so far: to "
             "that of each tick of a flying ball. Announced: from the arrival of a shot's last events to the newest "
-            "spin so far, told when its end is known and 40 ms have passed, sooner where all its ticks are answered; "
+            "spin so far, told when its end is known and 35 ms have passed, sooner where all its ticks are answered; "
             "final: to that of the whole shot. Apart: the median difference of the two. Identical: the first round's "
             "shots are those of the same events read at once. The paper computes spins afterwards.",
         )

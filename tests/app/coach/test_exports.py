@@ -185,7 +185,7 @@ def test_the_command_opens_the_sample_recordings_and_sessions(
     monkeypatch.setattr("spinscope.app.web.server.serve_coach", lambda *given, **named: asked.append((given, named)))
     for arguments in ([], ["--no-browser", "--port", "0"], [str(samples)], [str(tmp_path / "sessions/sample")]):
         assert CliRunner().invoke(cli, ["coach", *arguments]).exit_code == 0, arguments
-    (plain, quiet, recordings, session) = asked
+    plain, quiet, recordings, session = asked
     assert list(plain[0][0].sessions) == ["sample"] and plain[1] == {"port": None, "open_browser": True, "hosts": ()}
     assert quiet[1] == {"port": 0, "open_browser": False, "hosts": ()}
     assert next(iter(recordings[0][0].sessions)).startswith("sample_recordings ")

@@ -43,7 +43,7 @@ class Page {
 
   async begin() {
     [this.sessions] = await Promise.all([Shots.sessions(), loadTexts()]);
-    const kept = localStorage.getItem("spinscope.coach.session") ?? "";
+    const kept = sessionStorage.getItem("spinscope.coach.session") ?? ""; // of this tab, before it was loaded anew
     await this.shots.open(this.sessions.includes(kept) ? kept : this.sessions[0]);
     this.shots.addEventListener("change", () => this.#refresh());
     this.shots.addEventListener("lost", () => document.body.classList.add("lost"));
@@ -169,12 +169,13 @@ class Page {
         ),
       )
       : null;
+    const camera = analysis.camera_notice && element("span.failures", { role: "status" }, analysis.camera_notice);
     const working = analysis.is_working
       ? element(
         "span.working",
-        {},
+        { title: text("analyzing", analysis) },
         element("progress", { value: analysis.done, max: analysis.total, "aria-label": text("analyzing", analysis) }),
-        text("analyzing", analysis),
+        `${analysis.done}/${analysis.total}`,
       )
       : null;
     const current = PLACES.includes(name) ? name : "shots";
@@ -188,7 +189,7 @@ class Page {
       element("h1", {}, element("img", { src: "/static/icon.svg", alt: "" }), "Spinscope"),
       element("nav", { "aria-label": text("title") }, PLACES.map(link)),
       element("span.gap"),
-      ...[working, failed].filter((one) => one !== null),
+      ...[camera, working, failed].filter(Boolean),
       element("span.lost", { role: "alert" }, text("connection_lost")),
       session,
       choice("spin", ["rps", "rpm"], (value) => text(value), "spin_unit"),
@@ -212,7 +213,7 @@ class Page {
 
   /** @param {string} session */
   async #switchTo(session) {
-    localStorage.setItem("spinscope.coach.session", session);
+    sessionStorage.setItem("spinscope.coach.session", session);
     await this.shots.open(session);
   }
 

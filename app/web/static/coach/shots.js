@@ -25,6 +25,11 @@ const inOrder = (shots) =>
 
 // Events: `change` when shots, names or the work in the background have changed, `new` with a shot that has just ended,
 // `lost` and `back` with the connection.
+// Where the events of a shot come from: of a running camera, each of whose shots is a recording, the folder.
+const source = (/** @type {CoachShot} */ { recording }) =>
+  recording.match(/^(.*_shots)[\\/]shot_\d+\.h5$/)?.[1] ?? recording;
+const SAME_CONTACT_US = 2000; // as told by the flight before and by that after it
+
 export class Shots extends EventTarget {
   /** @type {Map<number, CoachShot>} */
   #all = new Map();
@@ -41,7 +46,7 @@ export class Shots extends EventTarget {
   #details = new Map();
   session = "";
   /** @type {AnalysisState} */
-  analysis = { total: 0, done: 0, is_working: false, failures: {} };
+  analysis = { total: 0, done: 0, is_working: false, failures: {}, camera_notice: null };
   /** @type {Names} */
   now = { player: null, wing: null, stroke: null, drill: null };
 
@@ -96,10 +101,12 @@ export class Shots extends EventTarget {
   /** The shot of the same ball before or after a bounce or hit. @param {CoachShot} shot @returns {CoachShot | null} */
   neighbour(shot, before = true) {
     const meets = (/** @type {CoachShot} */ other) =>
-      other.recording === shot.recording && !other.deleted &&
+      other !== shot && source(other) === source(shot) && !other.deleted &&
       (before
-        ? other.ended_by === "bounce" && shot.began_by === "bounce" && other.end_us === shot.start_us
-        : other.began_by === "bounce" && shot.ended_by === "bounce" && other.start_us === shot.end_us);
+        ? other.ended_by === "bounce" && shot.began_by === "bounce" &&
+          Math.abs(other.end_us - shot.start_us) < SAME_CONTACT_US
+        : other.began_by === "bounce" && shot.ended_by === "bounce" &&
+          Math.abs(other.start_us - shot.end_us) < SAME_CONTACT_US);
     return [...this.#all.values()].find(meets) ?? null;
   }
 

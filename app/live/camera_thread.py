@@ -1,0 +1,58 @@
+"""Thread of a live run whose results a page shows."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Protocol
+
+from .headless import LiveObserver, OpenLive
+
+
+class CameraObserver(LiveObserver, Protocol):
+    """Observer of a live run behind a page."""
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the run has begun."""
+
+    @property
+    def opened(self) -> OpenLive:
+        """The run, once it has begun."""
+
+    def end(self, error: Exception | None) -> None:
+        """Take note that the run has ended, by an error or as it should."""
+
+
+class CameraThread(threading.Thread):
+    """A live run beside a page's server.
+
+    Parameters
+    ----------
+    work : callable
+        Runs until the camera ends or is told to.
+    observer : CameraObserver
+        Onlooker of the run, told of its end.
+    """
+
+    def __init__(self, work: Callable[[], None], observer: CameraObserver) -> None:
+        super().__init__(name="live", daemon=True)
+        self._work, self._observer = work, observer
+        self._error: Exception | None = None
+
+    def run(self) -> None:
+        """Body of the thread."""
+        try:
+            self._work()
+        except Exception as error:  # noqa: BLE001  raised by `end`
+            self._error = error
+        finally:
+            self._observer.end(self._error)
+
+    def end(self) -> None:
+        """Stop the run and wait for it; raises what ended it."""
+        if self._observer.is_open:
+            self._observer.opened.run.stop()
+            self.join()
+        if self._error is not None:
+            raise self._error
