@@ -13,6 +13,7 @@ import threading
 import traceback
 from collections import deque
 from collections.abc import Callable, Collection, Iterator
+from functools import cache
 from typing import Any, NamedTuple
 
 from .cameras.clock import now_s
@@ -340,7 +341,8 @@ def _ended(log: ShotLog, ticks: _Ticks, one: TrackedTick) -> tuple[tuple[float, 
     )
 
 
-def load_stages(stages: Collection[str] | None = None) -> None:
+@cache
+def load_stages(stages: tuple[str, ...] | None = None) -> None:
     """Run stages, all by default, over shots with a contact and with two balls: no kernel is loaded in a shot."""
     for sample in ("bounce.h5", "two_balls.h5"):
         session = Session.open(SAMPLES / "own" / sample)

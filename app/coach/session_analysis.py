@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
@@ -27,6 +29,7 @@ from spinscope.pipeline.sidecar import Sidecar
 from .session import KnownRecording, ShotSession
 from .shot_record import RecordingShots, ShotRecord, analyze_for_session
 
+NICENESS = 5  # a third of the share of the page, and of a running camera's tracker, where they want one core
 POLL_S = 0.4  # a new shot is to appear within a second of its end
 CRASHED = "the process that read it was ended, by lack of memory or a fault of a library"
 
@@ -97,13 +100,12 @@ class SessionAnalysis:
         self._tell(AnalysisProgress(len(pending), self.progress.done, False))
 
     def _follow(self) -> None:
-        is_ready = False
+        if sys.platform == "linux":
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
         while not self._ended.is_set():
             try:
                 self.run_once()
-                if not is_ready:  # a single new recording is analyzed by this process
-                    load_stages()
-                    is_ready = True
+                load_stages()  # a single new recording is analyzed by this process
             except SpinscopeError as error:  # of the session itself, as a full disk
                 note(f"warning: {error}")
             self._ended.wait(POLL_S)

@@ -11,6 +11,7 @@ from typing import Any
 from spinscope.pipeline.cameras import ArrivedTick
 from spinscope.pipeline.cameras.recent_events import KEPT_US
 from spinscope.pipeline.live_outputs import LiveNotice, LiveOutput, LiveShot
+from spinscope.pipeline.live_spins import load_stages
 from spinscope.pipeline.result_rows import ResultRow
 from spinscope.pipeline.session import Choices, Result
 from spinscope.pipeline.tick import Tick
@@ -118,6 +119,7 @@ def run_with_coach(
     table, observer = session.folder / TABLE, LiveSession(session)
     folder: Path = events_folder(table)
     work = CameraThread(lambda: run_headless(chosen, choices, method, replace(to, table=table), observer), observer)
+    load_stages()  # before the first shot, rather than beside it
     work.start()
     try:
         observer.has_begun.wait()

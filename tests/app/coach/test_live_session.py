@@ -12,6 +12,7 @@ from click.testing import CliRunner
 from spinscope.app.cli import cli
 from spinscope.app.coach.session import ShotSession
 from spinscope.app.web.coach_application import CoachState
+from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.session import Session
 
 
@@ -60,5 +61,5 @@ def test_a_camera_that_cannot_be_opened_is_an_error_and_no_page(
     monkeypatch.setattr("spinscope.app.live.coach_page.serve_coach", lambda *_, **__: pytest.fail("no camera"))
     options = ["--replay", str(tmp_path / "no.raw"), "--session", str(tmp_path / "day")]
     done = CliRunner().invoke(cli, ["coach", "live", *options])
-    assert done.exit_code == 2 and "no.raw" in done.output
+    assert isinstance(done.exception, RecordingError) and "no.raw" in str(done.exception)
     assert not ShotSession(tmp_path / "day").shots()
