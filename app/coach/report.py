@@ -19,7 +19,7 @@ from spinscope.pipeline.files import atomic_file
 
 from .session import Row, ShotSession
 from .shot_words import ShotWords, kind_codes
-from .statistics import SeriesStatistics, series_statistics
+from .statistics import SeriesStatistics, compared, series_statistics
 
 COLOURS = ("#0072b2", "#c24e00", "#007a5a", "#a3427d", "#6b5900", "#2c7da0", "#555555")  # as in static/coach/charts.js
 MARKERS = "os^D"
@@ -82,11 +82,12 @@ def report_html(session: ShotSession, words: ShotWords) -> str:
 
 def answers(players: Mapping[str, SeriesStatistics], kind: str, words: ShotWords) -> list[str]:
     """Answer in sentences: the player with the most spin of a kind, and whether each got better."""
-    known = {name: one for name, one in players.items() if one.count >= 3 and one.median_rps is not None}
+    names, is_clear = compared(players)
     found = []
-    if len(known) > 1:
-        name = max(known, key=lambda one: known[one].median_rps or 0.0)
-        found.append(words.text("answer_more", group=name, kind=kind, value=words.spin(known[name].median_rps)))
+    if len(names) > 1:
+        value, other_value = (words.spin(players[name].median_rps) for name in names[:2])
+        told = {"group": names[0], "other": names[1], "kind": kind, "value": value, "other_value": other_value}
+        found.append(words.text("answer_more" if is_clear else "answer_even", **told))
     for name, one in players.items():
         change = None if one.change_rps is None else abs(one.change_rps)
         found.append(words.text(one.trend, group=name, value=words.spin(change), since=words.text("halves")))

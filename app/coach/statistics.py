@@ -14,8 +14,9 @@ Floats = NDArray[np.float64]
 Trend = Literal["rose", "fell", "unclear", "too_few"]
 
 FEWEST = 3  # shots of a spread, and of each part of a series that are compared; with two it says nothing
-# Half-axes of the ellipse that holds two of three shots of a normal distribution in the plane: sqrt(-2 ln(1 - 0.68)).
-ELLIPSE_SIGMAS = math.sqrt(-2 * math.log(1 - 0.68))
+ROBUST_STD = 1.4826  # standard deviations in the median absolute deviation of a normal distribution
+WITHIN = 2 / 3  # of the shots lie in the ellipse
+STEPS = 20  # towards the densest two thirds, which mostly are found in three
 CLEAR_SIGMAS = 2.0  # of the difference's own error: chance does that once in twenty times
 
 
@@ -29,6 +30,8 @@ class SeriesStatistics:
         Shots whose spin is known, and those whose spin is not seen.
     median_rps, best_rps : float, optional
         Middle value and largest one.
+    median_std_rps : float, optional
+        Standard error of the middle value, from the middle deviation, which a single other shot does not change.
     best_id : int, optional
         The shot with the largest spin.
     spread_rps : float, optional
@@ -46,6 +49,7 @@ class SeriesStatistics:
     count: int
     unseen: int
     median_rps: float | None
+    median_std_rps: float | None
     best_rps: float | None
     best_id: int | None
     spread_rps: float | None
@@ -74,6 +78,7 @@ def series_statistics(shots: Sequence[Mapping[str, Any]], since_s: float | None 
         count=len(known),
         unseen=len(shots) - len(known),
         median_rps=float(np.median(spins)) if len(spins) else None,
+        median_std_rps=_median_std(spins) if len(spins) >= FEWEST else None,
         best_rps=best["spin_rps"] if best else None,
         best_id=best["id"] if best else None,
         spread_rps=float(spins.std(ddof=1)) if len(spins) >= FEWEST else None,
@@ -85,16 +90,60 @@ def series_statistics(shots: Sequence[Mapping[str, Any]], since_s: float | None 
     )
 
 
+def compared(series: Mapping[str, SeriesStatistics]) -> tuple[list[str], bool]:
+    """Names of the series with enough shots, the largest middle first; whether it is larger by more than chance."""
+    known = {
+        name: (one.median_rps, one.median_std_rps)
+        for name, one in series.items()
+        if one.median_rps is not None and one.median_std_rps is not None
+    }
+    names = sorted(known, key=lambda name: known[name][0], reverse=True)
+    if len(names) < 2:
+        return names, False
+    (first, first_std), (second, second_std) = (known[name] for name in names[:2])
+    return names, first - second > CLEAR_SIGMAS * math.hypot(first_std, second_std)
+
+
+def _median_std(spins_rps: Floats) -> float:
+    """Standard error of the median: of a normal distribution 1.25 times that of the mean."""
+    return float(1.25 * ROBUST_STD * np.median(np.abs(spins_rps - np.median(spins_rps))) / math.sqrt(len(spins_rps)))
+
+
 def spread_ellipse(speeds_m_s: Floats, spins_rps: Floats, points: int = 48) -> list[tuple[float, float]] | None:
-    """Outline (speed in m/s, spin in rps) of the ellipse that holds two of three shots; None for too few of them."""
+    """Outline (speed in m/s, spin in rps) of the ellipse that holds two of three shots; None for too few of them.
+
+    Its shape is that of the two thirds of the shots that lie closest together, found by concentration steps: a single
+    shot of another kind does not turn it.
+
+    References
+    ----------
+    Rousseeuw and Van Driessen, A Fast Algorithm for the Minimum Covariance Determinant Estimator, Technometrics 1999.
+    """
     if len(speeds_m_s) < FEWEST:
         return None
-    both = np.stack([speeds_m_s, spins_rps])
-    values, vectors = np.linalg.eigh(np.cov(both))
+    shots = np.stack([speeds_m_s, spins_rps], axis=1)
+    count = max(math.ceil(WITHIN * len(shots)), FEWEST)
+    spread = ROBUST_STD * np.median(np.abs(shots - np.median(shots, axis=0)), axis=0)
+    centre, covariance = np.median(shots, axis=0), np.diag(np.maximum(spread, 1e-6) ** 2)
+    for _ in range(STEPS):
+        nearest = np.argsort(_distances(shots, centre, covariance), kind="stable")[:count]
+        centre, before = shots[nearest].mean(axis=0), covariance
+        # A thousandth of the spread beside: shots on a line have an ellipse, too.
+        covariance = np.cov(shots[nearest].T) + np.diag(1e-6 * np.maximum(spread, 1e-6) ** 2)
+        if np.allclose(covariance, before):
+            break
+    reach = np.sort(_distances(shots, centre, covariance))[count - 1]
     angle = np.linspace(0, 2 * np.pi, points, endpoint=False)
-    circle = np.stack([np.cos(angle), np.sin(angle)]) * ELLIPSE_SIGMAS * np.sqrt(np.clip(values, 0, None))[:, None]
-    outline = both.mean(axis=1)[:, None] + vectors @ circle
+    circle = np.stack([np.cos(angle), np.sin(angle)])
+    outline = centre[:, None] + reach * np.linalg.cholesky(covariance) @ circle
     return [(float(speed), float(spin)) for speed, spin in outline.T]
+
+
+def _distances(shots: Floats, centre: Floats, covariance: Floats) -> Floats:
+    """Mahalanobis distances of shots (n, 2)."""
+    apart: Floats = np.linalg.solve(np.linalg.cholesky(covariance), (shots - centre).T)
+    lengths: Floats = np.hypot(*apart)
+    return lengths
 
 
 def _parts(shots: Sequence[Mapping[str, Any]], spins_rps: Floats, since_s: float | None) -> tuple[Floats, Floats]:

@@ -20,7 +20,7 @@ from spinscope.app.coach.session import NAMES, Row, ShotSession
 from spinscope.app.coach.session_analysis import AnalysisProgress, SessionAnalysis
 from spinscope.app.coach.session_table import write_session_table
 from spinscope.app.coach.shot_words import ShotWords, kind_codes
-from spinscope.app.coach.statistics import series_statistics
+from spinscope.app.coach.statistics import compared, series_statistics
 from spinscope.app.coach.table_marking import event_picture, mark_table, marking_recordings
 from spinscope.app.coach.terms import clock_hours, confidence, corkscrew_share, effect_word, spin_effect
 from spinscope.app.coach.texts import texts
@@ -215,7 +215,8 @@ def _add_shot_routes(app: FastAPI, state: CoachState) -> None:
         for name, series in request.series.items():
             own = [rows[key] for session, ids in series.items() for one in ids if (key := (session, one)) in rows]
             found[name] = series_statistics(sorted(own, key=lambda row: row["recorded_s"]), request.since_s)
-        return Statistics(series=found)
+        order, is_clear = compared(found)
+        return Statistics(series=found, order=order, is_clear=is_clear)
 
 
 def _add_exports(app: FastAPI, state: CoachState) -> None:

@@ -157,9 +157,11 @@ class TableMarks(Response):
 
 
 class Statistics(Response):
-    """Statistics of series of shots, by their names."""
+    """Statistics of series of shots, by their names, and how their middles compare (`compared`)."""
 
     series: dict[str, SeriesStatistics]
+    order: list[str]
+    is_clear: bool
 
 
 class Kept(Response):

@@ -112,7 +112,7 @@ export type RunRequest = { serial: number; parameters: Record<string, Record<str
 /** A group of controls; `terms` of the glossary explain it, `is_open` where it is unfolded at first. */
 export type SectionInfo = { title: string; terms: string[]; is_open: boolean; controls: ControlInfo[] };
 /** Statistics of the spin of a series of shots; None for what too few shots tell. */
-export type SeriesStatistics = { count: number; unseen: number; median_rps: number | null; best_rps: number | null; best_id: number | null; spread_rps: number | null; median_speed_m_s: number | null; ellipse: [number, number][] | null; trend: "rose" | "fell" | "unclear" | "too_few"; change_rps: number | null; change_std_rps: number | null };
+export type SeriesStatistics = { count: number; unseen: number; median_rps: number | null; median_std_rps: number | null; best_rps: number | null; best_id: number | null; spread_rps: number | null; median_speed_m_s: number | null; ellipse: [number, number][] | null; trend: "rose" | "fell" | "unclear" | "too_few"; change_rps: number | null; change_std_rps: number | null };
 /** Sessions that are open. */
 export type SessionNames = { sessions: string[] };
 /** The shots of a session that have changed since a revision. */
@@ -127,8 +127,8 @@ export type ShotMetrics = { start_us: number; end_us: number; logo_events: numbe
 export type ShotsMessage = { kind: "shots"; share: number; shots: [number, number][]; error: string | null };
 /** The logo at two instants, and the first turned to the second: places on the disc as the camera sees it. */
 export type SpinProofPoints = { first_us: number; second_us: number; first: number[][]; second: number[][]; turned: number[][] };
-/** Statistics of series of shots, by their names. */
-export type Statistics = { series: Record<string, SeriesStatistics> };
+/** Statistics of series of shots, by their names, and how their middles compare (`compared`). */
+export type Statistics = { series: Record<string, SeriesStatistics>; order: string[]; is_clear: boolean };
 /** Statistics of series by their names: ids of shots by session; see `series_statistics` for `since_s`. */
 export type StatisticsRequest = { series: Record<string, Record<string, number[]>>; since_s?: number | null };
 /** Progress of a parameter sweep. */

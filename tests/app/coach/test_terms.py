@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from spinscope.app.coach.logo_texture import TEXTURE_PX, octahedral_directions, octahedral_pixels
 from spinscope.app.coach.shot_record import PARTS, hitter_frame
-from spinscope.app.coach.statistics import series_statistics, spread_ellipse
+from spinscope.app.coach.statistics import compared, series_statistics, spread_ellipse
 from spinscope.app.coach.terms import clock_hours, confidence, effect_word, mixture, spin_effect
 from spinscope.pipeline.spin_terms import kind_of_spin
 
@@ -109,6 +109,17 @@ def test_a_trend_is_told_only_beyond_chance() -> None:
     assert trends.count("unclear") > 0.9 * 300
 
 
+def test_the_strongest_is_told_only_beyond_chance() -> None:
+    series = {"weak": [50, 52, 51, 49], "strong": [60, 61, 59, 62], "few": [99, 98], "one": [60.5, 58.0, 63.0, 60.0]}
+    found = {name: series_statistics(rows(list(spins))) for name, spins in series.items()}
+    assert compared(found) == (["strong", "one", "weak"], False)
+    del found["one"]
+    assert compared(found) == (["strong", "weak"], True)
+    other = series_statistics(rows([60, 61, 59, 62, 11]))  # a single other shot does not hide it
+    assert compared({**found, "strong": other}) == (["strong", "weak"], True)
+    assert compared({"few": found["few"]}) == ([], False)
+
+
 def test_what_was_before_an_instant_is_compared_with_what_came_after() -> None:
     dated = [{**row, "recorded_s": float(i)} for i, row in enumerate(rows([60, 61, 59, 50, None, 52, 51, 50]))]
     found = series_statistics(dated, since_s=3.0)
@@ -128,4 +139,17 @@ def test_the_ellipse_holds_two_of_three_shots() -> None:
         [e[0] * (points[:, 1] - p[1]) - e[1] * (points[:, 0] - p[0]) for e, p in zip(edges, outline, strict=True)]
     )
     inward = np.sign(edges[0][0] * (centre[1] - outline[0][1]) - edges[0][1] * (centre[0] - outline[0][0]))
-    assert np.mean(np.all(sides * inward > 0, axis=0)) == pytest.approx(0.68, abs=0.01)
+    assert np.mean(np.all(sides * inward > 0, axis=0)) == pytest.approx(2 / 3, abs=0.01)
+
+
+@pytest.mark.parametrize("count", [4, 9, 30])
+def test_one_shot_of_another_kind_does_not_turn_the_ellipse(count: int) -> None:
+    random = np.random.default_rng(count)
+    speeds, spins = random.multivariate_normal([10, 60], [[4, 0], [0, 25]], count).T
+    with_other = np.array(spread_ellipse(np.append(speeds, 25.0), np.append(spins, 5.0)))
+    assert np.all(np.abs(with_other - [10, 60]) < [6, 16])
+
+
+def test_the_ellipse_of_shots_on_a_line_is_that_line() -> None:
+    outline = np.array(spread_ellipse(np.full(5, 10.0), np.arange(50.0, 55.0)))
+    assert np.ptp(outline[:, 0]) < 0.01 and 1 < np.ptp(outline[:, 1]) < 6

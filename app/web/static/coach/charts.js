@@ -13,7 +13,7 @@ const AROUND_M = 0.15; // of the table that is drawn
 const DAY_LABEL = 84; // wide, and so far apart
 const WIDTH = 560, HEIGHT = 340, LEFT = 52, RIGHT = 12, TOP = 12, BOTTOM = 44;
 
-/** @typedef {{name: string, shots: CoachShot[], statistics: SeriesStatistics}} Series */
+/** @typedef {{name: string, shots: CoachShot[], statistics: SeriesStatistics, rank: number, isStrongest: boolean}} Series */
 
 /** @param {number} x @param {number} y @param {number} index @param {string} title @param {() => void} [open] */
 function mark(x, y, index, title, open) {

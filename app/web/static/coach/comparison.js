@@ -10,7 +10,7 @@ import { Shots } from "./shots.js";
 import { dayOf, mainKind, speedWords, spinWords, term, text, wordsQuery } from "./texts.js";
 
 const GROUPINGS = ["player", "kind", "wing", "stroke", "drill", "day", "session"];
-const FEWEST = 3; // shots of a group that is called the most constant or the strongest
+const FEWEST = 3; // shots of a group that is called the most constant
 
 /** Name of a shot's group. @param {CoachShot} shot @param {string} by */
 function groupOf(shot, by) {
@@ -33,21 +33,24 @@ export async function seriesOf(list, name, since_s = null) {
     const ids = [...Map.groupBy(own, (shot) => shot.session).entries()];
     return [one, Object.fromEntries(ids.map(([session, shots]) => [session, shots.map((shot) => shot.id)]))];
   }));
-  const statistics = (await Shots.statistics({ series, since_s })).series;
-  return groups.map(([one, own]) => ({ name: one, shots: own, statistics: statistics[one] }));
+  const { series: statistics, order, is_clear } = await Shots.statistics({ series, since_s });
+  return groups.map(([one, own]) => {
+    const rank = order.indexOf(one);
+    return { name: one, shots: own, statistics: statistics[one], rank, isStrongest: rank === 0 && is_clear };
+  });
 }
 
 /** What the series answer, in sentences. @param {Series[]} series @param {string} since words for what is compared */
 function answers(series, since) {
   const sentences = [];
-  const large = series.filter(({ statistics }) => statistics.count >= FEWEST);
-  const strongest = [...large].sort((a, b) => (b.statistics.median_rps ?? 0) - (a.statistics.median_rps ?? 0))[0];
-  if (large.length > 1 && strongest) {
-    const kinds = new Set(large.flatMap(({ shots }) => shots.map(mainKind)).filter((kind) => kind !== null));
+  const ranked = series.filter(({ rank }) => rank >= 0).sort((a, b) => a.rank - b.rank);
+  const [first, second] = ranked;
+  if (second) {
+    const kinds = new Set(ranked.flatMap(({ shots }) => shots.map(mainKind)).filter((kind) => kind !== null));
     const kind = text(kinds.size === 1 ? [...kinds][0] ?? "spin_noun" : "spin_noun");
-    sentences.push(
-      text("answer_more", { group: strongest.name, kind, value: spinWords(strongest.statistics.median_rps) }),
-    );
+    const [value, other_value] = [first, second].map(({ statistics }) => spinWords(statistics.median_rps));
+    const words = { group: first.name, other: second.name, kind, value, other_value };
+    sentences.push(text(first.isStrongest ? "answer_more" : "answer_even", words));
   }
   for (const { name, statistics } of series) {
     const value = spinWords(Math.abs(statistics.change_rps ?? 0));
@@ -185,9 +188,6 @@ function statisticsTable(series, open) {
   const share = (/** @type {Series} */ one) =>
     (one.statistics.spread_rps ?? Infinity) / (one.statistics.median_rps ?? 1);
   const constant = large.length > 1 ? [...large].sort((a, b) => share(a) - share(b))[0] : null;
-  const strongest = large.length > 1
-    ? [...large].sort((a, b) => (b.statistics.median_rps ?? 0) - (a.statistics.median_rps ?? 0))[0]
-    : null;
   const head = ["", "count", "unseen", "median", "deviation", "best", "speed"].map((key) =>
     element("th", { scope: "col" }, key === "median" || key === "deviation" ? term(key) : key && text(key))
   );
@@ -202,7 +202,7 @@ function statisticsTable(series, open) {
         { scope: "row" },
         legendMark(index),
         ` ${one.name} `,
-        one === strongest ? element("span.badge.sure", {}, text("strongest")) : "",
+        one.isStrongest ? element("span.badge.sure", {}, text("strongest")) : "",
         one === constant ? element("span.badge.good", {}, text("most_constant")) : "",
       ),
       element("td", {}, String(statistics.count)),
