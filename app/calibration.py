@@ -12,6 +12,7 @@ import tomli_w
 
 from spinscope.pipeline.calibration.board import Board, BoardView, Pattern, board_views
 from spinscope.pipeline.calibration.camera_calibration import calibrate_camera, focal_length_px
+from spinscope.pipeline.calibration.outline_offset import MeasuredOutline, outline_offset
 from spinscope.pipeline.calibration.pixel_latency import TurningDisc, pixel_latency
 from spinscope.pipeline.calibration.stereo_calibration import calibrate_stereo
 from spinscope.pipeline.calibration.table_pose import table_pose
@@ -23,9 +24,12 @@ from spinscope.pipeline.presets import preset
 from spinscope.pipeline.recording_folders import recordings_in
 from spinscope.pipeline.recordings import ReadingOptions, open_recording
 from spinscope.pipeline.recordings.trials import trial_windows_us
+from spinscope.pipeline.registry import STAGES
 from spinscope.pipeline.session import Choices, Progress, Session
+from spinscope.pipeline.shots import ShotLog
+from spinscope.pipeline.toml import toml_tables
 
-LATENCY_RANGE_US = 10_000.0  # of `track.latency_us`
+LATENCY_RANGE_US, OUTLINE_RANGE_PX = 10_000.0, 5.0  # of `track.latency_us` and `track.outline_px`
 
 
 def calibrate_by_board(
@@ -94,17 +98,23 @@ def calibrate_by_ball(
 def calibrate_table(
     corners_px: Sequence[tuple[float, float]], camera: str, size_px: tuple[int, int], out: Path
 ) -> list[str]:
-    """Find camera.up by the table's corners and write it with the camera's preset; see `calibrate_by_board`."""
+    """Find camera.up by the table's corners and write it with the camera's preset; see `calibrate_by_board`.
+
+    The table's frame is written beside it, for the truth of what was measured in it (`camera_frame` of a sidecar).
+    """
     _check_name(out)
     parameters = preset(camera).camera
     pose = table_pose(corners_px, Camera.of(parameters, *size_px))
     stated = dataclasses.replace(parameters, up=tuple(pose.up.tolist()))
     _write(out, {name: value for name, value in stated.as_dict().items() if value is not None})
+    frame = out.with_suffix(".frame.toml")
+    with atomic_file(frame, "calibration") as part:
+        part.write_text(tomli_w.dumps({"table": {"rotation": pose.rotation.tolist()}}))
     up = ", ".join(f"{value:.4f}" for value in pose.up)
     return [
         f"up is ({up}); the camera stands {pose.height_m:.3f} m over the table; a corner is off by "
         f"{pose.reprojection_px:.2f} px at most",
-        f"wrote {out}",
+        f"wrote {out} and {frame}",
     ]
 
 
@@ -166,10 +176,14 @@ def calibrate_latency(
     recordings: Sequence[Path],
     circle: tuple[float, float, float],
     channel: int | None,
+    camera: str | None,
     reading: ReadingOptions,
     out: Path,
 ) -> list[str]:
-    """Find track.latency_us by recordings of a turning disc with a trigger a turn; see `calibrate_by_board`."""
+    """Find track.latency_us by recordings of a turning disc with a trigger a turn; see `calibrate_by_board`.
+
+    What is found is written with the preset of the camera, where one is given.
+    """
     _check_name(out)
     discs = []
     for path in recordings:
@@ -182,17 +196,64 @@ def calibrate_latency(
             f"the pixels seem to be {found.latency_us:.0f} us late: do the triggers come at the same place of the disc "
             "at each speed, and is their clock the camera's?"
         )
-    with atomic_file(out, "calibration") as part:
-        part.write_text(tomli_w.dumps({"track": {"latency_us": round(found.latency_us, 1)}}))
+    _write_with(camera, {"latency_us": round(found.latency_us, 1)}, out)
     speeds = ", ".join(f"{disc.speed_rps:.1f}" for disc in discs)
     known = f"the pixels report an edge {found.latency_us:.1f} +- {found.std_us:.1f} us late (at {speeds} rps)"
     return [known, f"wrote {out}"]
+
+
+def calibrate_outline(
+    recordings: Sequence[Path], distances_m: Sequence[float], camera: str | None, reading: ReadingOptions, out: Path
+) -> list[str]:
+    """Find track.outline_px by shots at known distances from the lens; see `calibrate_latency`.
+
+    A recording without a shot is said and left out; of several shots in one the longest counts.
+    """
+    _check_name(out)
+    said: list[str] = []
+    outlines: list[MeasuredOutline] = []
+    for path, distance_m in zip(recordings, distances_m, strict=True):
+        try:
+            session = Session.open(path, Choices(preset=camera, reading=reading))
+            if not session.states_focal_length:
+                raise RecordingError(f"nothing states the focal length: give --camera: {path}")
+            shots = ShotLog.of(session.ticks(("track",), forget=STAGES.names)).shots
+            if not shots:
+                raise RecordingError(f"no shot is found in it: {path}")
+        except RecordingError as error:
+            said.append(f"left out: {error}")
+            continue
+        shot, lens = max(shots, key=lambda shot: shot.t_us.size), session.camera
+        x, y, _, _, radius = shot.state[shot.measured].T
+        at = int(np.argmin(np.hypot(x - lens.principal_x_px, y - lens.principal_y_px)))
+        seen_px = float(radius[at]) + session.parameters.track.outline_px
+        outlines.append(MeasuredOutline(float(x[at]), float(y[at]), seen_px, distance_m))
+    if not outlines:
+        raise RecordingError("; ".join(said))
+    found = outline_offset(outlines, session.ball_radius_m, lens)
+    if not 0.0 <= found.outline_px <= OUTLINE_RANGE_PX:
+        raise RecordingError(
+            f"the outline seems to be {found.outline_px:.2f} px outside the ball: check distances and focal length"
+        )
+    _write_with(camera, {"outline_px": round(found.outline_px, 3)}, out)
+    known = (
+        f"the pixels see the outline {found.outline_px:.2f} +- {found.std_px:.2f} px outside the ball ({len(outlines)} "
+        f"shots); the lens's centre is {1000 * found.farther_m:.0f} mm farther away than measured"
+    )
+    return [*said, known, f"wrote {out}"]
 
 
 def _check_name(out: Path) -> None:
     if out.suffix != ".toml":
         raise ParameterError(f"a calibration is a TOML file: give a name that ends with .toml instead of {out}")
     check_writable(out, "calibration")
+
+
+def _write_with(camera: str | None, track: dict[str, float], out: Path) -> None:
+    """Write values of the stage `track` as a preset, with all that the preset of the camera states."""
+    stated = {} if camera is None else toml_tables(Path(camera).read_text(encoding="utf-8"))
+    with atomic_file(out, "calibration") as part:
+        part.write_text(tomli_w.dumps({**stated, "track": {**stated.get("track", {}), **track}}))
 
 
 def _write(out: Path, camera: dict[str, Any]) -> None:

@@ -66,15 +66,18 @@ class StatedTruth:
     def of(cls, table: Mapping[str, Any], folder: Path = Path()) -> StatedTruth:
         """The truth of a table with `spin_rps`, `axis` and `rps`, `rps` alone, or `dotted_shots`.
 
-        `dotted_shots` is the file of their spins, and `camera_frame` that of `spinscope calibrate stereo` where the
-        spin is stated in the frame camera's frame; both from the folder on. Raises SpinscopeError.
+        `dotted_shots` is the file of their spins or the folder of their trajectories, and `camera_frame` that of
+        `spinscope calibrate stereo` or `table` where the spin is stated in the frame camera's or the table's frame;
+        both from the folder on. Raises SpinscopeError.
         """
-        known = (*(one.name for one in fields(cls)), "axis", "camera_frame")
+        known = (*(one.name for one in fields(cls)), "axis", "camera_frame", "dotted_trajectories")
         for name in table:
             if name not in known:
                 raise ParameterError(f"truth.{name} is unknown{did_you_mean(name, known)}")
         if "dotted_shots" in table:
             return cls._of_dotted_shots(table, folder)
+        if "dotted_trajectories" in table:
+            raise ParameterError("truth.dotted_trajectories are numbers of dotted_shots: give its folder, too")
         spin, rps = _vector(table, "spin_rps"), _number(table, "rps")
         axis = _vector(table, "axis")
         if axis is not None:
@@ -105,7 +108,9 @@ class StatedTruth:
         if twice:
             raise ParameterError(f"truth.dotted_shots tells the spin, and so does {', '.join(twice)}: give one of them")
         about = _circumstances(table)
-        shots = DottedShots.read(folder / str(table["dotted_shots"]), about["setting"])
+        shots = DottedShots.read(folder / str(table["dotted_shots"]), about["setting"], _trajectories(table))
+        if about["speed_m_s"] is None:
+            about["speed_m_s"] = shots.speed_m_s
         x, y, z = shots.mean_rps.tolist()
         return cls(
             spin_rps=_in_event_camera((x, y, z), table, folder),
@@ -231,16 +236,29 @@ def _in_event_camera(
     if "camera_frame" not in table:
         return spin_rps
     path = folder / str(table["camera_frame"])
+    tables = _toml_tables(path)
     try:
-        rotation = np.array(_toml_tables(path)["stereo"]["rotation"], np.float64)
+        rotation = np.array((tables.get("stereo") or tables["table"])["rotation"], np.float64)
     except (KeyError, TypeError, ValueError):
         rotation = np.empty(0)
     if rotation.shape != (3, 3) or not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3):
         raise ParameterError(
-            f"truth.camera_frame names no rotation between two cameras: `spinscope calibrate stereo` writes one: {path}"
+            "truth.camera_frame names no rotation from the camera's frame: `spinscope calibrate stereo` and `calibrate "
+            f"table` write one: {path}"
         )
     x, y, z = (rotation.T @ spin_rps).tolist()
     return x, y, z
+
+
+def _trajectories(table: Mapping[str, Any]) -> list[int] | None:
+    """Numbers of dotted balls' trajectories, one or several; None where the truth states none."""
+    numbers = table.get("dotted_trajectories")
+    if numbers is None:
+        return None
+    numbers = numbers if isinstance(numbers, list) else [numbers]
+    if not numbers or not all(isinstance(one, int | float) and one == int(one) >= 0 for one in numbers):
+        raise ParameterError(f"truth.dotted_trajectories = {numbers!r} is not allowed: give whole numbers, [0, 1, 2]")
+    return list(dict.fromkeys(map(int, numbers)))
 
 
 def _circumstances(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -15,7 +15,7 @@ TRUTH_TABLE = "truth.csv"
 # Columns and the tables of a sidecar to which they belong; any other field is a column `table.field`.
 COLUMNS = {
     **dict.fromkeys(("spin_rps", "axis", "rps", "spin_std_rps", "axis_std_deg"), "truth"),
-    **dict.fromkeys(("ball", "speed_m_s", "setting", "dotted_shots", "camera_frame"), "truth"),
+    **dict.fromkeys(("ball", "speed_m_s", "setting", "camera_frame", "dotted_shots", "dotted_trajectories"), "truth"),
     **dict.fromkeys(("x_px", "y_px", "radius_px"), "fixed_ball"),
 }
 TEXTS = ("setting", "dotted_shots", "camera_frame")  # fields that are no numbers, whatever they look like

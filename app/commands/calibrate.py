@@ -1,4 +1,4 @@
-"""`spinscope calibrate`: the camera, a frame camera beside it, the pixels' latency, and the table's pose."""
+"""`spinscope calibrate`: the camera, a frame camera beside it, the pixels' latency and outline, the table's pose."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class BoardSize(click.ParamType[tuple[int, int]]):
 
 @click.group()
 def calibrate() -> None:
-    """Calibrate the camera, a frame camera beside it, the pixels' latency, and the table's pose."""
+    """Calibrate the camera, a frame camera beside it, the pixels' latency and outline, and the table's pose."""
 
 
 @calibrate.command()
@@ -119,27 +119,48 @@ def stereo(
 
 @calibrate.command()
 @click.argument("recordings", nargs=-1, required=True, type=RECORDING, metavar="FILE...")
-@click.option(
-    "--disc", type=float, nargs=3, required=True, metavar="X Y RADIUS", help="Axis of the disc, and its marks, in px."
-)
+@click.option("--disc", type=float, nargs=3, metavar="X Y RADIUS", help="Axis of the disc, and its marks, in px.")
 @click.option("--channel", type=click.IntRange(0, 255), help="Trigger input, where there are several.")
+@click.option(
+    "--distance-m",
+    "distances_m",
+    type=click.FloatRange(0.1, 20.0),
+    multiple=True,
+    help="Instead of a disc: distance from lens to ball, once for each FILE with a shot.",
+)
+@click.option("--camera", "preset", metavar="FILE.toml", help="The calibrated camera, which is written as well.")
 @click.option("--out", type=click.Path(path_type=Path), required=True, metavar="FILE.toml", help="Preset to write.")
 @reading_options
 def latency(
     recordings: tuple[Path, ...],
-    disc: tuple[float, float, float],
+    disc: tuple[float, float, float] | None,
     channel: int | None,
+    distances_m: tuple[float, ...],
+    preset: str | None,
     out: Path,
     reading: ReadingOptions,
 ) -> None:
-    """Find how late the pixels report an edge (track.latency_us), from a turning disc.
+    """Find how late and how far outside the pixels report an edge (track.latency_us, track.outline_px).
 
-    Let a disc with marks turn before the camera, facing it, with a pulse a turn on the trigger input (a light barrier).
-    Record it at two speeds or more, turning the same way.
+    With --disc: how late. Let a disc with marks turn before the camera, facing it, with a pulse a turn on the trigger
+    input (a light barrier). Record it at two speeds or more, turning the same way.
+
+    With --distance-m: how far outside a ball its outline is seen. Record shots that cross the image at known distances,
+    at two or more of them, some shots at each.
     """
     from .. import calibration as running
 
-    for line in running.calibrate_latency(recordings, disc, channel, reading, out):
+    if (disc is None) == (not distances_m):
+        raise click.UsageError("give --disc of a turning disc, or --distance-m of shots")
+    if disc is not None:
+        said = running.calibrate_latency(recordings, disc, channel, preset, reading, out)
+    elif len(distances_m) != len(recordings):
+        raise click.UsageError(
+            f"{len(recordings)} files with {len(distances_m)} distances: give --distance-m once for each FILE"
+        )
+    else:
+        said = running.calibrate_outline(recordings, distances_m, preset, reading, out)
+    for line in said:
         note(line)
 
 
@@ -150,13 +171,17 @@ def latency(
     nargs=8,
     required=True,
     metavar="X1 Y1 X2 Y2 X3 Y3 X4 Y4",
-    help="The table's corners in the image, in order round it, px.",
+    help="The table's corners in the image, in order round it, px; its y axis runs from the first along a long side.",
 )
 @click.option("--camera", "preset", required=True, metavar="FILE.toml", help="The calibrated camera.")
 @click.option("--size", type=BoardSize(), default="1280x720", show_default=True, help="Sensor, in px.")
 @click.option("--out", type=click.Path(path_type=Path), required=True, metavar="FILE.toml", help="Preset to write.")
 def table(corners: tuple[float, ...], preset: str, size: tuple[int, int], out: Path) -> None:
-    """Find the direction up (camera.up) from the table's four corners, and write it with the camera."""
+    """Find the direction up (camera.up) from the table's four corners, and write it with the camera.
+
+    The table's frame is written beside it, as FILE.frame.toml: with `camera_frame = "FILE.frame.toml"` in a sidecar's
+    [truth], spins measured in it (y along the table, z up), as of SpinDOE's trajectories, are turned into the camera's.
+    """
     from .. import calibration as running
 
     pairs = list(zip(corners[::2], corners[1::2], strict=True))

@@ -26,7 +26,7 @@ class TablePose:
     up : (3,) float64
         Unit normal of the table, camera frame.
     along : (3,) float64
-        Unit vector along its long sides, camera frame; which of the two directions is left open.
+        Unit vector along its long sides, camera frame: from the first corner on.
     middle_m : (3,) float64
         Middle of the table, camera frame.
     reprojection_px : float
@@ -42,6 +42,14 @@ class TablePose:
     def height_m(self) -> float:
         """Height of the camera over the table's plane."""
         return abs(float(self.up @ self.middle_m))
+
+    @property
+    def rotation(self) -> Floats:
+        """(3, 3) float64 from the camera's frame to the table's: x to the right, y along the table, z up.
+
+        SpinDOE's trajectories have such a frame, see `dotted_shots`.
+        """
+        return np.stack([np.cross(self.along, self.up), self.along, self.up])
 
 
 def table_pose(corners_px: Sequence[tuple[float, float]], camera: Camera) -> TablePose:

@@ -73,6 +73,59 @@ def test_a_sidecar_names_the_table(tmp_path: Path) -> None:
     assert Sidecar.beside(tmp_path / "shot.raw").truth == truth
 
 
+def with_trajectories(folder: Path) -> Path:
+    """A folder as SpinDOE's data set has it: shots 0, 1 and 12, of 6, 8 and 10 m/s along y, that gravity bends."""
+    made = folder / "trajectories"
+    made.mkdir()
+    (made / "index.csv").write_text(
+        "traj_file,x_spin,y_spin,z_spin\n"
+        + "".join(f"{number},{FULL_TURN * rps},0,0\n" for number, rps in ((0, 30), (1, 50), (12, 70)))
+    )
+    t_s = np.array([0.0, 0.007, 0.014, 0.024, 0.05, 0.08, 0.2])
+    for number, speed_m_s in ((0, 6.0), (1, 8.0), (12, 10.0)):
+        lines = [f"{t:.3f};0.006;{1 - speed_m_s * t:.4f};{0.3 - 4.905 * t**2:.4f}" for t in t_s]
+        (made / f"{number:03}.csv").write_text("\n".join(lines) + "\n")
+    return made
+
+
+def test_trajectories_of_spindoe_are_read_by_number_and_tell_the_speed(tmp_path: Path) -> None:
+    made = with_trajectories(tmp_path)
+    every = DottedShots.read(made, "top")
+    assert every.mean_rps == pytest.approx([50, 0, 0]) and every.speed_m_s == pytest.approx(8.0, rel=0.01)
+    (tmp_path / "shot.toml").write_text('[truth]\ndotted_shots = "trajectories"\ndotted_trajectories = [0, 1]\n')
+    truth = Sidecar.beside(tmp_path / "shot.raw").truth
+    assert truth is not None and truth.rps == pytest.approx(40) and truth.dotted_shots == 2
+    assert truth.speed_m_s == pytest.approx(7.0, rel=0.01)
+    (tmp_path / "shot.toml").unlink()
+    heading = "recording,dotted_shots,dotted_trajectories,speed_m_s"
+    (tmp_path / "truth.csv").write_text(f"{heading}\nshot,trajectories,1 12,9\nother,trajectories,12,\n")
+    shot, other = (Sidecar.beside(tmp_path / f"{name}.raw").truth for name in ("shot", "other"))
+    assert shot is not None and shot.rps == pytest.approx(60) and shot.speed_m_s == 9.0
+    assert other is not None and other.rps == pytest.approx(70) and other.speed_m_s == pytest.approx(10.0, rel=0.01)
+    (made / "012.csv").unlink()  # the spin is in the index alone
+    other = Sidecar.beside(tmp_path / "other.raw").truth
+    assert other is not None and other.rps == pytest.approx(70) and other.speed_m_s is None
+
+
+@pytest.mark.parametrize(
+    ("stated", "trajectory", "words"),
+    [
+        ('dotted_shots = "trajectories"\ndotted_trajectories = [2]', "", "no row of the setting has traj_file 2"),
+        ('dotted_shots = "trajectories"\ndotted_trajectories = [0.5]', "", "give whole numbers"),
+        ("rps = 3\ndotted_trajectories = [0]", "", "are numbers of dotted_shots"),
+        ('dotted_shots = "trajectories"', "t;x;y;z\n0;1;2;3\n", "lines time;x;y;z.*000.csv"),
+        ('dotted_shots = "trajectories"', "0;1;2;3\n0;1;2;3\n", "in order of time"),
+    ],
+)
+def test_wrong_trajectories_are_refused_in_words(tmp_path: Path, stated: str, trajectory: str, words: str) -> None:
+    made = with_trajectories(tmp_path)
+    (tmp_path / "shot.toml").write_text(f"[truth]\n{stated}\n")
+    if trajectory:
+        (made / "000.csv").write_text(trajectory)
+    with pytest.raises(ParameterError, match=words):
+        Sidecar.beside(tmp_path / "shot.raw")
+
+
 @pytest.mark.parametrize(
     ("sidecar", "table", "words"),
     [

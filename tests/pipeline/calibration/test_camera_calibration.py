@@ -24,6 +24,7 @@ from spinscope.pipeline.presets import preset
 from spinscope.pipeline.recordings import ReadingOptions, write_recording
 from spinscope.pipeline.recordings.in_memory import RecordingInMemory
 from spinscope.pipeline.session import Choices, Session
+from spinscope.pipeline.sidecar import StatedTruth
 from spinscope.pipeline.simulated_recordings import simulate_to_file
 from spinscope.pipeline.simulator.board import SimulatedBoard, drawn_poses, simulate_board
 from spinscope.pipeline.simulator.sensor import SensorModel
@@ -206,16 +207,22 @@ def test_table_pose(seed: int, tmp_path: Path) -> None:
     turn = rotations(random.uniform(-0.4, 0.4, 3))[0]
     table_m = np.array([(-1.37, -0.7625, 0), (1.37, -0.7625, 0), (1.37, 0.7625, 0), (-1.37, 0.7625, 0)])
     place = np.array([0.1, -0.05, 4.0])
-    corners = np.roll(TRUE.project(table_m @ turn.T + place), random.integers(4), axis=0)[:: random.choice([-1, 1])]
+    order = np.roll(np.arange(4), random.integers(4))[:: random.choice([-1, 1])]
+    corners = TRUE.project(table_m @ turn.T + place)[order]
     pose = table_pose([tuple(corner) for corner in corners], TRUE)
     assert pose.up == pytest.approx(-turn[:, 2], abs=1e-4) and pose.middle_m == pytest.approx(place, abs=1e-3)
-    assert abs(pose.along @ turn[:, 0]) == pytest.approx(1.0, abs=1e-6)
+    from_first = -np.sign(table_m[order[0], 0]) * turn[:, 0]  # along the long side, away from the first corner
+    assert pose.along == pytest.approx(from_first, abs=1e-4) and np.linalg.det(pose.rotation) == pytest.approx(1.0)
+    assert pose.rotation @ from_first == pytest.approx([0, 1, 0], abs=1e-4)
+    assert pose.rotation @ -turn[:, 2] == pytest.approx([0, 0, 1], abs=1e-4)
     assert pose.height_m == pytest.approx(abs(place @ turn[:, 2]), abs=1e-3)
     with pytest.raises(ParameterError, match="in order round the table"):
         table_pose([tuple(corner) for corner in corners[[0, 2, 1, 3]]], TRUE)
     (tmp_path / "lens.toml").write_text("[camera]\nfocal_length_mm = 4.0\n")
     calibrate_table([tuple(corner) for corner in corners], str(tmp_path / "lens.toml"), SIZE, tmp_path / "up.toml")
     assert preset(tmp_path / "up.toml").camera.up == pytest.approx(-turn[:, 2], abs=0.05)  # without the distortion
+    stated = {"spin_rps": [0.0, 0.0, 30.0], "camera_frame": "up.frame.toml"}  # of the table
+    assert StatedTruth.of(stated, tmp_path).spin_rps == pytest.approx(-30 * turn[:, 2], abs=1.5)
 
 
 def test_command_line_says_what_is_missing(tmp_path: Path) -> None:
