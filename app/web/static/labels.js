@@ -1,8 +1,9 @@
-// Labels of the ball: each in the picture of its exposure, to be accepted, moved or deleted. Every change is saved at
-// once, in order.
+// Labels of the ball: each in the picture of its exposure, to be accepted, moved or deleted, and missed ones added. Every
+// change is saved at once, in order.
 
 /** @import { Label, LabelChangeRequest, Opening } from "./messages.d.ts" */
 /** @import { Connection } from "./server.js" */
+/** @import { Viewer } from "./viewer.js" */
 
 import { attempt, drawing, element, notice, number } from "./elements.js";
 
@@ -11,6 +12,8 @@ const FAR = 10; // times as much with Shift
 const LEAST_RADIUS_PX = 1;
 const SETTLED_MS = 300; // a held key or a turned wheel is one change
 const VIEW_RADII = 10; // side of the picture: a ball at 12 m/s sweeps over eight of its radii in an exposure
+const STEP_US = 2500; // between labels, as `spinscope label` sets them
+const NEAR_US = 10_000; // an exposure: the playhead is in a flight if it is no farther from a label of it
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
 /** @typedef {{first: number, removed: number, labels: Label[]}} Change */
@@ -22,6 +25,7 @@ export class Labels {
   #place = 0;
   /** @type {Label | null} the label in sight, moved and not yet saved */
   #moved = null;
+  #isPlaced = true; // a label of a new flight is not, until it is clicked at its place in the whole picture
   /** @type {(Change & {place: number})[]} what leads back */
   #history = [];
   /** @type {Promise<void>} changes on their way to the file */
@@ -32,18 +36,26 @@ export class Labels {
 
   /**
    * @param {any} parent
-   * @param {{connection: Connection, opening: Opening}} app
+   * @param {{connection: Connection, opening: Opening, viewer: Viewer}} app
    */
-  constructor(parent, { connection, opening }) {
+  constructor(parent, { connection, opening, viewer }) {
     this.connection = connection;
     this.recording = opening.recording;
+    this.viewer = viewer;
     this.summary = element("p.note");
     this.begin = element("button", { disabled: true, onclick: () => this.#show() }, "Go through the labels");
-    parent.append(this.summary, this.begin);
+    this.adding = element("button", {
+      disabled: true,
+      title: "A label that was missed, at the time shown in the viewer",
+      onclick: () => this.#addAtPlayhead(),
+    }, "Add one at the playhead");
+    parent.append(this.summary, element("div.row", {}, this.begin, this.adding));
     this.actions = [
       { keys: ["Enter", "a"], shown: "Enter, a", label: "Accept", act: () => this.#accept() },
       { keys: ["A"], shown: "Shift+A", label: "Accept the rest of the flight", act: () => this.#acceptFlight() },
       { keys: ["Delete", "x"], shown: "Delete, x", label: "Delete", act: () => this.#delete() },
+      { keys: ["i"], shown: "i", label: "Add after", act: () => this.#addBeside(1) },
+      { keys: ["I"], shown: "Shift+I", label: "Add before", act: () => this.#addBeside(-1) },
       { keys: ["p", "PageUp"], shown: "p, Page↑", label: "Previous", act: () => this.#select(this.#place - 1) },
       { keys: ["n", "PageDown"], shown: "n, Page↓", label: "Next", act: () => this.#select(this.#place + 1) },
       { keys: ["z"], shown: "z, Ctrl+Z", label: "Undo", act: () => this.#undo() },
@@ -62,7 +74,8 @@ export class Labels {
       element("button", { title: `${label} (${shown})`, onclick: () => (act(), this.stage.focus()) }, label)
     );
     const help = "All events of 10 ms, those of the middle millisecond bright: the circle belongs on these. Drag it, " +
-      "or use the arrow keys (Shift: ten times as far); the wheel, + and - change its radius. Every change is saved.";
+      "or use the arrow keys (Shift: ten times as far); the wheel, + and - change its radius. Where the ball was missed, " +
+      "add a label. Every change is saved.";
     this.dialog = element(
       "dialog.labels",
       { "aria-labelledby": "labels-title" },
@@ -98,6 +111,7 @@ export class Labels {
     /** @type {number[] | null} */
     let held = null;
     this.stage.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
+      if (!this.#isPlaced) return void this.#placeAt(event);
       held = [event.clientX, event.clientY];
       this.stage.setPointerCapture(event.pointerId);
     });
@@ -120,16 +134,15 @@ export class Labels {
     this.#moved = null;
     this.#history = [];
     this.dialog.title = path;
-    this.begin.disabled = false; // of a damaged file it stays
+    this.begin.disabled = this.adding.disabled = false; // of a damaged file they stay
     this.#drawList();
     this.#select(this.#place);
   }
 
-  #show() {
+  #show(place = this.#labels.findIndex(({ state }) => state === "detected")) {
     this.dialog.showModal();
     this.#drawList();
-    const open = this.#labels.findIndex(({ state }) => state === "detected");
-    this.#select(Math.max(open, 0));
+    this.#select(Math.max(place, 0));
     this.stage.focus();
   }
 
@@ -143,6 +156,7 @@ export class Labels {
     if (!this.dialog.open) return;
     const { width_px: width, height_px: height } = this.recording;
     const { t_us, x_px, y_px, radius_px } = this.#label;
+    this.#isPlaced = true;
     const side = VIEW_RADII * radius_px, href = this.connection.path(`label.png?t_us=${t_us}`);
     this.stage.setAttribute("viewBox", `${x_px + 0.5 - side / 2} ${y_px + 0.5 - side / 2} ${side} ${side}`);
     this.stage.replaceChildren(drawing("image", { href, width, height }), this.circle, this.centre);
@@ -214,6 +228,56 @@ export class Labels {
     if (this.#labels.length === 1) return void (this.words.textContent = "The last label stays: delete the file.");
     this.#change({ first: this.#place, removed: 1, labels: [] });
     this.#select(this.#place);
+  }
+
+  // Beside the one in sight: a step before or after it, or in the middle of what is free there.
+  #addBeside(/** @type {1 | -1} */ way) {
+    this.#settle();
+    const { t_us, ball } = this.#labels[this.#place], next = this.#labels[this.#place + way];
+    const free_us = next?.ball === ball ? Math.abs(next.t_us - t_us) / 2 : STEP_US;
+    this.#select(this.#add(t_us + way * Math.min(STEP_US, free_us), ball));
+  }
+
+  // In the flight that it falls into, else of a flight of its own, whose ball may be anywhere in the picture.
+  #addAtPlayhead() {
+    const t_us = this.viewer.playhead_us;
+    if (t_us === null) return void notice("The viewer shows no time yet: wait until it is there.");
+    const near = this.#labels.find((label) => Math.abs(label.t_us - t_us) <= NEAR_US);
+    const place = this.#add(t_us, near?.ball ?? Math.max(...this.#labels.map(({ ball }) => ball)) + 1);
+    this.#show(place);
+    if (near) return;
+    const { width_px: width, height_px: height } = this.recording;
+    this.#isPlaced = false;
+    this.stage.setAttribute("viewBox", `0 0 ${width} ${height}`);
+    this.words.textContent = "A new flight: click the ball's middle.";
+  }
+
+  #placeAt(/** @type {PointerEvent} */ event) {
+    const { x, y } = new DOMPoint(event.clientX, event.clientY).matrixTransform(this.stage.getScreenCTM().inverse());
+    const label = { ...this.#label, x_px: x - 0.5, y_px: y - 0.5 };
+    this.#change({ first: this.#place, removed: 1, labels: [label] });
+    this.#select(this.#place);
+  }
+
+  /**
+   * Adds a label where the flight's nearest two lead; in the picture's middle, as large as the others, if it has none.
+   * @param {number} t_us
+   * @param {number} ball
+   */
+  #add(t_us, ball) {
+    const far = (/** @type {Label} */ label) => Math.abs(label.t_us - t_us);
+    const [one, other] = this.#labels.filter((label) => label.ball === ball).sort((a, b) => far(a) - far(b));
+    const { width_px, height_px } = this.recording, like = one ?? this.#labels[0];
+    const middle = { x_px: (width_px - 1) / 2, y_px: (height_px - 1) / 2 };
+    const share = other ? (t_us - one.t_us) / (other.t_us - one.t_us) : 0;
+    const along = (/** @type {"x_px" | "y_px"} */ name) =>
+      one ? one[name] + share * ((other ?? one)[name] - one[name]) : middle[name];
+    /** @type {Label} */
+    const label = { ...like, t_us, ball, x_px: along("x_px"), y_px: along("y_px"), state: "moved" };
+    const later = this.#labels.findIndex((label) => label.ball > ball || (label.ball === ball && label.t_us > t_us));
+    const first = later < 0 ? this.#labels.length : later;
+    this.#change({ first, removed: 0, labels: [label] });
+    return first;
   }
 
   #undo() {

@@ -15,6 +15,7 @@ from click.testing import CliRunner
 from spinscope.app.cli import cli
 from spinscope.app.web.label_routes import EXPOSED, IN_THE_MIDDLE, exposure_picture
 from spinscope.pipeline.calibration.ball_labels import LATENCY_US, BallLabels, labels_beside
+from spinscope.pipeline.calibration.label_file import HAND_STD_PX
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.recordings import open_recording
 
@@ -118,6 +119,32 @@ def test_labels_are_gone_through_by_key_and_mouse(browser: Any, tuner: Served, p
         page.keyboard.press("Control+z")
     saved(lambda labels: labels.state.tolist() == ["detected"] * size)
     assert BallLabels.read(path).x_px == pytest.approx(before.x_px, abs=1e-3)
+    rows.nth(0).click()
+    page.keyboard.press("i")  # a missed one, half-way to the next
+    saved(lambda labels: labels.state.tolist() == ["detected", "moved", *["detected"] * (size - 1)])
+    added = BallLabels.read(path)
+    assert added.t_us[0] < added.t_us[1] <= added.t_us[0] + 2500 and added.std_px[1] == HAND_STD_PX
+    share = (added.t_us[1] - added.t_us[0]) / (added.t_us[2] - added.t_us[0])
+    assert added.x_px[1] == pytest.approx(added.x_px[0] + share * (added.x_px[2] - added.x_px[0]), abs=0.01)
+    page.keyboard.press("z")
+    saved(lambda labels: labels.ball.size == size)
+    page.keyboard.press("Escape")
+    dialog.wait_for(state="hidden")
+    later_us = float(before.t_us[-1]) + 50_000  # no label near: a flight of its own
+    playhead = "Object.defineProperty(Viewer.prototype, 'playhead_us', { get: () => at_us })"
+    page.evaluate(
+        f"async (at_us) => {{ const {{ Viewer }} = await import('/static/viewer.js'); {playhead}; }}", later_us
+    )
+    page.get_by_role("button", name="Add one at the playhead").click()
+    dialog.get_by_text("A new flight: click the ball's middle").wait_for()
+    box = dialog.locator("svg").bounding_box()
+    page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    saved(lambda labels: labels.ball.tolist() == [1] * size + [2] and labels.t_us[-1] == later_us)
+    page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])  # it is placed, and not moved again
+    placed = BallLabels.read(path)
+    middle = open_recording(tuner.state.path)
+    assert placed.x_px[-1] == pytest.approx((middle.width_px - 1) / 2, abs=2.0)
+    assert placed.y_px[-1] == pytest.approx((middle.height_px - 1) / 2, abs=2.0)
     page.keyboard.press("Escape")
     dialog.wait_for(state="hidden")
     assert tab.errors == []
