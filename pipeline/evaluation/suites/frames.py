@@ -24,8 +24,8 @@ from . import thrower
 LABEL = "Frame camera against event camera: the paper's table 2"
 HELP = "A frame camera beside the event camera on the same flights (table 2)."
 
+TAKES_SCENE_CHOICES = True
 TAKES_RIVALS = True
-
 REAL_KINDS = (FLIGHT,)
 
 STEREO = "stereo.toml"  # of `spinscope calibrate stereo`
