@@ -17,6 +17,7 @@ import numpy as np
 from joblib import Parallel
 from numpy.typing import NDArray
 
+from ..camera import Camera
 from ..errors import ParameterError
 from ..files import atomic_file
 from ..simulator import SimulatedRecording, human_shot, spinner
@@ -33,15 +34,15 @@ WINDOWS_US = (3000, 5000, 10_000)
 FEWEST_EVENTS = 30  # as the methods ask of a visible logo
 SPINNER_MS = 50
 LOWEST_RPS, HIGHEST_RPS = 5.0, 150.0
-KINDS = ("top", "back", "side")
 SCENE_SEEDS = 1 << 40  # drawn from so many, so that no suite's are among them
 README = """\
 # Training set of Spinscope's simulator
 
 Made by `spinscope evaluate dataset`; the same command with the same numbers makes it again, event by event. Half of the
-recordings are of a ball on a spinner (balls 1 to 7; top, back and side; {lowest:g} to {highest:g} rps, evenly in the
-logarithm), half are flights as people play them. Windows of {windows} ms end at random times; those with fewer
-than {fewest} logo events are left out.
+recordings are of a ball on a spinner (balls 1 to 7; axes evenly over all directions, so that none is likelier than
+another; {lowest:g} to {highest:g} rps, evenly in the logarithm), half are flights as people play them. Windows of
+{windows} ms end at random times; those with fewer than {fewest} logo events are left out. The events are those that
+contrast takes: without the moving outline's, with those of the rim that cannot be the outline's.
 
 `shard_NNNN.npz`, of n samples with m events together:
 
@@ -140,13 +141,14 @@ def add_recording(samples: Samples, context: TaskContext, number: int, seed: int
     """Simulate a recording, a spinner's or a flight by turns, and take windows of it."""
     random = np.random.default_rng([number, seed])
     scene_seed = int(random.integers(SCENE_SEEDS))
-    parameters = context.parameters
+    parameters, camera = context.parameters, camera_of(context)
     if number % 2:
-        scene = human_shot(camera=camera_of(context), seed=scene_seed)
+        scene = human_shot(camera=camera, seed=scene_seed)
     else:
         rps = math.exp(random.uniform(math.log(LOWEST_RPS), math.log(HIGHEST_RPS)))
-        kind, ball = str(random.choice(KINDS)), int(random.integers(1, 8))
-        scene = spinner(ball=ball, kind=kind, magnitude_rps=rps, duration_ms=SPINNER_MS, seed=scene_seed)
+        axis, ball = random.standard_normal(3), int(random.integers(1, 8))
+        spin_rps = rps * axis / np.linalg.norm(axis)
+        scene = spinner(ball=ball, spin_rps=spin_rps.tolist(), duration_ms=SPINNER_MS, seed=scene_seed)
     recording = render(context, scene, seed=scene_seed)
     if not number % 2:
         parameters = parameters.with_values({"track": known_circle(recording.truth, scene_seed)})
@@ -156,17 +158,22 @@ def add_recording(samples: Samples, context: TaskContext, number: int, seed: int
             shots.setdefault(tick.balls[0].track.shot, []).append(tick)
     ticks = max(shots.values(), key=len, default=[])
     if ticks:
-        _add_windows(samples, recording, ticks, random, scene_seed)
+        _add_windows(samples, recording, camera, ticks, random, scene_seed)
 
 
 def _add_windows(
-    samples: Samples, recording: SimulatedRecording, ticks: Sequence[Tick], random: np.random.Generator, seed: int
+    samples: Samples,
+    recording: SimulatedRecording,
+    camera: Camera,
+    ticks: Sequence[Tick],
+    random: np.random.Generator,
+    seed: int,
 ) -> None:
     """Take windows of a shot that end at random times."""
-    t_us = np.concatenate([tick.logo.events.t_us for tick in ticks])
-    on = np.concatenate([tick.logo.events.on for tick in ticks])
-    normals = np.concatenate([tick.logo.normals for tick in ticks])
-    points = np.concatenate([tick.logo.points_m for tick in ticks])
+    turning = [tick.logo.turning for tick in ticks]
+    names = ("t_us", "on", "normals", "centre_x_px", "centre_y_px")
+    t_us, on, normals, x_px, y_px = (np.concatenate([getattr(part, name) for part in turning]) for name in names)
+    rays = camera.rays(x_px, y_px)
     ends_us = np.array([tick.packet.end_us for tick in ticks])
     start_us = ticks[0].packet.start_us
     for _ in range(WINDOWS_A_RECORDING):
@@ -176,7 +183,7 @@ def _add_windows(
         if end_us - window_us < start_us or last - first < FEWEST_EVENTS:
             continue
         tick = ticks[min(int(np.searchsorted(ends_us, end_us)), len(ticks) - 1)]
-        sight = points[first:last].mean(axis=0)
+        sight = (rays[first:last] / np.linalg.norm(rays[first:last], axis=1)[:, None]).mean(axis=0)
         truth = recording.truth
         spin = [np.interp(end_us - window_us / 2, truth.t_us, truth.spin_rps[:, axis]) for axis in range(3)]
         samples.add(
