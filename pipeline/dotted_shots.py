@@ -146,6 +146,11 @@ class DottedShots:
         return cls(np.array([np.mean(spins, axis=0) for spins in shots.values()]), speed_m_s)
 
 
+def is_trajectory(path: Path) -> bool:
+    """Whether a file is one of the numbered ones beside an INDEX."""
+    return path.suffix == ".csv" and path.stem.isdecimal() and path.with_name(INDEX).is_file()
+
+
 def _trajectory_number(row: dict[str, str]) -> int | None:
     """Number of a row's trajectory, written as 7, 7.0, 007 or 007.csv; None without."""
     try:

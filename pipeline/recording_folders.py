@@ -6,6 +6,7 @@ import glob
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
+from .dotted_shots import is_trajectory
 from .errors import RecordingError
 from .recordings import is_recording, readable_suffixes
 from .truth_table import TRUTH_TABLE
@@ -14,15 +15,21 @@ from .truth_table import TRUTH_TABLE
 def recordings_in(names: Sequence[Path], others: Collection[Path] = ()) -> list[Path]:
     """Recordings named by files, folders (with those below) and patterns like `day1/*.raw`; each once.
 
-    A folder's recordings are told by their suffixes, texts by their content; `others` are no recordings. Raises
-    RecordingError for a folder or a pattern without one.
+    A folder's recordings are told by their suffixes, texts by their content; `others` are no recordings, nor are tables
+    and trajectories of the truth. Raises RecordingError for a folder or a pattern without one.
     """
     found: dict[Path, None] = {}
     not_these = {path.absolute() for path in others}
     for name in names:
         if name.is_dir():
-            below = (path for path in sorted(name.rglob("*")) if path.name != TRUTH_TABLE and is_recording(path))
-            these = [path for path in below if path.absolute() not in not_these]
+            these = [
+                path
+                for path in sorted(name.rglob("*"))
+                if is_recording(path)
+                and path.absolute() not in not_these
+                and path.name != TRUTH_TABLE
+                and not is_trajectory(path)
+            ]
             if not these:
                 raise RecordingError(f"the folder holds no recordings ({', '.join(readable_suffixes())}): {name}")
         elif not name.exists() and glob.has_magic(str(name)):

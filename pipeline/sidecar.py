@@ -236,7 +236,7 @@ def _in_event_camera(
     if "camera_frame" not in table:
         return spin_rps
     path = folder / str(table["camera_frame"])
-    tables = _toml_tables(path)
+    tables = _toml_tables(path) if path.is_file() else {}
     try:
         rotation = np.array((tables.get("stereo") or tables["table"])["rotation"], np.float64)
     except (KeyError, TypeError, ValueError):

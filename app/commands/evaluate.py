@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import click
@@ -96,7 +97,7 @@ def evaluate(
 
     choices, scene = Choices(preset, assignments, rivals=rivals), SceneChoices(ball, lens_mm)
     if check is not None:
-        raise click.exceptions.Exit(running.check_folder(check, choices))
+        sys.exit(running.check_folder(check, choices))
     if (suites == (DATASET,)) != (out is not None):
         raise click.UsageError(
             f"`spinscope evaluate {DATASET} --out FOLDER` writes a training set: give both, or neither"

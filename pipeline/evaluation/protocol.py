@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from ..biases import PAPER
-from ..camera import CameraParameters
 from ..errors import SpinscopeError
 from ..recordings import Recording
 from .lab_recordings import SPINNER, LabFolder, LabRecording
@@ -56,7 +55,7 @@ def _lacking(recording: LabRecording) -> Iterator[str]:
     start_us, end_us = recording.span_us
     if isinstance(session.recording, Recording) and session.recording.sensor_from == "guess":
         yield "the file does not state its sensor: give --sensor WxH to `spinscope convert` and keep the result"
-    if session.parameters.camera == CameraParameters():
+    if not session.states_focal_length:
         yield f"the camera is not stated: [camera] focal_length_mm in {toml}, or the result of `calibrate camera`"
     if sidecar.truth is None:
         yield f"no truth: [truth] in {toml}, or a line of truth.csv"

@@ -10,7 +10,10 @@ import pytest
 
 from spinscope.pipeline.dotted_shots import DottedShots
 from spinscope.pipeline.errors import ParameterError, RecordingError
+from spinscope.pipeline.recording_folders import recordings_in
+from spinscope.pipeline.recordings import write_recording
 from spinscope.pipeline.sidecar import Sidecar
+from tests.track_runs import disc_events
 
 FULL_TURN = 2 * math.pi
 
@@ -102,6 +105,13 @@ def test_trajectories_of_spindoe_are_read_by_number_and_tell_the_speed(tmp_path:
     shot, other = (Sidecar.beside(tmp_path / f"{name}.raw").truth for name in ("shot", "other"))
     assert shot is not None and shot.rps == pytest.approx(60) and shot.speed_m_s == 9.0
     assert other is not None and other.rps == pytest.approx(70) and other.speed_m_s == pytest.approx(10.0, rel=0.01)
+    write_recording(
+        tmp_path / "shot.csv",
+        disc_events(np.array([9.0, 9, 900, 0, 5]), 0, 9000, width_px=32, height_px=32),
+        width_px=32,
+        height_px=32,
+    )
+    assert recordings_in([tmp_path]) == [tmp_path / "shot.csv"]
     (made / "012.csv").unlink()  # the spin is in the index alone
     other = Sidecar.beside(tmp_path / "other.raw").truth
     assert other is not None and other.rps == pytest.approx(70) and other.speed_m_s is None

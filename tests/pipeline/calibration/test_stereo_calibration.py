@@ -110,5 +110,5 @@ def test_recordings_and_pictures_of_a_folder(tmp_path: Path) -> None:
     cosine = np.array(truth.spin_rps) @ spin / np.linalg.norm(spin) ** 2
     assert np.degrees(np.arccos(cosine)) < 0.2
     (tmp_path / "stereo.toml").write_text("[stereo]\nrotation = [[1, 2, 3], [0, 1, 0], [0, 0, 1]]\n")
-    with pytest.raises(ParameterError, match="names no rotation between two cameras"):
+    with pytest.raises(ParameterError, match="names no rotation from the camera's frame"):
         Sidecar.beside(tmp_path / "shot.raw")

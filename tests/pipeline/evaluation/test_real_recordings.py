@@ -14,8 +14,8 @@ import pytest
 import tomli_w
 from click.testing import CliRunner
 
-from spinscope.app.cli import cli
-from spinscope.app.evaluate import check_folder, evaluate_suite, write_page
+from spinscope.app.cli import cli, run
+from spinscope.app.evaluate import evaluate_suite, write_page
 from spinscope.pipeline.api import estimate
 from spinscope.pipeline.biases import PAPER, write_biases
 from spinscope.pipeline.errors import ParameterError, RecordingError
@@ -213,10 +213,12 @@ def test_pictures_of_one_movement_are_taken_at_equal_places(lab: Lab, tmp_path: 
 
 
 def test_protocol(lab: Lab, capsys: pytest.CaptureFixture[str]) -> None:
-    assert check_folder(lab[0], Choices()) == 1
+    with pytest.raises(SystemExit) as ended:
+        run(["evaluate", "--check", str(lab[0])])
     said = capsys.readouterr().out
+    assert ended.value.code == 1
     assert "spinner0.raw: the camera is not stated" in said and "has 1 shots: record 5" in said
-    stated = Choices(assignments=["camera.focal_length_mm=8.01"])
+    stated = Choices(assignments=["camera.focal_length_mm=8.0"])  # the default, but stated
     findings = protocol_findings(LabFolder.of(lab[0], stated))
     assert not [finding for finding in findings if finding.recording.startswith("spinner")]
 
