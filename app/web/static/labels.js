@@ -25,7 +25,7 @@ export class Labels {
   #place = 0;
   /** @type {Label | null} the label in sight, moved and not yet saved */
   #moved = null;
-  #isPlaced = true; // a label of a new flight is not, until it is clicked at its place in the whole picture
+  #isPlaced = true; // a label of a new flight is not, until it is clicked at its place: left before, it is taken back
   /** @type {(Change & {place: number})[]} what leads back */
   #history = [];
   /** @type {Promise<void>} changes on their way to the file */
@@ -92,7 +92,7 @@ export class Labels {
   }
 
   #listen() {
-    this.dialog.addEventListener("close", () => this.#settle());
+    this.dialog.addEventListener("close", () => this.#isPlaced ? this.#settle() : this.#undo());
     this.dialog.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
       const { key, ctrlKey, metaKey, shiftKey } = event;
       const isOfButton = key === "Enter" && /** @type {Element} */ (event.target).closest("button");
@@ -152,11 +152,11 @@ export class Labels {
 
   #select(/** @type {number} */ place) {
     this.#settle();
+    if (!this.#isPlaced) return void this.#undo();
     this.#place = Math.min(Math.max(place, 0), this.#labels.length - 1);
     if (!this.dialog.open) return;
     const { width_px: width, height_px: height } = this.recording;
     const { t_us, x_px, y_px, radius_px } = this.#label;
-    this.#isPlaced = true;
     const side = VIEW_RADII * radius_px, href = this.connection.path(`label.png?t_us=${t_us}`);
     this.stage.setAttribute("viewBox", `${x_px + 0.5 - side / 2} ${y_px + 0.5 - side / 2} ${side} ${side}`);
     this.stage.replaceChildren(drawing("image", { href, width, height }), this.circle, this.centre);
@@ -282,6 +282,7 @@ export class Labels {
 
   #undo() {
     this.#settle();
+    this.#isPlaced = true;
     const back = this.#history.pop();
     if (!back) return;
     const { place, ...change } = back;
@@ -292,6 +293,7 @@ export class Labels {
   #change(/** @type {Change} */ change) {
     const { first, removed, labels } = change;
     const taken = this.#labels.slice(first, first + removed);
+    this.#isPlaced = true;
     this.#history.push({ first, removed: labels.length, labels: taken, place: this.#place });
     this.#splice(change);
   }

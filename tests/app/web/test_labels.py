@@ -135,8 +135,13 @@ def test_labels_are_gone_through_by_key_and_mouse(browser: Any, tuner: Served, p
     page.evaluate(
         f"async (at_us) => {{ const {{ Viewer }} = await import('/static/viewer.js'); {playhead}; }}", later_us
     )
-    page.get_by_role("button", name="Add one at the playhead").click()
-    dialog.get_by_text("A new flight: click the ball's middle").wait_for()
+    add, ask = page.get_by_role("button", name="Add one at the playhead"), "A new flight: click the ball's middle"
+    add.click()
+    dialog.get_by_text(ask).wait_for()
+    page.keyboard.press("Escape")  # before it is placed: it is taken back
+    page.get_by_text(f"{size} labels of 1 flights").wait_for()
+    add.click()
+    dialog.get_by_text(ask).wait_for()
     box = dialog.locator("svg").bounding_box()
     page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
     saved(lambda labels: labels.ball.tolist() == [1] * size + [2] and labels.t_us[-1] == later_us)
