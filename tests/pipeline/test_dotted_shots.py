@@ -84,7 +84,7 @@ def with_trajectories(folder: Path) -> Path:
         "traj_file,x_spin,y_spin,z_spin\n"
         + "".join(f"{number},{FULL_TURN * rps},0,0\n" for number, rps in ((0, 30), (1, 50), (12, 70)))
     )
-    t_s = np.array([0.0, 0.007, 0.014, 0.024, 0.05, 0.08, 0.2])
+    t_s = np.array([0.0, 0.007, 0.014, 0.014, 0.05, 0.08, 0.2])  # as there, one time twice
     for number, speed_m_s in ((0, 6.0), (1, 8.0), (12, 10.0)):
         lines = [f"{t:.3f};0.006;{1 - speed_m_s * t:.4f};{0.3 - 4.905 * t**2:.4f}" for t in t_s]
         (made / f"{number:03}.csv").write_text("\n".join(lines) + "\n")
