@@ -24,13 +24,16 @@ class EventCounts(NamedTuple):
 
     Attributes
     ----------
-    pixels : (height, width) uint32
-        Events of each pixel.
+    low_bytes : (height, width) uint8
+        Events of each pixel, modulo 256: a megabyte or less, which the processor's own cache holds.
+    carried : (height, width) uint32
+        The rest of them, multiples of 256.
     totals : (5,) int64
         Events, those that are ON, those of the fullest bin, end of the present bin in us and its events so far.
     """
 
-    pixels: NDArray[np.uint32]
+    low_bytes: NDArray[np.uint8]
+    carried: NDArray[np.uint32]
     totals: NDArray[np.int64]
 
     @classmethod
@@ -38,7 +41,13 @@ class EventCounts(NamedTuple):
         """Counts before the first event."""
         totals = np.zeros(5, np.int64)
         totals[BIN_END_US] = -(2**63)
-        return cls(np.zeros((height_px, width_px), np.uint32), totals)
+        size = (height_px, width_px)
+        return cls(np.zeros(size, np.uint8), np.zeros(size, np.uint32), totals)
+
+    @property
+    def pixels(self) -> NDArray[np.uint32]:
+        """(height, width) uint32 events of each pixel."""
+        return self.carried + self.low_bytes
 
 
 @njit(cache=True, nogil=True)
@@ -50,9 +59,13 @@ def count_events(
     on: NDArray[np.bool_],
 ) -> None:
     """Add events (n,), on the sensor and in order of time, to the counts."""
-    pixels, totals = out
+    low_bytes, carried, totals = out
     for i in range(t_us.size):
-        pixels[y_px[i], x_px[i]] += 1
+        x, y = x_px[i], y_px[i]
+        low_byte = np.uint8(low_bytes[y, x] + 1)
+        low_bytes[y, x] = low_byte
+        if low_byte == 0:
+            carried[y, x] += 256
     on_events = 0
     for i in range(t_us.size):  # a loop of its own is vectorized
         on_events += on[i]
@@ -85,23 +98,27 @@ def _first_from(t_us: NDArray[np.int64], first: int, end_us: int) -> int:
     return first + 1
 
 
+def hot_pixel_counts(pixels: NDArray[np.uint32]) -> tuple[int, int]:
+    """Number of hot pixels, and of their events, from the events of each pixel (height, width)."""
+    hot = np.zeros(2, np.int64)
+    _count_hot(hot, pixels, np.flatnonzero(pixels.reshape(-1) >= HOT_EVENTS))
+    return int(hot[0]), int(hot[1])
+
+
 @njit(cache=True, nogil=True)
-def count_hot_pixels(out: NDArray[np.int64], pixels: NDArray[np.uint32]) -> None:
-    """Write the number of hot pixels, and of their events, into `out` (2,), from the events of each pixel."""
+def _count_hot(out: NDArray[np.int64], pixels: NDArray[np.uint32], places: NDArray[np.int64]) -> None:
+    """Add the number of hot pixels among those at `places`, row after row, and of their events to `out` (2,)."""
     height, width = pixels.shape
-    out[:] = 0
-    for y in range(height):
-        for x in range(width):
-            events = int(pixels[y, x])
-            if events < HOT_EVENTS:
-                continue
-            busiest = second = 0
-            for row in range(max(y - 1, 0), min(y + 2, height)):
-                for column in range(max(x - 1, 0), min(x + 2, width)):
-                    if row != y or column != x:
-                        around = int(pixels[row, column])
-                        second = max(second, min(busiest, around))
-                        busiest = max(busiest, around)
-            if events > HOT_RATIO * second:
-                out[0] += 1
-                out[1] += events
+    for place in places:
+        y, x = place // width, place % width
+        events = int(pixels[y, x])
+        busiest = second = 0
+        for row in range(max(y - 1, 0), min(y + 2, height)):
+            for column in range(max(x - 1, 0), min(x + 2, width)):
+                if row != y or column != x:
+                    around = int(pixels[row, column])
+                    second = max(second, min(busiest, around))
+                    busiest = max(busiest, around)
+        if events > HOT_RATIO * second:
+            out[0] += 1
+            out[1] += events

@@ -6,8 +6,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from .reader import Progress
 from .recording import Recording
 
@@ -61,7 +59,7 @@ class RecordingInfo:
 def summary(recording: Recording, on_progress: Progress | None = None) -> RecordingInfo:
     """Summarise a recording in one pass, in constant memory; raises RecordingError if it cannot be read."""
     # numba takes 0.3 s to load
-    from .event_counts import EVENTS, ON, PEAK_BIN_US, PEAK_EVENTS, EventCounts, count_events, count_hot_pixels
+    from .event_counts import EVENTS, ON, PEAK_BIN_US, PEAK_EVENTS, EventCounts, count_events, hot_pixel_counts
 
     counts = EventCounts.of_sensor(recording.width_px, recording.height_px)
     first_us = last_us = None
@@ -70,9 +68,7 @@ def summary(recording: Recording, on_progress: Progress | None = None) -> Record
         first_us, last_us = int(batch.t_us[0]) if first_us is None else first_us, int(batch.t_us[-1])
     duration_us = 0 if first_us is None or last_us is None else last_us - first_us
     events = int(counts.totals[EVENTS])
-    hot = np.zeros(2, np.int64)
-    count_hot_pixels(hot, counts.pixels)
-    hot_pixels, hot_events = hot.tolist()
+    hot_pixels, hot_events = hot_pixel_counts(counts.pixels)
     stated = ("path", "format", "width_px", "height_px", "sensor_from", "t_offset_us", "attributes", "warnings")
     return RecordingInfo(
         **{name: getattr(recording, name) for name in stated},

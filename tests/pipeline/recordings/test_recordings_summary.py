@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.recordings import open_recording, summary, write_recording
-from spinscope.pipeline.recordings.event_counts import count_hot_pixels
+from spinscope.pipeline.recordings.event_counts import EventCounts, count_events, hot_pixel_counts
 from tests.pipeline.recordings.test_recordings_raw import moving_edge
 from tests.reference.recordings import naive_hot_pixels
 
@@ -50,9 +50,20 @@ def test_summary_is_what_plain_sums_say(tmp_path_factory: pytest.TempPathFactory
     arrays(np.int64, array_shapes(min_dims=2, max_dims=2, max_side=6), elements=st.sampled_from([0, 1, 9, 10, 11, 100]))
 )
 def test_hot_pixels_are_those_of_the_twin(pixels: NDArray[np.int64]) -> None:
-    found = np.full(2, -1, np.int64)
-    count_hot_pixels(found, pixels)
-    assert tuple(found.tolist()) == naive_hot_pixels(pixels.tolist())
+    assert hot_pixel_counts(pixels) == naive_hot_pixels(pixels.tolist())
+
+
+@pytest.mark.parametrize("together", [1000, 1 << 14])
+def test_the_events_of_busy_pixels_are_counted(together: int) -> None:
+    """Pixels with no event, one, and just below, at and above a multiple of 256."""
+    wanted = np.array([[0, 1, 255, 256], [257, 511, 512, 5000]])
+    y, x = (np.repeat(place.reshape(-1), wanted.reshape(-1)).astype(np.uint16) for place in np.indices(wanted.shape))
+    order = np.random.default_rng(0).permutation(x.size)
+    counts = EventCounts.of_sensor(4, 2)
+    for first in range(0, x.size, together):
+        rows = order[first : first + together]
+        count_events(counts, np.arange(rows.size), x[rows], y[rows], np.ones(rows.size, np.bool_))
+    assert np.array_equal(counts.pixels, wanted)
 
 
 def test_summary_is_ready_for_json(tmp_path: Path) -> None:
