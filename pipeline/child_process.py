@@ -17,12 +17,14 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any, BinaryIO, ClassVar, Generic, TypeVar
 
+import numpy as np
+
 try:
     import fcntl
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-PIPE_BYTES = 1 << 20  # the most that Linux gives to everybody: a whole tick of a busy scene
+PIPE_BYTES = 1 << 20  # the most that Linux gives to everybody: a whole tick of a busy scene, half a part of a file
 
 
 def send_value(file: BinaryIO, value: Any) -> None:
@@ -42,9 +44,9 @@ def receive_value(file: BinaryIO) -> Any:
         pickled, sizes = pickle.load(file)
     except pickle.UnpicklingError as error:  # cut off
         raise EOFError from error
-    buffers = [bytearray(size) for size in sizes]
+    buffers = [np.empty(size, np.uint8) for size in sizes]
     for buffer in buffers:
-        if file.readinto(buffer) < len(buffer):  # type: ignore[attr-defined]
+        if file.readinto(buffer) < buffer.size:  # type: ignore[attr-defined]
             raise EOFError
     return pickle.loads(pickled, buffers=buffers)
 
@@ -81,8 +83,9 @@ class ChildProcess:
         self._requests: BinaryIO = self._process.stdin  # type: ignore[assignment]
         self._answers: BinaryIO = self._process.stdout  # type: ignore[assignment]
         if hasattr(fcntl, "F_SETPIPE_SZ"):
-            with suppress(OSError):  # the user's pipes take too much already
-                fcntl.fcntl(self._requests, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
+            for pipe in (self._requests, self._answers):
+                with suppress(OSError):  # the user's pipes take too much already
+                    fcntl.fcntl(pipe, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
         self._not_ended.add(self)
 
     def send(self, value: Any) -> None:

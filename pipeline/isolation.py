@@ -7,7 +7,6 @@ call raises `IsolationError` while everything else goes on. It is started once a
 from __future__ import annotations
 
 import faulthandler
-import math
 import os
 import signal
 import traceback
@@ -28,9 +27,9 @@ Value = TypeVar("Value")
 # Sound files give their next part within some hundredths of a second of computing. What a library that loops needs is
 # counted in CPU time: a busy machine or a slow disk refuses no sound file. An error within 5 s is what a user is
 # promised, start of the process included.
-MAX_CPU_S = 3
+MAX_CPU_S = 2.5
 # Where a library waits without computing, for a network that is gone; and on Windows, which cannot limit CPU time.
-MAX_SILENCE_S = 20.0 if hasattr(signal, "SIGXCPU") else 3.0
+MAX_SILENCE_S = 20.0 if hasattr(signal, "setitimer") else 3.0
 # What a process may take besides the libraries it loads (a part of a million events takes 13 MB, and some copies).
 MAX_MEMORY_BYTES = 512 << 20
 MAX_IDLE = 2  # processes kept for the next call: one for a reading thread and one beside it
@@ -153,23 +152,23 @@ class _Process(ChildProcess):
         status = self.exit_status()
         if status == SILENT_EXIT:
             return f"reading it makes no progress for {self._silence_s:g} s"
-        if hasattr(signal, "SIGXCPU") and status == -signal.SIGXCPU:
-            return f"reading it makes no progress in {MAX_CPU_S} s of computing"
+        if hasattr(signal, "SIGPROF") and status == -signal.SIGPROF:
+            return f"reading it makes no progress in {MAX_CPU_S:g} s of computing"
         return f"reading it crashes the library (exit status {status})"
 
 
 _idle = IdleProcesses[_Process](MAX_IDLE)
 
 
-_limits: tuple[int, float] | None = None  # CPU time and time in seconds; None where this process has no limits
+_limits: tuple[float, float] | None = None  # CPU time and time in seconds; None where this process has no limits
 
 
-def serve(cpu_s: int, silence_s: float) -> None:
+def serve(cpu_s: float, silence_s: float) -> None:
     """Answer calls on standard input until it ends; the main program of the process.
 
     Parameters
     ----------
-    cpu_s, silence_s : int, float
+    cpu_s, silence_s : float
         CPU time and time in seconds without progress after which the process ends.
     """
     global _limits
@@ -232,24 +231,20 @@ def _limit_time() -> None:
         return
     cpu_s, silence_s = _limits
     faulthandler.dump_traceback_later(silence_s, exit=True)
-    if resource is not None:
-        used = resource.getrusage(resource.RUSAGE_SELF)
-        _set_soft_limit(resource.RLIMIT_CPU, math.ceil(used.ru_utime + used.ru_stime) + cpu_s - 1)
+    _set_cpu_timer(cpu_s)
 
 
 def _lift_time_limit() -> None:
     if _limits is None:
         return
     faulthandler.cancel_dump_traceback_later()
-    if resource is not None:
-        _set_soft_limit(resource.RLIMIT_CPU, resource.RLIM_INFINITY)
+    _set_cpu_timer(0)
 
 
-def _set_soft_limit(kind: int, value: int) -> None:
-    """Set a limit of this process as far as the hard limit that it was started with allows."""
-    hard = resource.getrlimit(kind)[1]
-    allowed = value if hard == resource.RLIM_INFINITY else hard if value == resource.RLIM_INFINITY else min(value, hard)
-    resource.setrlimit(kind, (allowed, hard))
+def _set_cpu_timer(cpu_s: float) -> None:
+    """Have the system end this process by SIGPROF after so much CPU time; never by 0."""
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_PROF, cpu_s)
 
 
 def _limit_memory() -> None:

@@ -23,5 +23,7 @@ def toml_tables(text: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except RecursionError:
         raise ParameterError("its values are nested too deep") from None
-    except ValueError as error:  # of TOML, or of an integer of thousands of digits
+    except tomllib.TOMLDecodeError as error:
         raise ParameterError(f"it is no TOML: {str(error)[:200]}") from None
+    except ValueError:
+        raise ParameterError("it holds an integer of thousands of digits") from None

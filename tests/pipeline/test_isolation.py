@@ -106,7 +106,7 @@ def test_each_of_several_calls_at_a_time_has_a_process() -> None:
 @pytest.mark.parametrize(
     ("function", "arguments", "message"),
     [
-        (hang, (), "no progress in 3 s of computing"),
+        (hang, (), "no progress in 2.5 s of computing"),
         (crash, (), "crashes the library"),
         (take, (2 << 30,), "over 512 MB of memory"),
     ],

@@ -79,6 +79,7 @@ def test_without_a_file_there_is_nothing(tmp_path: Path) -> None:
         (b"\xff\xfe\x00", RecordingError, "decode"),
         ("a = " + "[" * 50_000, RecordingError, "nested too deep"),
         ("a" + ".a" * 49_000 + " = 1", RecordingError, "49000 dots"),
+        ("a = 1" + "0" * 5000, RecordingError, "an integer of thousands of digits"),
         ("#" * 2_000_000, RecordingError, "over 1.05 MB"),
     ],
 )

@@ -22,7 +22,7 @@ from tests.pipeline.recordings.test_recordings_columns import some_columns, writ
 from tests.pipeline.recordings.test_recordings_fuzz import MOST_GROWTH_BYTES, peak_bytes
 
 HOSTILE = Path(__file__).parent / "hostile"
-# The library is ended after 3 s; the rest is for a machine that does much else. Without a limit it takes for ever.
+# The library is ended after 2.5 s; the rest is for a machine that does much else. Without a limit it takes for ever.
 MOST_S = 30.0
 
 
