@@ -177,6 +177,8 @@ def _losses(recording: Recording, format: RecordingFormat, truth: Truth | None) 
         lost.append(f"{format.label} does not hold the simulation's truth: lost")
     elif recording.truth is not None and truth is None:
         lost.append("the simulation's truth is lost: its labels do not fit where events are left out or moved")
+    if next(recording.frames(-(2**63), 2**63 - 1), None) is not None:
+        lost.append(f"{format.label} does not hold the camera's pictures: lost")
     return lost
 
 

@@ -286,6 +286,7 @@ FORMATS.register(
         sniff=is_text,
         open=TextReader,
         write=write_csv,
+        keeps=frozenset(),
         generic=True,
     )
 )

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.recordings import Triggers, convert, open_recording, write_recording
+from spinscope.pipeline.recordings.reader import CameraFrame, FormatReader
 from spinscope.pipeline.results import Truth
 from tests.pipeline.recordings.test_recordings_raw import assert_same_events, moving_edge
 
@@ -254,3 +255,12 @@ def test_conversion_says_nothing_is_lost_where_nothing_is(tmp_path: Path) -> Non
     assert convert(tmp_path / "b.h5", tmp_path / "c.npz") == ["NPZ does not hold the simulation's truth: lost"]
     for name in ("b.h5", "c.npz"):
         assert open_recording(tmp_path / name).attributes["camera.focal_length_mm"] == 16.0
+
+
+def test_pictures_and_a_sensor_that_are_lost_are_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_recording(tmp_path / "a.raw", moving_edge(500), width_px=1280, height_px=720)
+    (lost,) = convert(tmp_path / "a.raw", tmp_path / "b.csv")
+    assert lost.startswith("CSV or text does not hold the size of the sensor") and "--sensor 1280x720" in lost
+    picture = CameraFrame(5, 0, 0, np.zeros((2, 3), np.uint8))
+    monkeypatch.setattr(FormatReader, "frames", lambda *_: iter([picture]))
+    assert convert(tmp_path / "a.raw", tmp_path / "b.h5") == ["HDF5 does not hold the camera's pictures: lost"]
