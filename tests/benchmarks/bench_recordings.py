@@ -49,7 +49,7 @@ def best_seconds(run: Callable[[], Any], times: int = 3, clock: Callable[[], flo
 
 def say(name: str, seconds: float, other: str, other_seconds: float) -> None:
     ratio = other_seconds / seconds
-    sys.stdout.write(f"\n{name}: {EVENTS / seconds / 1e6:.1f} Mev/s, {ratio:.1f} x {other}\n")
+    sys.stdout.write(f"\n{name}: {EVENTS / seconds / 1e6:.1f} Mev/s, {ratio:.2f} x {other}\n")
 
 
 @pytest.mark.parametrize("format", ["EVT3", "EVT2"])

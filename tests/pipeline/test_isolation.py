@@ -130,6 +130,18 @@ def test_a_call_that_waits_forever_ends() -> None:
         call(wait_for, 1e6)
 
 
+@pytest.mark.parametrize("read", [1, 2, 3])
+def test_what_is_left_of_a_call_disturbs_no_later_one(read: int) -> None:
+    """Left with values to come, with the last one to come, and behind it."""
+    first = call(process_id)
+    parts = iterate(blocks, 3, 100_000)
+    for _ in range(read):
+        next(parts)
+    parts.close()
+    assert [int(part["values"][0]) for part in iterate(blocks, 2, 5)] == [0, 1]
+    assert call(process_id) == first
+
+
 def test_values_before_a_hang_are_kept() -> None:
     parts = iterate(hang_after, 2)
     assert next(parts) == 0
