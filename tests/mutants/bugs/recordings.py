@@ -174,6 +174,12 @@ FORMATS = [
         "tests/pipeline/recordings/test_recordings_columns.py tests/pipeline/recordings/test_recordings_text.py",
     ),
     Mutant(
+        "pipeline/recordings/event_counts.py",
+        "        if low_byte == 0:\n",
+        "        if low_byte == 255:\n",
+        "tests/pipeline/recordings/test_recordings_summary.py",
+    ),
+    Mutant(
         "pipeline/isolation.py",
         "            wish = STOP\n",
         "            wish = NEXT\n",
