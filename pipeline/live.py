@@ -33,6 +33,7 @@ from .registry import STAGES, Parameters
 from .results import Packet
 from .session import Choices, Session, method_targets
 from .spin_process import SpinProcess, loaded_kernels
+from .stages.track_extension import EXTENDED_US
 from .tick import Tick
 
 STATUS_S = 1.0
@@ -63,10 +64,39 @@ def load_kernels() -> None:
 
 
 def _needed_by_balls(tick: Tick) -> Tick:
-    """The part of a tick that the spins need."""
-    if not tick.track.balls:
-        return Tick({"track": tick.track}, replace(tick.packet, events=EventBatch.empty()), ())
+    """The part of a tick that the spins of its balls need."""
     return Tick({name: tick.results[name] for name in tick.results if name in NEEDED_BY_BALLS}, tick.packet, ())
+
+
+def _of_no_ball(one: TrackedTick) -> TrackedTick:
+    """The part of a tick that is needed where no shot has part in it."""
+    track, packet = one.tick.track, replace(one.tick.packet, events=EventBatch.empty())
+    return one._replace(tick=Tick({"track": track}, packet, ()))
+
+
+class _HeldTicks:
+    """Ticks without a ball that are held until it is known whether a shot found later begins in them."""
+
+    def __init__(self) -> None:
+        self._ticks = deque[TrackedTick]()
+
+    def passed(self, one: TrackedTick) -> Iterator[TrackedTick]:
+        """The ticks up to the next one that are held no longer, with events where a shot has part in them."""
+        self._ticks.append(one)
+        track, end_us = one.tick.track, one.tick.packet.end_us
+        if track.balls or track.ended:
+            begins_us = min((ball.start_us for ball in track.balls if ball.earlier), default=end_us)
+            while len(self._ticks) > 1:
+                held = self._ticks.popleft()
+                yield held if held.tick.packet.end_us > begins_us else _of_no_ball(held)
+            yield self._ticks.popleft()
+        while self._ticks and self._ticks[0].tick.packet.end_us <= end_us - EXTENDED_US:
+            yield _of_no_ball(self._ticks.popleft())
+
+    def rest(self) -> Iterator[TrackedTick]:
+        """The ticks that are still held: no ball comes any more."""
+        while self._ticks:
+            yield _of_no_ball(self._ticks.popleft())
 
 
 class _Ticks:
@@ -206,6 +236,7 @@ class LiveRun:
     def _track_segment(self, coming: _Ticks) -> None:
         """Track the ticks up to the next gap. The stages' memory is there before the first one comes."""
         at_work, chain, parameters = deque[ArrivedTick](), self._new_chain(), self.parameters
+        held = _HeldTicks()
         self._spins.put(SegmentStart(parameters))
 
         def packets() -> Iterator[Packet]:
@@ -219,12 +250,15 @@ class LiveRun:
             one = at_work.popleft()
             latency_ms = (now_s() - one.first_s) * 1e3
             self._latencies_ms.append(latency_ms)
-            self._spins.put(TrackedTick(_needed_by_balls(tick), one.clock, one.first_s, one.last_s))
+            for tracked in held.passed(TrackedTick(_needed_by_balls(tick), one.clock, one.first_s, one.last_s)):
+                self._spins.put(tracked)
             if self._with_balls:
                 for ball in tick.track.balls:
                     self._outputs.put(LiveBall(ball, latency_ms))
             if self._on_tick is not None:
                 self._on_tick(one, tick, latency_ms)
+        for tracked in held.rest():
+            self._spins.put(tracked)
 
     def _status(self, seconds: float) -> LiveStatus:
         counts, tick_ms = self.stream.counts, self.parameters.track.tick_us / 1e3

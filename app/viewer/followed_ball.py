@@ -17,7 +17,7 @@ def followed_ticks(ticks: Sequence[Tick], shots: Sequence[Shot], followed: Shot 
     """The ticks as they are known in the end, the followed shot's ball first where it is in flight.
 
     A contact is known only some ticks later: in the ticks in between the shot before it is replaced by the one after
-    it, so that no tick shows results of two shots.
+    it, so that no tick shows results of two shots. A ball that was found late is shown from its first tick on.
 
     Parameters
     ----------

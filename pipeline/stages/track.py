@@ -10,7 +10,7 @@ shots where a contact bends its path (track_contact).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +26,11 @@ from .surface import SurfaceResult
 from .track_background import SHAKING_US, background_moves
 from .track_ball import Measuring, TrackedBall
 from .track_contact import Contact, find_contact
+from .track_extension import Past
 from .track_hough import hough_near
 from .track_limits import Limits
 from .track_outline import VOTE_US, Edge, Sighting
+from .track_path import PathPoint
 from .track_result import BallTrack, BeganBy, EndedBy, ShotEnd, Status, TrackResult
 from .track_search import (
     MOST_CANDIDATES,
@@ -92,6 +94,10 @@ MAY_ROLL = "the ball is slow and was seen for too short a time to tell whether i
 AFTER_CONTACT, AFTER_CONTACT_AT_END = 3, 1
 
 
+# States at the ends of ticks before the one in which a shot is announced, by shot.
+Earlier = dict[int, tuple[BallTrack, ...]]
+
+
 @dataclass(slots=True)
 class TrackState:
     """State of the tracker from tick to tick."""
@@ -101,6 +107,7 @@ class TrackState:
     measuring: Measuring
     last_us: NDArray[np.uint16]
     contour: EventBatch = field(default_factory=EventBatch.empty)
+    past: Past = field(default_factory=Past)
     balls: list[TrackedBall] = field(default_factory=list)
     pending: list[tuple[int, Sighting]] = field(default_factory=list)
     first_us: int | None = None
@@ -165,6 +172,7 @@ def _step_flying(
     if since_us < packet.start_us:
         events = EventBatch.concatenate([state.contour, events])
     state.contour = events.between(since_us, packet.end_us)
+    state.past.add(replace(packet, events=filtered.contour_events))
     state.first_us = packet.start_us if state.first_us is None else state.first_us
     for ball in state.balls:
         ball.filter.predict((packet.end_us - packet.start_us) * 1e-6)
@@ -173,19 +181,20 @@ def _step_flying(
     for ball in tuple(state.balls):
         lost, end = _follow(parameters, state, ball, packet)
         if end is not None:
-            state.balls.remove(ball)
+            _let_go(state, ball)
             ended.append(end)
     for ball in _doubles(state.balls):
-        state.balls.remove(ball)
+        _let_go(state, ball)
         ended.append(ShotEnd(ball.shot, packet.start_us, "lost"))
     waiting = None
+    earlier: Earlier = {}
     if _is_search_due(state, packet):
-        anywhere, waiting = _search(parameters, state, packet, surface)
+        anywhere, waiting = _search(parameters, state, packet, surface, earlier)
         hough = hough or anywhere
     if _is_shaking(parameters, state, packet.end_us):
         for ball in state.balls:
-            ball.add_shake(parameters.shake_px)
-    contacts, earlier = _announce_contacts(parameters, state)
+            ball.add_shake(parameters.shake_px, ball.start_us if ball.shot in earlier else packet.start_us)
+    contacts = _announce_contacts(parameters, state, earlier)
     for ball in state.balls:
         if ball.is_shot:
             is_shadow, rolls = any(ball.is_shadow_of(other) for other in state.balls), ball.rolls(state.measuring)
@@ -234,6 +243,12 @@ def _follow(
     return None, None
 
 
+def _let_go(state: TrackState, ball: TrackedBall) -> None:
+    """Follow a ball no longer."""
+    state.balls.remove(ball)
+    state.past.gone.append(ball)
+
+
 def _doubles(balls: list[TrackedBall]) -> list[TrackedBall]:
     """The balls that follow the same outline as one found before them."""
     return [ball for place, ball in enumerate(balls) if any(ball.shares_outline(other) for other in balls[:place])]
@@ -255,23 +270,33 @@ def _contact(parameters: TrackParameters, state: TrackState, ball: TrackedBall, 
     return find_contact(ball.path, context.camera, context.ball_radius_m, parameters.contour_us, circles_after)
 
 
-def _announce_contacts(
-    parameters: TrackParameters, state: TrackState
-) -> tuple[list[ShotEnd], dict[int, tuple[BallTrack, ...]]]:
-    """End the shots whose contact is known now; the earlier states of those that it began, by shot."""
-    ended, earlier = [], {}
+def _announce_contacts(parameters: TrackParameters, state: TrackState, earlier: Earlier) -> list[ShotEnd]:
+    """End the shots whose contact is known now; adds what comes before this tick of those that it began to `earlier`.
+
+    A shot that is itself announced in this tick, with its own earlier states, ends in the next one at the soonest.
+    """
+    ended = []
     for place, ball in enumerate(state.balls):
-        contact = None if ball.measured is None else _contact(parameters, state, ball, AFTER_CONTACT)
+        if ball.measured is None or ball.shot in earlier:
+            continue
+        contact = _contact(parameters, state, ball, AFTER_CONTACT)
         if contact is None:
             continue
         ended.append(_end_at(contact, ball))
         after = ball.after(contact, state.measuring, state.shots)
         after.doubt = ended[-1].doubt
-        tracks = [_ball_track(parameters, after, point.end_us) for point in after.follow(ball.path, state.measuring)]
-        earlier[after.shot] = tuple(tracks[:-1])
+        earlier[after.shot] = _follow_path(parameters, after, ball.path, after.start_us + parameters.contour_us)
         state.balls[place] = after
+        state.past.gone.append(ball)
         state.shots += 1
-    return ended, earlier
+    return ended
+
+
+def _follow_path(
+    parameters: TrackParameters, ball: TrackedBall, path: list[PathPoint], own_us: int
+) -> tuple[BallTrack, ...]:
+    """Lead a ball along a known path (see `TrackedBall.follow`); its states there but for the last."""
+    return tuple(_ball_track(parameters, ball, point.end_us) for point in ball.follow(path, own_us))[:-1]
 
 
 def _is_shaking(parameters: TrackParameters, state: TrackState, end_us: int) -> bool:
@@ -292,9 +317,12 @@ def _is_search_due(state: TrackState, packet: Packet) -> bool:
 
 
 def _search(
-    parameters: TrackParameters, state: TrackState, packet: Packet, surface: SurfaceResult
+    parameters: TrackParameters, state: TrackState, packet: Packet, surface: SurfaceResult, earlier: Earlier
 ) -> tuple[Circle | None, Sighting | None]:
-    """Begin tracks of sightings that are trusted, or promising for long enough; the best circle and what must wait."""
+    """Begin tracks of sightings that are trusted, or promising for long enough; the best circle and what must wait.
+
+    Adds what comes before this tick of the shots that begin to `earlier`.
+    """
     state.looked_us = packet.end_us
     measured = [ball.filter.mean for ball in state.balls if ball.measured is not None]
     events = outside_balls(state.contour, measured, packet.end_us)
@@ -320,7 +348,7 @@ def _search(
         if packet.end_us - since[0] < _wait_us(parameters, state, sighting):
             state.pending.append(since)
         else:
-            _begin(state, packet, sighting)
+            _begin(parameters, state, packet, sighting, earlier)
             hough = circle
     state.pending += [one for one in pending if packet.end_us - one[0] < HELD_US]
     return hough, state.pending[0][1] if state.pending else None
@@ -342,23 +370,34 @@ def _wait_us(parameters: TrackParameters, state: TrackState, sighting: Sighting)
     return 0 if sighting.trusted else parameters.contour_us
 
 
-def _begin(state: TrackState, packet: Packet, sighting: Sighting) -> None:
-    """Follow a sighting: as the ball out of sight whose path it meets, else as a new shot."""
+def _begin(
+    parameters: TrackParameters, state: TrackState, packet: Packet, sighting: Sighting, earlier: Earlier
+) -> None:
+    """Follow a sighting: as the ball out of sight whose path it meets, else as a new shot.
+
+    The new shot begins with the first tick in which its ball is measured; the states since then are in `earlier`.
+    """
     for ball in state.balls:
         if ball.measured is None and ball.is_found(sighting, packet.end_us):
             ball.restart(state.measuring, sighting, packet.start_us, packet.end_us)
             return
-    began_by = _began_by(state, packet, sighting)
-    ball = TrackedBall.at(sighting, state.measuring, state.shots, packet, began_by)
+    ball = TrackedBall.at(sighting, state.measuring, state.shots, packet, "found")
+    path, first = state.past.path_before(ball, state.balls, state.measuring, parameters.coast_us)
+    tick = state.past.ticks[-len(path)]
+    if len(path) > 1:
+        ball = ball.extended(path, tick.start_us, first, state.measuring)
+    ball.began_by = _began_by(state, tick, first)
+    if len(path) > 1:
+        earlier[ball.shot] = _follow_path(parameters, ball, path, tick.end_us)
     state.balls.append(ball)
     state.shots += 1
 
 
-def _began_by(state: TrackState, packet: Packet, sighting: Sighting) -> BeganBy:
-    """Whether a ball first seen now came in across the border, or was there when the recording began."""
-    first_us = packet.start_us if state.first_us is None else state.first_us
-    since_us = max(first_us, packet.end_us - BEFORE_US)
-    if _beyond(moved(sighting.ring, since_us - packet.end_us), state.context.camera):
+def _began_by(state: TrackState, tick: Packet, ball: NDArray[np.float64]) -> BeganBy:
+    """Whether a ball (5,) first seen at a tick's end came in across the border, or was there from the beginning."""
+    first_us = tick.start_us if state.first_us is None else state.first_us
+    since_us = max(first_us, tick.end_us - BEFORE_US)
+    if _beyond(moved(ball, since_us - tick.end_us), state.context.camera):
         return "entered"
     return "start" if since_us == first_us else "found"
 

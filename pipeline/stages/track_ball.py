@@ -58,8 +58,8 @@ APART_PX = 5.0
 HIDDEN_ERROR = 0.3
 # A ball that turned is taken for one that flies on for up to so long: paths are compared from so long before.
 MEETING_US = 10_000
-# 1 sigma of a state just after a contact, of place and radius: what a few circles leave open.
-AFTER_CONTACT_COVARIANCE = np.diag([0.3**2, 0.3**2, 0.0, 0.0, 0.3**2])
+# 1 sigma of the state in which a path known afterwards begins, of place and radius: what a few circles leave open.
+FIRST_COVARIANCE = np.diag([0.3**2, 0.3**2, 0.0, 0.0, 0.3**2])
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,19 +153,30 @@ class TrackedBall:
         """The ball's next shot, at the end of the first tick after a contact, by the path since."""
         first_us = next(point.end_us for point in self.path if point.end_us > contact.latest_us)
         state = contact.path.state(first_us)
-        new = measuring.filter_at(state, AFTER_CONTACT_COVARIANCE)
+        new = measuring.filter_at(state, FIRST_COVARIANCE)
         return TrackedBall(
             shot, contact.latest_us, contact.kind, new, first_us, state, contrast=self.contrast, part=self.part
         )
 
-    def follow(self, path: list[PathPoint], measuring: Measuring) -> Iterator[PathPoint]:
-        """Go along the rest of a path from the shot's first tick on, with the circles that show no other shot."""
+    def extended(self, path: list[PathPoint], start_us: int, state: Floats, measuring: Measuring) -> TrackedBall:
+        """The ball as found in the first tick of a path, where its state was this (5,)."""
+        return replace(
+            self,
+            start_us=start_us,
+            filter=measuring.filter_at(state, FIRST_COVARIANCE),
+            seen_us=path[0].end_us,
+            seen=state,
+            path=[],
+        )
+
+    def follow(self, path: list[PathPoint], own_us: int) -> Iterator[PathPoint]:
+        """Go along a path from the shot's first tick on, with the circles since own_us, which show no other shot."""
         for point in path:
             if point.end_us < self.seen_us and not self.path:
                 continue
             if self.path:
                 self.filter.predict((point.end_us - self.path[-1].end_us) * 1e-6)
-            circle = point.circle if point.end_us - self.start_us >= measuring.contour_us else None
+            circle = point.circle if point.end_us >= own_us else None
             if circle is not None:
                 observed = np.array([circle.x_px, circle.y_px, circle.radius_px])
                 self.filter.update(observed, point.noise, math.inf)
@@ -245,9 +256,9 @@ class TrackedBall:
             return sighting.ahead >= LEAST_AHEAD
         return min(sighting.ahead, sighting.behind) >= LEAST_ARC
 
-    def add_shake(self, std_px: float) -> None:
-        """Note that a shaking camera moved the last circle by so much, 1 sigma: so much of a bend is no contact."""
-        self.path[-1] = replace(self.path[-1], shake_px=std_px)
+    def add_shake(self, std_px: float, since_us: int) -> None:
+        """Note that a shaking camera moved the circles since by so much, 1 sigma: so much of a bend is no contact."""
+        self.path = [replace(one, shake_px=std_px) if one.end_us > since_us else one for one in self.path]
 
     def coast(self, end_us: int) -> None:
         """Note a tick in which it was not measured."""
@@ -273,6 +284,14 @@ class TrackedBall:
             np.hypot(*off[:2]) < 0.5 * self.filter.mean[4]
             and np.hypot(*off[2:4]) < SAME_VELOCITY * np.hypot(*self.filter.mean[2:4])
         )
+
+    def was_near(self, mean: Floats, end_us: int) -> bool:
+        """Whether its circle of the tick with this end touched, or nearly, the outline of a ball of this state (5,)."""
+        circle = next((point.circle for point in self.path if point.end_us == end_us), None)
+        if circle is None:
+            return False
+        apart_px = math.hypot(circle.x_px - mean[0], circle.y_px - mean[1])
+        return bool(apart_px < circle.radius_px + mean[4] + APART_PX)
 
     def is_shadow_of(self, other: TrackedBall) -> bool:
         """Whether it is darker than what is around it and keeps pace with one that is brighter."""

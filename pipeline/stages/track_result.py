@@ -43,8 +43,9 @@ class BallTrack(ReadOnlyArrays):
         Whether the ball is in free flight. False from the tick on in which it is seen to roll, or to be the shadow of
         another one: the last state decides whether this was a shot.
     earlier : tuple of BallTrack
-        States at the ends of the ticks since start_us before this one, oldest first: a contact is known only some
-        ticks later. Given in the one tick in which the shot is announced, else empty.
+        States at the ends of the ticks since start_us before this one, oldest first: a contact is known only some ticks
+        later, and so is a ball that must be seen more than once. Given in the one tick in which the shot is announced,
+        else empty.
     doubt : str, optional
         What speaks against one free flight so far, in words for people; None where nothing does.
     """

@@ -5,14 +5,19 @@ from __future__ import annotations
 import json
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from spinscope.pipeline.cameras import ArrivedTick, EventStream, ReplayCamera
 from spinscope.pipeline.errors import CameraError, ParameterError
-from spinscope.pipeline.live import LiveRun
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.live import LiveRun, _HeldTicks
 from spinscope.pipeline.live_outputs import LiveBall, LiveNotice, LiveOutput, LiveShot, LiveSpin, LiveStatus
+from spinscope.pipeline.live_spins import TrackedTick
+from spinscope.pipeline.results import Packet
 from spinscope.pipeline.session import Session
 from spinscope.pipeline.spin_so_far import ROLLING_METHODS
 from spinscope.pipeline.tick import Tick
@@ -48,6 +53,25 @@ def test_shots_are_those_of_the_recording(samples: Path, name: str) -> None:
     status = outputs[-1]
     assert isinstance(status, LiveStatus)
     assert status.events == session.source.event_count and status.skipped == status.late == status.outside == 0
+
+
+def test_ticks_without_a_ball_go_with_events_where_a_shot_found_later_begins_in_them() -> None:
+    """In order, and 50 ms later at the latest; the tick in which a shot ends goes at once, and whole."""
+
+    def tick(number: int, balls: tuple[Any, ...] = (), ended: tuple[Any, ...] = ()) -> TrackedTick:
+        event = EventBatch(np.array([5000 * number]), *np.zeros((2, 1), np.uint16), np.ones(1, np.bool_))
+        packet = Packet(number, 5000 * number, 5000 * number + 5000, event)
+        return TrackedTick(Tick({"track": SimpleNamespace(balls=balls, ended=ended)}, packet, ()), 0, 0.0, 0.0)
+
+    def told(ticks: Any) -> list[tuple[int, int]]:
+        return [(one.tick.packet.index, len(one.tick.packet.events)) for one in ticks]
+
+    held = _HeldTicks()
+    assert [told(held.passed(tick(number))) for number in range(12)] == 10 * [[]] + [[(0, 0)], [(1, 0)]]
+    ball = SimpleNamespace(earlier=("a state",), start_us=50_000)
+    assert told(held.passed(tick(12, (ball,)))) == [(n, 0) for n in range(2, 10)] + [(10, 1), (11, 1), (12, 1)]
+    assert told(held.passed(tick(13, (), ("an end",)))) == [(13, 1)]
+    assert told(held.passed(tick(14))) == [] and told(held.rest()) == [(14, 0)]
 
 
 def test_all_methods_balls_and_spins_for_robots(samples: Path) -> None:

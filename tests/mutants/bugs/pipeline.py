@@ -359,6 +359,18 @@ STAGES = [
         "tests/pipeline/stages/test_track.py",
     ),
     Mutant(
+        "pipeline/stages/track_extension.py",
+        "path, others = list(ball.path), [*flying, *self.gone]",
+        "path, others = list(ball.path), list(self.gone)",
+        "tests/pipeline/stages/test_track_extension.py",
+    ),
+    Mutant(
+        "pipeline/stages/track_extension.py",
+        "while path[-1].circle is None:",
+        "while False:",
+        "tests/pipeline/stages/test_track_extension.py",
+    ),
+    Mutant(
         "pipeline/stages/fixed_ball.py",
         "radius_px = float(answer[2]) * (1 + short)",
         "radius_px = float(answer[2])",

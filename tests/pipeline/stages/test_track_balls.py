@@ -160,9 +160,13 @@ def test_a_ball_seen_in_part_counts_when_seen_again() -> None:
     assert [len(result.balls) for result in results[:3]] == [0, 0, 1], "at 10, 15 and 20 ms"
     assert results[0].status == results[1].status == "starting"
     ball = results[2].balls[0]
-    np.testing.assert_allclose(
-        ball.mean, [200.0 + 6.0 * M_S * 0.02, 360.0, 6.0 * M_S, 0.0, RADIUS_PX], atol=0.5, rtol=0.05
-    )
+    states = (*ball.earlier, ball)
+    assert [state.t_us for state in states] == [10_000, 15_000, 20_000]
+    assert [state.measured is not None for state in states] == [True, False, True], "nothing is seen from 10 to 15 ms"
+    assert {state.start_us for state in states} == {5000} and ball.began_by == "start"
+    for state in states:
+        true = [200.0 + 6.0 * M_S * state.t_us * 1e-6, 360.0, 6.0 * M_S, 0.0, RADIUS_PX]
+        np.testing.assert_allclose(state.mean, true, atol=0.5, rtol=0.05)
 
 
 def test_the_samples_balls_begin_and_end_as_they_do() -> None:

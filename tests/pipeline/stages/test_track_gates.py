@@ -301,8 +301,11 @@ def test_the_ball_is_smaller_than_its_outline_and_ahead_of_it() -> None:
 def test_a_new_track_begins_with_the_sightings_spread_and_room_for_acceleration() -> None:
     state = track.start(TrackParameters(outline_px=0.0, lag_px=0.0), PAPER_CONTEXT)
     state.shots = 4
-    track._begin(state, packet_to(10_000), sighting())
+    state.past.add(packet_to(10_000))
+    earlier: track.Earlier = {}
+    track._begin(TrackParameters(), state, packet_to(10_000), sighting(), earlier)
     (ball,) = state.balls
+    assert not earlier, "no tick came before"
     speed_std_px_s = 0.2 * 17.0 / 0.02
     expected = SPREAD + np.diag([0.05**2, 0.05**2, speed_std_px_s**2, speed_std_px_s**2, 0.05**2])
     np.testing.assert_allclose(ball.filter.covariance, expected)
@@ -358,5 +361,5 @@ def test_how_a_shot_began(x_px: float, first_us: int, began_by: str) -> None:
     """Back along its flight by 30 ms or to the recording's start: out of view, in view, or too late to say."""
     state = track.start(TrackParameters(), PAPER_CONTEXT)
     state.first_us = first_us
-    seen = sighting(ring=np.array([x_px, 300.0, 3000.0, 0.0, 17.0]))
-    assert track._began_by(state, packet_to(10_000), seen) == began_by
+    ball = np.array([x_px, 300.0, 3000.0, 0.0, 17.0])
+    assert track._began_by(state, packet_to(10_000), ball) == began_by
