@@ -34,6 +34,8 @@ MOST_SURPRISE = 25.0
 # Scatter of an outline's centre and radius from tick to tick beyond the statistical one, on the samples.
 OUTLINE_STD_PX = 0.05
 OUTLINE_COVARIANCE = OUTLINE_STD_PX**2 * np.eye(3)
+# The same of arcs, on white walls of our simulator (seeds 96000-96010): mostly 0.2 to 0.5 px, single ones 2 px.
+ARCS_COVARIANCE = 0.5**2 * np.eye(3)
 # What no filtering takes away: the calibration of latency, place and radius. The first two differ from shot to shot;
 # how far outside the outline is seen, from sensor to sensor: two simulators with the same biases are 0.3 px apart.
 LATENCY_STD_US = 12.0
@@ -315,7 +317,8 @@ class TrackedBall:
     def _noise(self, measuring: Measuring, sighting: Sighting, start_us: int, end_us: int) -> Floats:
         # Outlines taken further back than one tick share events with the tick before and so count for less.
         shared = max(1.0, measuring.contour_us / (end_us - start_us))
-        noise: Floats = (sighting.covariance[OBSERVED_BLOCK] + OUTLINE_COVARIANCE) * shared
+        scatter = OUTLINE_COVARIANCE if sighting.part == HALF_AHEAD else ARCS_COVARIANCE
+        noise: Floats = (sighting.covariance[OBSERVED_BLOCK] + scatter) * shared
         return noise
 
     def _see(self, measuring: Measuring, sighting: Sighting, noise: Floats, end_us: int) -> None:

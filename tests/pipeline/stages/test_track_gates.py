@@ -256,6 +256,12 @@ def test_events_shared_by_two_ticks_count_less(monkeypatch: pytest.MonkeyPatch, 
     np.testing.assert_allclose(noise, shared * (np.diag([0.01, 0.02, 0.03]) + 0.05**2 * np.eye(3)))
 
 
+def test_circles_from_arcs_scatter_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By half a pixel, which is neither a contact nor another ball."""
+    _, _, (noise,) = updated(monkeypatch, sighting(part=OF_DARK))
+    np.testing.assert_allclose(noise, np.diag([0.01, 0.02, 0.03]) + 0.5**2 * np.eye(3))
+
+
 def test_an_outline_cut_by_the_border_counts_less_in_the_path(monkeypatch: pytest.MonkeyPatch) -> None:
     """A fifth of it hidden: by 0.3 of a fifth of the radius more."""
     _, ball, (noise,) = updated(monkeypatch, sighting(visible=0.8))
