@@ -104,7 +104,8 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
 NOTE = (
     f"Free flights of at least 20 ms in the image. {RIGHT_NOTE} {FLIGHT_NOTE} Two spins for one: "
     "an answer from events on both sides of a contact, or of two balls. Shares of all flights; the time to find "
-    "counts from where the ball's centre comes into the image."
+    "counts from where the ball's centre comes into the image to the shot's first tick, which may be known some ticks "
+    "later."
 )
 
 
