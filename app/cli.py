@@ -65,12 +65,10 @@ def main() -> None:
 def run(arguments: list[str]) -> int:
     """Run a command and return its exit status; our errors and click's become one line on standard error and 2."""
     try:
-        cli.main(join_fixed_ball(arguments), prog_name="spinscope", standalone_mode=False)
+        status = cli.main(join_fixed_ball(arguments), prog_name="spinscope", standalone_mode=False)
         sys.stdout.flush()
     except SpinscopeError as error:
         message = str(error)
-    except click.exceptions.Exit as error:
-        return error.exit_code
     except click.Abort:
         return 130
     except click.ClickException as error:
@@ -87,6 +85,6 @@ def run(arguments: list[str]) -> int:
         drop_output()
         message = f"the output cannot be written ({error.strerror}): check free space"
     else:
-        return 0
+        return status or 0
     note(f"spinscope: {message}")
     return 2
