@@ -8,7 +8,7 @@ import { Bar } from "./bar.js";
 import { Biases } from "./biases.js";
 import { Coach } from "./coach.js";
 import { Controls } from "./controls.js";
-import { ask, byId, element, notice } from "./elements.js";
+import { ask, byId, element, notice, pause } from "./elements.js";
 import { Keyboard } from "./keyboard.js";
 import { carriedSettings, linked, linkOf, linkTo, settingsOf } from "./link.js";
 import { Labels } from "./labels.js";
@@ -31,6 +31,8 @@ import { Viewer } from "./viewer.js";
 // While a picture is waited for it is left alone, as browser and viewer both take notice of it.
 const REMEMBER_MS = 300;
 const REMEMBER_UNSEEN_MS = 3000;
+// While the viewer loads, the browser has no time for anything else: the first preview goes before it, if it comes soon.
+const PREVIEW_MS = 1000;
 
 new Notices();
 const connection = new Connection();
@@ -62,12 +64,13 @@ async function start() {
   app.runner.followed = link.followed ?? opening.followed;
   app.overview = new Overview(byId("overview"), recording);
   app.bar = new Bar(byId("bar"), opening.stages);
-  new Preview(app);
+  const preview = new Preview(app);
   describe(recording);
   listen();
   if (hasTools) addTools(opening);
   new Keyboard(shortcuts(app, hasTools));
-  viewer.start(opening.viewer_version, byId("viewer")).catch((error) => {
+  const previewed = Promise.race([preview.first, pause(PREVIEW_MS)]);
+  viewer.start(opening.viewer_version, byId("viewer"), previewed).catch((error) => {
     app.runner.isBlind = true; // the numbers and the preview are still there
     byId("viewer").replaceChildren(); // its own message
     const others = "`spinscope view --native` or `--save FILE.rrd` work without WebAssembly and WebGL";

@@ -26,6 +26,8 @@ export class Preview {
     this.runner = runner;
     this.image = element("img", { alt: `${TITLES.join(", ")} at the playhead` });
     const titles = element("div.titles", {}, ...TITLES.map((title) => element("span", {}, title)));
+    // Settled once a first picture is to be seen.
+    this.first = new Promise((resolve) => this.image.addEventListener("load", () => requestAnimationFrame(resolve)));
     this.words = element("figcaption");
     this.node = element("figure", { id: "preview", hidden: true }, titles, this.image, this.words);
     byId("middle").append(this.node);

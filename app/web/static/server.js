@@ -1,6 +1,6 @@
 // Requests to the server, the stream of its messages, and the run requests: from changed settings to the new picture.
 
-/** @import { Dropped, Gets, Opening, Picture, Posts, RunMessage, ServerMessages, SessionGets, SessionPosts } from "./messages.d.ts" */
+/** @import { Dropped, Gets, Opening, Picture, Posts, PreviewMessage, RunMessage, ServerMessages, SessionGets, SessionPosts } from "./messages.d.ts" */
 /** @import { Settings } from "./settings.js" */
 /** @import { Viewer } from "./viewer.js" */
 
@@ -188,6 +188,8 @@ export class RunRequests extends EventTarget {
   #timer = undefined;
   /** @type {string | null} the newest picture */
   #latest = null;
+  /** @type {{clip: string, time_us: number} | null} the newest preview: the playhead while the viewer has none */
+  #previewed = null;
 
   /**
    * @param {Connection} connection
@@ -202,7 +204,7 @@ export class RunRequests extends EventTarget {
     this.viewer = viewer;
     this.start = start;
     connection.on("run", (message) => this.#receive(message));
-    connection.on("preview", ({ serial }) => this.#follow(serial));
+    connection.on("preview", (message) => this.#follow(message));
     settings.onChange((settled) => this.#change(settled));
   }
 
@@ -252,7 +254,8 @@ export class RunRequests extends EventTarget {
     this.#isPreviewed = false;
     this.#sentAt = performance.now();
     this.#last = this.#wanted;
-    const playhead_us = this.viewer.playhead_us;
+    // Without one the server previews what is seen first, which it knows at the end of the clip.
+    const playhead_us = this.viewer.playhead_us ?? (interactive ? this.#previewed_us : null);
     try {
       await this.connection.post("run", { serial: ++this.serial, ...JSON.parse(this.#last), interactive, playhead_us });
     } catch (error) {
@@ -268,9 +271,14 @@ export class RunRequests extends EventTarget {
     }
   }
 
+  get #previewed_us() {
+    return this.#previewed?.clip === String(this.settings.clip) ? this.#previewed.time_us : null;
+  }
+
   // A preview is enough to let a dragged slider go on: the viewer follows when it rests.
-  #follow(/** @type {number} */ serial) {
+  #follow(/** @type {PreviewMessage} */ { serial, t_us }) {
     if (serial !== this.serial) return;
+    this.#previewed = { clip: String(this.settings.clip), time_us: t_us };
     this.#isPreviewed = true;
     this.#schedule();
   }

@@ -66,12 +66,16 @@ export class Viewer extends EventTarget {
   #isAlone = false;
 
   /**
-   * Loads the viewer; whatever else is asked of it meanwhile waits.
+   * Loads the viewer, when something has happened; whatever else is asked of it meanwhile waits.
    * @param {string} version
    * @param {HTMLElement} parent
+   * @param {Promise<unknown>} happened
    */
-  start(version, parent) {
-    return this.#next(() => this.#start(version, parent));
+  start(version, parent, happened) {
+    return this.#next(async () => {
+      await happened;
+      await this.#start(version, parent);
+    });
   }
 
   async #start(/** @type {string} */ version, /** @type {HTMLElement} */ parent) {

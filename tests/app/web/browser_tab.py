@@ -123,6 +123,7 @@ def bare_tab(browser: Any, address: str) -> Tab:
     made.page.route(re.compile(r"re_viewer_bg\.wasm"), lambda route: route.abort())
     made.open(address)
     made.settled()
+    made.until("window.spinscope.runner.isBlind")
     return made
 
 

@@ -47,6 +47,8 @@ def test_every_group_of_sliders_changes_its_stages_and_nothing_above(bare: Tab) 
 
 
 def test_previews_follow_a_slider_that_is_dragged_without_a_rest(bare: Tab) -> None:
+    requests: list[Any] = []
+    bare.page.on("request", lambda one: requests.append(one.post_data_json) if one.url.endswith("/run") else None)
     bare.page.evaluate(
         """(() => {
             const slider = document.querySelector("[data-name='logo.pad_px'] input[type=range]");
@@ -72,6 +74,8 @@ def test_previews_follow_a_slider_that_is_dragged_without_a_rest(bare: Tab) -> N
     bare.page.evaluate("window.letGo()")
     bare.settled()
     assert bare.page.locator(".control.differs").count() == 0
+    # What is computed for them ends at the picture that is seen.
+    assert all(one["playhead_us"] is not None for one in requests if one["interactive"])
 
 
 def test_typing_reset_undo_and_redo(bare: Tab) -> None:

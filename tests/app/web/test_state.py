@@ -75,6 +75,7 @@ def test_without_the_viewer_a_preview_follows_the_playhead(bare: Tab) -> None:
 
 def test_notices_stay_until_read_and_can_be_looked_up(bare: Tab) -> None:
     page = bare.page
+    bare.until("window.spinscope.runner.isBlind")  # of which there is a notice
     for notice in page.locator(".notice").all():
         notice.click()
     box = page.locator("[data-name='logo.pad_px'] input.number")
