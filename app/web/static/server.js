@@ -9,6 +9,9 @@ import { byId, notice, pause } from "./elements.js";
 const REOPEN_MS = 700;
 const PATIENCE_MS = 5000; // as long as a picture takes to draw where there is no graphics card
 const SIZE_STEP_PX = 50; // the layout is made anew for a viewer that is larger or smaller by more
+const REST_MS = 500; // a slider that is held still for so long rests, one that is let go of at once
+const POLL_MS = 50;
+const RESIZED_MS = 500; // a window that keeps its size for so long has it
 const NUMBERS_MS = 1000; // as long as numbers wait for their picture
 
 export class Refused extends Error {
@@ -184,8 +187,11 @@ export class RunRequests extends EventTarget {
   #sentAt = 0;
   #running = false;
   #isPreviewed = false;
+  #movedAt = -Infinity; // when a slider that is dragged was moved last
   /** @type {number | undefined} */
   #timer = undefined;
+  /** @type {number | undefined} */
+  #resizing = undefined;
   /** @type {string | null} the newest picture */
   #latest = null;
   /** @type {{clip: string, time_us: number} | null} the newest preview: the playhead while the viewer has none */
@@ -206,6 +212,7 @@ export class RunRequests extends EventTarget {
     connection.on("run", (message) => this.#receive(message));
     connection.on("preview", (message) => this.#follow(message));
     settings.onChange((settled) => this.#change(settled));
+    new ResizeObserver(() => this.#resized()).observe(byId("viewer"));
   }
 
   // Whether a picture is on its way.
@@ -233,6 +240,7 @@ export class RunRequests extends EventTarget {
    * @param {boolean} settled
    */
   #change(settled) {
+    this.#movedAt = settled ? -Infinity : performance.now();
     if (!settled || this.#dirty || this.#last !== this.#wanted) this.request(settled);
   }
 
@@ -308,28 +316,16 @@ export class RunRequests extends EventTarget {
    * @param {boolean} isWhole
    */
   async #show(picture, isWhole) {
+    const { serial } = this;
     this.#latest = picture.id;
     try {
+      await this.#rest();
+      if (this.#latest !== picture.id || serial !== this.serial) return false;
       const content = await this.connection.bytes(`pictures/${picture.id}`);
       if (this.#latest !== picture.id) return false;
-      // Ranges and panes of the layout are those of a clip, and of a ball in flight or in place.
-      const { ball, fixed_radius_px } = this.settings.parameters.track;
-      const { clientWidth, clientHeight } = byId("viewer");
-      const [width, height] = [clientWidth, clientHeight].map((px) =>
-        SIZE_STEP_PX * Math.max(1, Math.floor(px / SIZE_STEP_PX))
-      );
-      const layoutOf = JSON.stringify([this.settings.clip, ball, fixed_radius_px, width, height]);
-      if (layoutOf !== this.#layoutOf && (isWhole || !this.#hasLayout)) {
-        const query = new URLSearchParams({
-          tab: this.viewer.front ?? this.start.tab,
-          tools: String(this.start.hasTools),
-          width_px: String(width),
-          height_px: String(height),
-        });
-        await this.viewer.layout(await this.connection.bytes(`layout?${query}`));
-        this.#layoutOf = layoutOf;
-      }
-      await this.viewer.show(content, picture.id, (!this.#hasLayout && this.start.time_us) || picture.opening_us);
+      if (isWhole || !this.#hasLayout) await this.#fit();
+      const opening_us = (!this.#hasLayout && this.start.time_us) || picture.opening_us;
+      if (!(await this.viewer.show(content, picture.id, opening_us))) return false;
       if (!this.#hasLayout) await this.viewer.tab(); // until the layout is there: before it, one of the viewer's own
       this.#hasLayout = true;
       return true;
@@ -337,6 +333,38 @@ export class RunRequests extends EventTarget {
       if (this.isBlind || (error instanceof Refused && error.status === 404)) return false;
       throw error;
     }
+  }
+
+  // Until a slider that is dragged rests: what the viewer takes to draw, its previews would lack.
+  async #rest() {
+    while (performance.now() < this.#movedAt + REST_MS) await pause(POLL_MS);
+  }
+
+  // A layout for what is shown, where the present one was made for something else: its ranges and panes are those of a
+  // clip, of a ball in flight or in place, and of the viewer's size.
+  async #fit() {
+    if (document.body.classList.contains("coach")) return; // a layout of its own
+    const { ball, fixed_radius_px } = this.settings.parameters.track;
+    const { clientWidth, clientHeight } = byId("viewer");
+    const [width, height] = [clientWidth, clientHeight].map((px) =>
+      SIZE_STEP_PX * Math.max(1, Math.floor(px / SIZE_STEP_PX))
+    );
+    const layoutOf = JSON.stringify([this.settings.clip, ball, fixed_radius_px, width, height]);
+    if (layoutOf === this.#layoutOf) return;
+    const query = new URLSearchParams({
+      tab: this.viewer.front ?? this.start.tab,
+      tools: String(this.start.hasTools),
+      width_px: String(width),
+      height_px: String(height),
+    });
+    await this.viewer.layout(await this.connection.bytes(`layout?${query}`));
+    this.#layoutOf = layoutOf;
+  }
+
+  // The panes of a viewer of another size; a picture that is on its way brings them along.
+  #resized() {
+    clearTimeout(this.#resizing);
+    this.#resizing = setTimeout(() => this.#hasLayout && !this.#running && this.#fit().catch(() => {}), RESIZED_MS);
   }
 
   #end(/** @type {number} */ serial) {

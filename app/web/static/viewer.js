@@ -52,6 +52,8 @@ export class Viewer extends EventTarget {
   #queue = Promise.resolve();
   /** @type {Set<string>} ids of the recordings in the viewer */
   #sent = new Set();
+  /** @type {string | null} the one that is to be shown next, whatever waits before it */
+  #newest = null;
   /** @type {string | null} the one that is seen */
   #shown = null;
   /**
@@ -149,13 +151,16 @@ export class Viewer extends EventTarget {
   }
 
   /**
-   * Shows a recording in place of the present one, at the same playhead; at `time_us` when there is none.
+   * Shows a recording in place of the present one, at the same playhead; at `time_us` when there is none. False where a
+   * newer one has taken its place while it waited.
    * @param {Uint8Array} bytes
    * @param {string} id
    * @param {number} time_us
    */
   show(bytes, id, time_us) {
+    this.#newest = id;
     return this.#next(async () => {
+      if (this.#newest !== id) return false;
       const taken = this.#taken_in(id);
       this.#sent.add(id);
       this.#channel.send_rrd(bytes);
@@ -170,6 +175,7 @@ export class Viewer extends EventTarget {
       this.#shown = id;
       this.#moved(time_ns);
       await new Promise(requestAnimationFrame); // what was set is drawn now
+      return true;
     });
   }
 

@@ -91,10 +91,11 @@ def test_the_picture_of_the_view_is_saved(tab: Tab) -> None:
 
 def test_a_smaller_and_a_larger_window_hold_the_whole_page(tab: Tab) -> None:
     try:
-        for height in (500, 700):
-            tab.page.set_viewport_size({**SIZE, "height": height})
-            end = "document.getElementById('bar').getBoundingClientRect().bottom"
-            tab.until(f"Math.abs({end} - {height}) <= 1")
+        with tab.page.expect_request(lambda request: "layout?" in request.url):  # with panes for the new size
+            for height in (500, 700):
+                tab.page.set_viewport_size({**SIZE, "height": height})
+                end = "document.getElementById('bar').getBoundingClientRect().bottom"
+                tab.until(f"Math.abs({end} - {height}) <= 1")
     finally:
         tab.page.set_viewport_size(SIZE)
 
