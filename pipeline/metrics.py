@@ -15,6 +15,8 @@ from .flight_calibration import measured_up
 from .results import SpinEstimate
 from .session import Result, Session
 from .shots import Shot
+from .spin.combined.result import Witness
+from .spin.combined.stage import LABELS
 from .spin_terms import Kind, kind_of_spin, km_h, rpm
 from .tick import Tick
 
@@ -50,6 +52,21 @@ class EstimateMetrics:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class WitnessMetrics:
+    """Evidence of one witness of the combined answer; None for what it does not tell.
+
+    Attributes
+    ----------
+    odds : str
+        For or against the combined spin, in words; empty where they are nearly even.
+    """
+
+    magnitude_rps: float | None
+    magnitude_std_rps: float | None
+    odds: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ShotMetrics:
     """One shot with the estimate of every method.
 
@@ -63,6 +80,8 @@ class ShotMetrics:
         Kind of the trusted spin, like "topspin".
     sentence : str
         Spin, speed and kind in one sentence for a coach.
+    witnesses : dict of str to WitnessMetrics
+        Those of the combined answer, by their names for people.
     """
 
     start_us: int
@@ -75,6 +94,7 @@ class ShotMetrics:
     kind: str | None
     sentence: str
     spin: dict[str, EstimateMetrics]
+    witnesses: dict[str, WitnessMetrics]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -178,6 +198,15 @@ def _shot(session: Session, shot: Shot) -> ShotMetrics:
         kind=kind.name if kind else None,
         sentence=coach_sentence(trusted, kind, velocity),
         spin={name: _estimate(session, shot, estimate) for name, estimate in shot.estimates.items()},
+        witnesses={} if shot.combined is None else {LABELS[one.name]: _witness(one) for one in shot.combined.witnesses},
+    )
+
+
+def _witness(witness: Witness) -> WitnessMetrics:
+    return WitnessMetrics(
+        magnitude_rps=_finite(witness.magnitude_rps),
+        magnitude_std_rps=_finite(witness.magnitude_std_rps),
+        odds=witness.odds,
     )
 
 

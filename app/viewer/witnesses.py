@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import cache
 
 import numpy as np
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 from spinscope.pipeline.registry import STAGES
 from spinscope.pipeline.spin.combined.result import CombinedResult, Witness
 from spinscope.pipeline.spin.combined.stage import METHOD as COMBINED
-from spinscope.pipeline.spin.combined.stage import SPEAKS
 from spinscope.pipeline.stage import SpinMethod
 
 from . import entities as at
@@ -26,7 +24,7 @@ DISC_RADIUS_PX, GAP_PX = 60.0, 20.0
 WIDTH_PX = 4 * DISC_RADIUS_PX + GAP_PX
 BARS_TOP_PX, ROW_PX = 2 * DISC_RADIUS_PX + 30.0, 40.0  # words are as large in a small pane: they need their rows
 NAMES_X_PX, MARGIN_PX = -150.0, 300.0
-ODDS_X_PX, ODDS_MARGIN_PX, MOST_ODDS = WIDTH_PX + 130.0, 260.0, 1e6
+ODDS_X_PX, ODDS_MARGIN_PX = WIDTH_PX + 130.0, 260.0
 MAX_RPS, GRID_RPS = 150.0, 50.0
 SIGMAS = 2.0
 ELLIPSE_POINTS = 49
@@ -88,7 +86,7 @@ def _drawn(run: ViewedRun, name: str, colour: at.Colour, ticks: list[Strips]) ->
 def _odds(run: ViewedRun, name: str, row: int, said: list[Witness | None]) -> list[Chunk]:
     """Odds of the combined spin against the next best one by one witness, where it speaks for or against it."""
     entity = f"{at.WITNESSES}/{name}/odds"
-    texts = ["" if witness is None else odds_words(witness.log_odds) for witness in said]
+    texts = ["" if witness is None else witness.odds for witness in said]
     shown = [text for text in texts if text]
     place = ODDS_X_PX, BARS_TOP_PX + ROW_PX * (row + 0.2)
     columns = rr.Points2D.columns(positions=np.full((len(shown), 2), place), labels=shown)
@@ -96,14 +94,6 @@ def _odds(run: ViewedRun, name: str, row: int, said: list[Witness | None]) -> li
         styled(entity, rr.Points2D, colors=_colour(name), radii=-0.1, show_labels=True),
         columns_at(entity, run.times_us, columns, [0, *(int(bool(text)) for text in texts)]),
     ]
-
-
-def odds_words(log_odds: float) -> str:
-    """Odds for or against a spin, in words; empty where they are nearly even."""
-    if abs(log_odds) < SPEAKS:
-        return ""
-    odds = math.exp(min(abs(log_odds), math.log(MOST_ODDS)))
-    return f"{odds:,.0f} : 1 {'for it' if log_odds > 0 else 'against it'}"
 
 
 def _strips(witness: Witness | None, row: int) -> Strips:

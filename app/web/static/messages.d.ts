@@ -122,7 +122,7 @@ export type SettingsRequest = { parameters: Record<string, Record<string, any>>;
 /** Drawn details of a shot; directions in the camera frame, `texture` a PNG in base64. */
 export type ShotDetail = { shot: CoachShot; spin_rps: number[] | null; reference_us: number; hitter: number[][] | null; texture: string | null; proof: SpinProofPoints | null; flight: FlightPath | null };
 /** One shot with the estimate of every method. */
-export type ShotMetrics = { start_us: number; end_us: number; logo_events: number; speed_m_s: number | null; radius_px: number | null; best: string | null; best_reason: string | null; kind: string | null; sentence: string; spin: Record<string, EstimateMetrics> };
+export type ShotMetrics = { start_us: number; end_us: number; logo_events: number; speed_m_s: number | null; radius_px: number | null; best: string | null; best_reason: string | null; kind: string | null; sentence: string; spin: Record<string, EstimateMetrics>; witnesses: Record<string, WitnessMetrics> };
 /** Shots of a long recording found so far, [start, end) in us, and the share of it that was searched. */
 export type ShotsMessage = { kind: "shots"; share: number; shots: [number, number][]; error: string | null };
 /** The logo at two instants, and the first turned to the second: places on the disc as the camera sees it. */
@@ -147,6 +147,8 @@ export type TableRequest = { recording: string; corners_px: number[][] };
 export type TextRequest = { text: string };
 /** One setting, over all clips that are tuned on. */
 export type Trial = { cost: number; answers: number; logo_events: number; objection: string | null };
+/** Evidence of one witness of the combined answer; None for what it does not tell. */
+export type WitnessMetrics = { magnitude_rps: number | null; magnitude_std_rps: number | null; odds: string };
 /** Settings as a preset and as a command line; `needs` names a file that the command reads. */
 export type WrittenSettings = { toml: string; command: string; needs: string | null };
 /** Messages of the server by their kind. */

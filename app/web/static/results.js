@@ -5,6 +5,8 @@
 import { element, milliseconds, number } from "./elements.js";
 
 const SPIN_HELP = "Magnitude ± 1 sigma that the method states. ✔: the one answer that the program itself trusts.";
+const WITNESS_HELP =
+  "What each tells by itself, and how many times as likely it makes the combined spin as the next one.";
 const AXIS_HELP = "Unit vector in the camera frame (x right, y down, z into the scene), right-hand rule; ± 1 sigma.";
 
 export class Results extends EventTarget {
@@ -74,6 +76,7 @@ export class Results extends EventTarget {
         if (values.some((value) => value !== "–")) rows.push(row(metric.label.toLowerCase(), values, metric.help));
       }
     }
+    rows.push(...witnessRows(shots));
     rows.push(row("Computing time", costs_ms.map(milliseconds), "All stages, when they were last computed."));
     const counts = both.map(({ shots: all }) => (all.length > 1 ? `${all.length} shots, the largest` : ""));
     const columns = both.length > 1 ? ["A", "B"] : [""];
@@ -83,6 +86,26 @@ export class Results extends EventTarget {
     heading.title = "All results here are of the whole shot; the pictures show what is known so far at the playhead.";
     return element("table.numbers", {}, heading, ...rows);
   }
+}
+
+/**
+ * Rows of the combined answer's witnesses: what each tells by itself, and the odds by it.
+ * @param {(ShotMetrics | null)[]} shots
+ */
+function witnessRows(shots) {
+  const names = new Set(shots.flatMap((shot) => Object.keys(shot?.witnesses ?? {})));
+  if (!names.size) return [];
+  const heading = element("th", { colSpan: 2 * shots.length, title: WITNESS_HELP }, "Witnesses of the combined answer");
+  const rows = [...names].map((name) => {
+    const told = shots.map((shot) => shot?.witnesses[name]);
+    const words = told.map((one) => {
+      const magnitude = one && one.magnitude_rps !== null ? spinWords(one.magnitude_rps, one.magnitude_std_rps) : "";
+      return [magnitude, one?.odds].filter(Boolean).join(", ") || "–";
+    });
+    const more = told.length > 1 ? [spinDifference(told)] : [];
+    return row(name.replace(/^the /, ""), [...words, ...more], WITNESS_HELP);
+  });
+  return [element("tr.method", {}, heading), ...rows];
 }
 
 /**
@@ -132,7 +155,7 @@ function compared(both, metric) {
   return [...values, more.replace("-", "−")];
 }
 
-function spinDifference(/** @type {(EstimateMetrics | undefined)[]} */ [a, b]) {
+function spinDifference(/** @type {({magnitude_rps: number | null} | undefined)[]} */ [a, b]) {
   if (!a?.magnitude_rps || !b?.magnitude_rps) return "–";
   const more = (b.magnitude_rps - a.magnitude_rps).toFixed(2);
   return `${Number(more) ? more.replace("-", "−") : "0.00"} rps`;
@@ -148,11 +171,11 @@ function axisDifference(/** @type {(EstimateMetrics | undefined)[]} */ [a, b]) {
 function spin(/** @type {EstimateMetrics | undefined} */ estimate) {
   if (!estimate) return "…";
   if (estimate.magnitude_rps === null) return `refused: ${estimate.reason}`;
-  const std = estimate.magnitude_std_rps;
-  return `${estimate.magnitude_rps.toFixed(std !== null && std < 0.05 ? 2 : 1)}${
-    std === null ? "" : ` ± ${margin(std)}`
-  } rps`;
+  return spinWords(estimate.magnitude_rps, estimate.magnitude_std_rps);
 }
+
+const spinWords = (/** @type {number} */ rps, /** @type {number | null} */ std) =>
+  `${rps.toFixed(std !== null && std < 0.05 ? 2 : 1)}${std === null ? "" : ` ± ${margin(std)}`} rps`;
 
 function axis(/** @type {EstimateMetrics | undefined} */ estimate) {
   if (!estimate?.axis) return "–";

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from ...kernels.arrays import Floats
 from ...results import ReadOnlyArrays, SpinEstimate
+
+# A witness that makes one spin three times as likely as the next speaks for it.
+SPEAKS = math.log(3.0)
+MOST_ODDS = 1e6  # that are told
 
 Basis = Literal["pattern", "rhythm", "flight"]
 
@@ -33,6 +38,14 @@ class Witness(ReadOnlyArrays):
     magnitude_rps: float | None
     magnitude_std_rps: float | None
     log_odds: float = 0.0
+
+    @property
+    def odds(self) -> str:
+        """Odds for or against the combined spin, in words; empty where they are nearly even."""
+        if abs(self.log_odds) < SPEAKS:
+            return ""
+        odds = math.exp(min(abs(self.log_odds), math.log(MOST_ODDS)))
+        return f"{odds:,.0f} : 1 {'for it' if self.log_odds > 0 else 'against it'}"
 
     def to_dict(self) -> dict[str, Any]:
         """The witness as `spinscope analyze` writes it, ready for JSON."""

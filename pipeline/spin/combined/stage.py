@@ -20,7 +20,7 @@ from ..contrast.result import ContrastResult
 from ..trajectory.stage import TRUSTED_AXIS_DEG, TRUSTED_SHARE, TrajectoryResult
 from .candidates import Candidate, flight_candidates, pattern_candidates, rhythm_candidates
 from .likelihoods import BLUNDER, by_flight, by_flow, by_rate, by_sightings, fallible, log_mean, rhythms_of
-from .result import Basis, CombinedResult, Witness
+from .result import SPEAKS, Basis, CombinedResult, Witness
 from .sightings import Sightings
 
 METHOD = "combined"
@@ -43,8 +43,6 @@ CONTRIBUTIONS: dict[Basis, str] = {
     "rhythm": "magnitude from the rhythm of the logo's visits, axis from the flight",
     "flight": "magnitude and axis from the bend of the flight",
 }
-# A witness that makes one spin three times as likely as the next speaks for it.
-SPEAKS = math.log(3.0)
 
 
 @dataclass(frozen=True, kw_only=True)

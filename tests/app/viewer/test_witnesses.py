@@ -11,7 +11,8 @@ import pytest
 from spinscope.app.viewer import entities
 from spinscope.app.viewer.rrd import write_rrd
 from spinscope.app.viewer.run import ViewedRun
-from spinscope.app.viewer.witnesses import DISC_RADIUS_PX, GAP_PX, MAX_RPS, NAMES, WIDTH_PX, odds_words
+from spinscope.app.viewer.witnesses import DISC_RADIUS_PX, GAP_PX, MAX_RPS, NAMES, WIDTH_PX
+from spinscope.pipeline.spin.combined.result import Witness
 from tests.app.viewer.reading import Rows, read_back
 
 
@@ -62,7 +63,7 @@ def test_every_witness_has_a_row_and_its_odds_stand_there(flight: ViewedRun, log
     assert any(one.name == "logo" for _, one in said), "what was seen and not seen is a witness"
     for t_us, one in said:
         shown = logged[f"{entities.WITNESSES}/{one.name}/odds"].at("labels", t_us) or []
-        assert list(shown) == [words for words in [odds_words(one.log_odds)] if words]
+        assert list(shown) == [words for words in [one.odds] if words]
 
 
 @pytest.mark.parametrize(
@@ -76,7 +77,7 @@ def test_every_witness_has_a_row_and_its_odds_stand_there(flight: ViewedRun, log
     ],
 )
 def test_odds_in_words(log_odds: float, words: str) -> None:
-    assert odds_words(log_odds) == words
+    assert Witness("rate", None, None, None, None, log_odds).odds == words
 
 
 def test_the_ellipse_is_two_sigma_of_the_axis(flight: ViewedRun, logged: dict[str, Rows]) -> None:

@@ -156,6 +156,7 @@ def metrics_with(best: str | None, estimate: EstimateMetrics | None) -> RunMetri
         kind=None,
         sentence="",
         spin={} if estimate is None else {"triplet": estimate},
+        witnesses={},
     )
     return RunMetrics(
         ticks=1,
