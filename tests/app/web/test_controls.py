@@ -115,6 +115,8 @@ def test_a_and_b_beside_each_other(bare: Tab) -> None:
     bare.slide("logo.pad_px", "PageUp")
     text = bare.page.inner_text("#side details[data-title='Result']")
     assert "logo.pad_px" in text
+    witness = r"Witnesses of the combined answer\n.*\npattern\t[\d.]+ ± [\d.]+ rps\t[\d.]+ ± [\d.]+ rps\t[−\d.]+ rps\n"
+    assert re.search(witness, text, re.DOTALL)
     headings = bare.page.locator("#side tr.heading th").all_inner_texts()
     assert "A" in headings and "B" in headings and "B − A" in headings
     assert re.search(r"\d° apart", bare.page.inner_text("#side details[data-title='Result']"))
