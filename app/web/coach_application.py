@@ -47,7 +47,7 @@ from .error_answers import add_error_handlers
 from .security import SecurityMiddleware
 
 STATIC = Path(__file__).parent / "static"
-POLL_S = 0.3  # a session that another program writes to; a new shot is to appear within a second
+POLL_S = 0.1  # a session that another program writes to; a new shot is to appear within a second
 SESSION = "/api/coach/{session}/"
 MEDIA_TYPES = {
     ".csv": "text/csv; charset=utf-8",
