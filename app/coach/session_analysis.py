@@ -30,6 +30,7 @@ from .session import KnownRecording, ShotSession
 from .shot_record import RecordingShots, ShotRecord, analyze_for_session
 
 NICENESS = 5  # a third of the share of the page, and of a running camera's tracker, where they want one core
+MOST_WAIT_S = 10.0
 POLL_S = 0.4  # a new shot is to appear within a second of its end
 CRASHED = "the process that read it was ended, by lack of memory or a fault of a library"
 
@@ -58,6 +59,8 @@ class SessionAnalysis:
         Processes; None = one a core.
     on_change : callable, optional
         Called, in the thread, when progress or the session has changed.
+    is_playing : callable, optional
+        Whether a shot is being played, whose spin is more urgent: the work then waits, up to `MOST_WAIT_S`.
     """
 
     def __init__(
@@ -67,7 +70,9 @@ class SessionAnalysis:
         choices: Choices,
         jobs: int | None = None,
         on_change: Callable[[], None] = lambda: None,
+        is_playing: Callable[[], bool] = lambda: False,
     ) -> None:
+        self._is_playing = is_playing
         self.session, self.choices, self.progress = session, choices, AnalysisProgress()
         self._sources, self._jobs, self._on_change = list(sources), jobs, on_change
         self._settings_hash = settings_hash(choices)
@@ -102,7 +107,13 @@ class SessionAnalysis:
     def _follow(self) -> None:
         if sys.platform == "linux":
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
+        waited_s = 0.0
         while not self._ended.is_set():
+            if self._is_playing() and waited_s < MOST_WAIT_S:
+                self._ended.wait(POLL_S)
+                waited_s += POLL_S
+                continue
+            waited_s = 0.0
             try:
                 self.run_once()
                 load_stages()  # a single new recording is analyzed by this process

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from dataclasses import replace
@@ -29,6 +30,7 @@ from .opening import CameraChoice
 from .shot_table import events_folder
 
 TABLE = "live.csv"
+REST_S = 1.0  # without a ball, after which nobody plays
 
 
 class LiveSession:
@@ -54,6 +56,7 @@ class LiveSession:
         self._session, self._version = session, program_version()
         self._open: OpenLive | None = None
         self._notice: str | None = None
+        self._ball_s = -math.inf  # when a ball was last in flight
 
     @property
     def is_open(self) -> bool:
@@ -75,8 +78,14 @@ class LiveSession:
         self._open = live
         self.has_begun.set()
 
+    def is_playing(self) -> bool:
+        """Whether a ball is in flight, or was less than REST_S ago."""
+        return time.monotonic() - self._ball_s < REST_S
+
     def add_tick(self, arrived: ArrivedTick, tick: Tick) -> None:
-        """Take a tick, of which the session needs nothing."""
+        """Take a tick, in the tracker's thread."""
+        if tick.track.balls:
+            self._ball_s = time.monotonic()
 
     def add_output(self, output: LiveOutput, row: ResultRow | None) -> None:
         """Take a result; raises RecordingError when the session cannot be written."""
@@ -124,7 +133,7 @@ def run_with_coach(
     try:
         observer.has_begun.wait()
         if observer.is_open:
-            analysis = SessionAnalysis(session, [folder], choices.for_others, jobs=1)
+            analysis = SessionAnalysis(session, [folder], choices.for_others, jobs=1, is_playing=observer.is_playing)
             sessions = [session, *other_sessions([session])]
             serve_coach(CoachState(sessions, [analysis], observer.notice), place="live", **page)
     except KeyboardInterrupt:

@@ -7,12 +7,14 @@ import signal
 import sqlite3
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from spinscope.app.coach import session_analysis
 from spinscope.app.coach.session import NOT_FOUND, TABLE_FILE, ShotSession
 from spinscope.app.coach.session_analysis import SessionAnalysis
 from spinscope.pipeline.errors import ParameterError, RecordingError
@@ -153,3 +155,31 @@ def test_recordings_are_analyzed_once_and_damaged_ones_are_listed(session: ShotS
     assert [path.name for path, _ in later._pending()] == ["damaged.h5"]
     other = SessionAnalysis(session, [folder], Choices(assignments=("logo.pad_px=3",)), jobs=1)
     assert len(list(other._pending())) == 2
+
+
+@pytest.mark.parametrize(("most_wait_s", "asked"), [(1e9, 4), (0.0015, 3)])
+def test_the_analysis_waits_while_a_shot_is_played_but_not_for_ever(
+    session: ShotSession, monkeypatch: pytest.MonkeyPatch, most_wait_s: float, asked: int
+) -> None:
+    monkeypatch.setattr(session_analysis, "POLL_S", 0.001)
+    monkeypatch.setattr(session_analysis, "MOST_WAIT_S", most_wait_s)
+    monkeypatch.setattr(session_analysis, "load_stages", lambda: None)
+    calls = list[str]()
+
+    def is_playing() -> bool:
+        calls.append("asked")
+        return len(calls) < 4
+
+    waiting = SessionAnalysis(session, [], Choices(), is_playing=is_playing)
+    worked = threading.Event()
+
+    def work() -> None:
+        calls.append("work")
+        waiting._ended.set()
+        worked.set()
+
+    monkeypatch.setattr(waiting, "run_once", work)
+    waiting.start()
+    assert worked.wait(30.0)
+    waiting.close()
+    assert calls[: calls.index("work")] == ["asked"] * asked
