@@ -3,23 +3,34 @@
 from __future__ import annotations
 
 import threading
+from abc import abstractmethod
 from collections.abc import Callable
-from typing import Protocol
 
 from .headless import LiveObserver, OpenLive
 
 
-class CameraObserver(LiveObserver, Protocol):
-    """Observer of a live run behind a page."""
+class CameraObserver(LiveObserver):
+    """Observer of a live run behind a page, which knows the run once it has begun."""
+
+    def __init__(self) -> None:
+        self._open: OpenLive | None = None
 
     @property
     def is_open(self) -> bool:
         """Whether the run has begun."""
+        return self._open is not None
 
     @property
     def opened(self) -> OpenLive:
-        """The run, once it has begun."""
+        """The run."""
+        assert self._open is not None
+        return self._open
 
+    def begin(self, live: OpenLive) -> None:
+        """Take the run before it starts."""
+        self._open = live
+
+    @abstractmethod
     def end(self, error: Exception | None) -> None:
         """Take note that the run has ended, by an error or as it should."""
 

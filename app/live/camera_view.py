@@ -26,6 +26,7 @@ from ..tuning.bias_sweep import BiasRange, BiasState, BiasSweep
 from ..viewer import entities
 from ..web.live_schemas import LiveSecond, LiveShotRow, LiveView
 from .camera_sweep import CameraSweep, proposal_words, swept_biases
+from .camera_thread import CameraObserver
 from .event_rates import EventRateMeter
 from .headless import OpenLive, row_words
 from .recording import sidecar_tables, toml_text
@@ -39,7 +40,7 @@ FIRST_WINDOW_US = 500_000  # the page opens on so much
 CHECK_S = 0.1
 
 
-class CameraView:
+class CameraView(CameraObserver):
     """Observer of a live run behind the page.
 
     Parameters
@@ -56,10 +57,10 @@ class CameraView:
     """
 
     def __init__(self, folder: Path, kept_s: float) -> None:
+        super().__init__()
         self.kept_us = round(kept_s * 1e6)
         self.has_events = threading.Event()
         self._folder = folder
-        self._open: OpenLive | None = None
         self._is_running = True
         self._ticks: deque[tuple[ArrivedTick, Tick]] = deque()
         self._meter = EventRateMeter()
@@ -75,7 +76,7 @@ class CameraView:
 
     def begin(self, live: OpenLive) -> None:
         """Take the run before it starts."""
-        self._open = live
+        super().begin(live)
         self._biases = dict(live.camera.biases)
 
     def add_tick(self, arrived: ArrivedTick, tick: Tick) -> None:
@@ -149,17 +150,6 @@ class CameraView:
             del self._shots[next(iter(self._shots))]
 
     # Source of the page.
-
-    @property
-    def is_open(self) -> bool:
-        """Whether the camera could be opened."""
-        return self._open is not None
-
-    @property
-    def opened(self) -> OpenLive:
-        """The run."""
-        assert self._open is not None
-        return self._open
 
     def view(self) -> LiveView:
         """The last two minutes."""

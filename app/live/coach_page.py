@@ -24,7 +24,7 @@ from ..coach.session_folders import other_sessions
 from ..coach.shot_record import RecordingShots, live_record
 from ..web.coach_application import CoachState
 from ..web.server import serve_coach
-from .camera_thread import CameraThread
+from .camera_thread import CameraObserver, CameraThread
 from .headless import OpenLive, Outputs, run_headless
 from .opening import CameraChoice
 from .shot_table import events_folder
@@ -33,7 +33,7 @@ TABLE = "live.csv"
 REST_S = 1.0  # without a ball, after which nobody plays
 
 
-class LiveSession:
+class LiveSession(CameraObserver):
     """Observer of a live run that adds its shots to a session.
 
     They come without logo and pictures, which follow when `SessionAnalysis` has analyzed each shot's recording.
@@ -52,22 +52,11 @@ class LiveSession:
     kept_us = KEPT_US
 
     def __init__(self, session: ShotSession) -> None:
+        super().__init__()
         self.has_begun = threading.Event()
         self._session, self._version = session, program_version()
-        self._open: OpenLive | None = None
         self._notice: str | None = None
         self._ball_s = -math.inf  # when a ball was last in flight
-
-    @property
-    def is_open(self) -> bool:
-        """Whether the run has begun."""
-        return self._open is not None
-
-    @property
-    def opened(self) -> OpenLive:
-        """The run."""
-        assert self._open is not None
-        return self._open
 
     def notice(self) -> str | None:
         """Words on what happened to the camera since the last shot; None where nothing did."""
@@ -75,7 +64,7 @@ class LiveSession:
 
     def begin(self, live: OpenLive) -> None:
         """Take the run before it starts."""
-        self._open = live
+        super().begin(live)
         self.has_begun.set()
 
     def is_playing(self) -> bool:
