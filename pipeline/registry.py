@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .spin.contrast.parameters import ContrastParameters
     from .spin.parameters import SpinParameters
     from .spin.trajectory.stage import TrajectoryParameters
+    from .stages.track_parameters import TrackParameters
 
 STAGES: Registry[Stage] = Registry("stage")
 for _stage in (
@@ -49,7 +50,7 @@ class Parameters(ParameterSet):
         ball: BallParameters
         filter: filter.FilterParameters
         surface: surface.SurfaceParameters
-        track: track.TrackParameters
+        track: TrackParameters
         logo: logo.LogoParameters
         rate: rate.RateParameters
         flow: flow.FlowParameters

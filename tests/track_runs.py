@@ -17,7 +17,7 @@ from spinscope.pipeline.stage import Context
 from spinscope.pipeline.stages import filter, surface, track
 from spinscope.pipeline.stages.filter import FilterParameters, FilterResult
 from spinscope.pipeline.stages.surface import SurfaceParameters, SurfaceResult
-from spinscope.pipeline.stages.track import TrackParameters
+from spinscope.pipeline.stages.track_parameters import TrackParameters
 from spinscope.pipeline.stages.track_result import TrackResult
 
 SAMPLES = Path(__file__).parents[1] / "sample_recordings"

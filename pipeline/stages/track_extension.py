@@ -18,8 +18,8 @@ from ..results import Packet
 from .track_ball import Measuring, TrackedBall
 from .track_path import PathPoint
 
-# Longer than it takes to tell that a slow ball is a shot (`track.WATCH_US`) where it is missed for a while
-# (`track.HELD_US`), and half of what the chain keeps for shots that are announced late.
+# Longer than it takes to tell that a slow ball is a shot (`track_initiation.WATCH_US`) where it is missed for a while
+# (`track_initiation.HELD_US`), and half of what the chain keeps for shots that are announced late.
 EXTENDED_US = 50_000
 # The centre lies so many radii inside the image where 0.6 of the outline is visible, as of a trusted sighting.
 LEAST_INSIDE = 0.3

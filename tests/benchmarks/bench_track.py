@@ -16,7 +16,7 @@ from spinscope.pipeline.kernels import hough, moving_circle, outline
 from spinscope.pipeline.stages import filter, surface, track
 from spinscope.pipeline.stages.filter import FilterParameters
 from spinscope.pipeline.stages.surface import SurfaceParameters
-from spinscope.pipeline.stages.track import TrackParameters
+from spinscope.pipeline.stages.track_parameters import TrackParameters
 from tests.reference import hough as reference
 from tests.track_runs import PAPER_CONTEXT, inputs, run, sample, tracked
 

@@ -10,7 +10,7 @@ import pytest
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.stages import track
-from spinscope.pipeline.stages.track import TrackParameters
+from spinscope.pipeline.stages.track_parameters import TrackParameters
 from tests.track_runs import (
     HEIGHT,
     WIDTH,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinscope.pipeline.events import EventBatch
-from spinscope.pipeline.stages.track import TrackParameters
+from spinscope.pipeline.stages.track_parameters import TrackParameters
 from spinscope.pipeline.stages.track_result import ShotEnd, TrackResult
 from tests.track_runs import disc_events, inputs, merged, run, sample, setting, tracked
 

@@ -13,8 +13,8 @@ from spinscope.pipeline.results import Circle
 from spinscope.pipeline.simulator import Ball, Flight, Scene, flight
 from spinscope.pipeline.simulator.motion import Trajectory, trajectory, triple
 from spinscope.pipeline.stages import track_contact
-from spinscope.pipeline.stages.track import TrackParameters
 from spinscope.pipeline.stages.track_contact import Contact, find_contact
+from spinscope.pipeline.stages.track_parameters import TrackParameters
 from spinscope.pipeline.stages.track_path import PathPoint
 
 ABOVE = Camera.of(CameraParameters(), 1280, 720)

@@ -11,11 +11,11 @@ import pytest
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.kernels.moving_circle import HALF_AHEAD, OF_DARK
 from spinscope.pipeline.results import Packet
-from spinscope.pipeline.stages import track, track_ball
-from spinscope.pipeline.stages.track import TrackParameters
+from spinscope.pipeline.stages import track, track_ball, track_initiation, track_state
 from spinscope.pipeline.stages.track_ball import TrackedBall
 from spinscope.pipeline.stages.track_kalman import BallFilter
 from spinscope.pipeline.stages.track_outline import Sighting
+from spinscope.pipeline.stages.track_parameters import TrackParameters
 from spinscope.pipeline.stages.track_search import agree
 from tests.track_runs import PAPER_CONTEXT
 
@@ -136,12 +136,13 @@ def test_two_sightings_are_of_one_ball_if_it_moved_as_it_said(near: list[float],
 def test_other_balls_are_looked_for_every_5_ms_and_at_once_when_one_is_missed() -> None:
     state = track.start(TrackParameters(), PAPER_CONTEXT)
     state.looked_us = 50_000
-    assert track._is_search_due(state, packet_to(51_000)), "no ball yet"
+    assert track_initiation.is_search_due(state, packet_to(51_000)), "no ball yet"
     state.balls = [tracked_ball()]
-    assert not track._is_search_due(state, packet_to(54_999)) and track._is_search_due(state, packet_to(55_000))
-    assert not track._is_search_due(state, packet_to(51_000))
+    assert not track_initiation.is_search_due(state, packet_to(54_999))
+    assert track_initiation.is_search_due(state, packet_to(55_000))
+    assert not track_initiation.is_search_due(state, packet_to(51_000))
     state.balls[0].coast(51_000)
-    assert track._is_search_due(state, packet_to(51_000))
+    assert track_initiation.is_search_due(state, packet_to(51_000))
 
 
 @pytest.mark.parametrize(
@@ -166,7 +167,7 @@ def test_what_turns_up_slowly_in_the_middle_is_watched(
     ahead = 0.95 if trusted else 0.75
     seen = sighting(ring=ring, covariance=np.zeros((5, 5)), ahead=ahead)
     assert seen.trusted == trusted
-    assert track._wait_us(parameters, state, seen) == wait_us
+    assert track_initiation._wait_us(parameters, state, seen) == wait_us
 
 
 def ball_filter() -> BallFilter:
@@ -291,7 +292,7 @@ def test_a_ball_has_left_when_less_than_a_tenth_of_its_width_is_in_view(axis: in
         for inwards, beyond in ((0.05, False), (-0.05, True)):
             mean = RING.copy()
             mean[axis] = place - last * inwards
-            assert track._beyond(mean, PAPER_CONTEXT.camera) == beyond
+            assert track_state.is_beyond(mean, PAPER_CONTEXT.camera) == beyond
 
 
 def test_the_ball_is_smaller_than_its_outline_and_ahead_of_it() -> None:
@@ -308,8 +309,8 @@ def test_a_new_track_begins_with_the_sightings_spread_and_room_for_acceleration(
     state = track.start(TrackParameters(outline_px=0.0, lag_px=0.0), PAPER_CONTEXT)
     state.shots = 4
     state.past.add(packet_to(10_000))
-    earlier: track.Earlier = {}
-    track._begin(TrackParameters(), state, packet_to(10_000), sighting(), earlier)
+    earlier: track_state.Earlier = {}
+    track_initiation._begin(TrackParameters(), state, packet_to(10_000), sighting(), earlier)
     (ball,) = state.balls
     assert not earlier, "no tick came before"
     speed_std_px_s = 0.2 * 17.0 / 0.02
@@ -368,4 +369,4 @@ def test_how_a_shot_began(x_px: float, first_us: int, began_by: str) -> None:
     state = track.start(TrackParameters(), PAPER_CONTEXT)
     state.first_us = first_us
     ball = np.array([x_px, 300.0, 3000.0, 0.0, 17.0])
-    assert track._began_by(state, packet_to(10_000), ball) == began_by
+    assert track_initiation._began_by(state, packet_to(10_000), ball) == began_by

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from spinscope.pipeline.events import EventBatch
-from spinscope.pipeline.stages.track import TrackParameters
+from spinscope.pipeline.stages.track_parameters import TrackParameters
 from spinscope.pipeline.stages.track_result import TrackResult
 from tests.track_runs import WIDTH, disc_events, inputs, run, sample, tracked, transformed
 

@@ -7,8 +7,8 @@ import pytest
 
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.stages import track_search
-from spinscope.pipeline.stages.track import TrackParameters
 from spinscope.pipeline.stages.track_background import background_moves
+from spinscope.pipeline.stages.track_parameters import TrackParameters
 from spinscope.pipeline.stages.track_search import support_times
 from tests.track_runs import PAPER_CONTEXT, disc_events, inputs, merged, run, setting
 
