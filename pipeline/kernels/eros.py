@@ -36,7 +36,6 @@ K_MAX_PX = 49
 MARGIN_PX = K_MAX_PX // 2
 # Pixels faded at once: one AVX2 register. A constant trip, or the compiler will not vectorise it.
 BAND_PX = np.uint64(32)
-WORD, ONE, TWO, THREE = np.uint64(8), np.uint64(1), np.uint64(2), np.uint64(3)
 
 
 def odd_px(k_px: int) -> int:
@@ -105,26 +104,26 @@ def update(levels: Bytes, width_px: int, k_px: int, full: int, x_px: Pixels, y_p
         levels[corner + half * stride + half] = full
 
 
+def image_levels(levels: Bytes, width_px: int, height_px: int) -> Bytes:
+    """The image's part of the levels: a view, (height, width) uint8."""
+    stride = _stride_px(width_px)
+    first = MARGIN_PX * stride + MARGIN_PX
+    return levels[first : first + height_px * stride].reshape(height_px, stride)[:, :width_px]
+
+
 @njit(cache=True, nogil=True)
 def render(values: Bytes, levels: Bytes, table: Bytes) -> None:
-    """Write the values of the levels into `values` (height, width) uint8, which must hold zeros.
+    """Write the values of levels, (height, width) uint8 both, into `values`, which must hold zeros.
 
-    Skips what is empty, by whole rows and then 32 pixels at a time: on a flight's surface 5 x as fast as cv2.LUT over
-    every pixel.
+    Skips what is empty, 32 pixels at a time.
     """
-    height_px, width_px = values.shape
-    width, stride = np.uint64(width_px), np.uint64(_stride_px(width_px))
-    flat, words = values.reshape(-1), levels.view(np.uint64)
-    for y in range(height_px):
-        row = np.uint64(y + MARGIN_PX) * stride + np.uint64(MARGIN_PX)
-        out = np.uint64(y) * width
-        occupied = np.uint64(0)
-        for n in range(row // WORD, (row + width + np.uint64(7)) // WORD):
-            occupied |= words[np.uint64(n)]
-        if occupied == 0:
-            continue
-        for left in range(np.uint64(0), width, BAND_PX):
-            word = (row + np.uint64(left)) // WORD
-            if (words[word] | words[word + ONE] | words[word + TWO] | words[word + THREE]) != 0:
-                for x in range(np.uint64(left), min(np.uint64(left) + BAND_PX, width)):
-                    flat[out + np.uint64(x)] = table[levels[row + np.uint64(x)]]
+    out, flat = values.reshape(-1), levels.reshape(-1)
+    size = np.uint64(flat.size)
+    for start in range(np.uint64(0), size, BAND_PX):
+        end = min(np.uint64(start) + BAND_PX, size)
+        occupied = np.uint8(0)
+        for n in range(np.uint64(start), end):
+            occupied |= flat[np.uint64(n)]
+        if occupied != 0:
+            for n in range(np.uint64(start), end):
+                out[np.uint64(n)] = table[flat[np.uint64(n)]]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
-from .arrays import Bytes, Integers, Pixels
+from .arrays import Bytes, Floats, Integers, Pixels
 
 BLOCK_PIXELS = 16  # of `peak`: a vector instruction takes 16 votes
 
@@ -25,38 +25,120 @@ def vote(votes: Pixels, x_px: Integers, y_px: Integers, x0_px: int, y0_px: int, 
     """
     height, width, radii = votes.shape
     reach = radius0_px + radii - 1
-    # Which radius each squared distance rounds to, so that no root is taken in the loop: 2 x faster.
-    radius_of = np.full(2 * reach * reach + 1, radii, np.int64)
-    for k in range(radii):
-        radius = radius0_px + k
-        # d rounds to the radius where (radius - 1/2)^2 <= d^2 < (radius + 1/2)^2; d^2 is a whole number.
-        first = radius * radius - radius + 1 if radius > 0 else 0
-        radius_of[first : radius * radius + radius + 1] = k
-    # Where the votes reach around the pixels, all of one pixel's are at the same offsets: 4 x faster than clipping.
-    flat = votes.reshape(-1)
-    offsets = np.empty((2 * reach + 1) ** 2 if min(width, height) > 2 * reach else 0, np.int64)
-    m = 0
-    if offsets.size > 0:
-        for dy in range(-reach, reach + 1):
-            for dx in range(-reach, reach + 1):
-                k = radius_of[dx * dx + dy * dy]
-                if k < radii:
-                    offsets[m] = (dy * width + dx) * radii + k
-                    m += 1
+    radius_of = _radius_of(radius0_px, radii)
     for i in range(x_px.size):
         x = x_px[i] - x0_px
         y = y_px[i] - y0_px
-        if reach <= x < width - reach and reach <= y < height - reach:
-            centre = (y * width + x) * radii
-            for n in range(m):
-                flat[np.uint64(centre + offsets[n])] += np.uint16(1)
-            continue
         for b in range(max(0, y - reach), min(height, y + reach + 1)):
             dy2 = (y - b) * (y - b)
             for a in range(max(0, x - reach), min(width, x + reach + 1)):
                 k = radius_of[(x - a) * (x - a) + dy2]
                 if k < radii:
                     votes[b, a, k] += np.uint16(1)
+
+
+@njit(cache=True, nogil=True)
+def _radius_of(radius0_px: int, radii: int) -> Integers:
+    """Index of the radius that each squared distance rounds to, so that no root is taken in a vote: 2 x faster."""
+    reach = radius0_px + radii - 1
+    radius_of = np.full(2 * reach * reach + 1, radii, np.int64)
+    for k in range(radii):
+        radius = radius0_px + k
+        # d rounds to the radius where (radius - 1/2)^2 <= d^2 < (radius + 1/2)^2; d^2 is a whole number.
+        first = radius * radius - radius + 1 if radius > 0 else 0
+        radius_of[first : radius * radius + radius + 1] = k
+    return radius_of
+
+
+@njit(cache=True, nogil=True)
+def _offsets(radius0_px: int, radii: int, width: int) -> Integers:
+    """Places (m,) of all votes of a pixel relative to its own in flat votes of such a width."""
+    reach, radius_of = radius0_px + radii - 1, _radius_of(radius0_px, radii)
+    offsets = np.empty((2 * reach + 1) ** 2, np.int64)
+    m = 0
+    for dy in range(-reach, reach + 1):
+        for dx in range(-reach, reach + 1):
+            k = radius_of[dx * dx + dy * dy]
+            if k < radii:
+                offsets[m] = (dy * width + dx) * radii + k
+                m += 1
+    return offsets[:m]
+
+
+@njit(cache=True, nogil=True)
+def best_circles(
+    votes: Pixels, x_px: Integers, y_px: Integers, radius0_px: int, radii: int, most: int, least_support: float
+) -> tuple[Floats, Integers]:
+    """Circles through pixels (n,), n > 0, by `vote` and `peak`, without votes around a better one; best first.
+
+    Only circles with votes are looked at, and only their votes are set to zero again: where few pixels vote for a large
+    image 10 x faster.
+
+    Parameters
+    ----------
+    votes : flat uint16
+        Zeros, which they are again at the end; for each centre within the largest radius of the pixels' bounding box,
+        one a radius.
+    radius0_px, radii : int
+        Smallest radius, and number of radii.
+    most : int
+        Circles at most.
+    least_support : float
+        Least support (see `peak`) of a circle.
+
+    Returns
+    -------
+    supports : (m,) float64
+    circles : (m, 3) int64
+        Centre x and y, and radius.
+    """
+    reach = radius0_px + radii - 1
+    left, top = x_px.min() - reach, y_px.min() - reach
+    width, height = x_px.max() + reach + 1 - left, y_px.max() + reach + 1 - top
+    offsets = _offsets(radius0_px, radii, width)
+    perimeter = np.empty(radii)
+    for k in range(radii):
+        perimeter[k] = 2.0 * math.pi * max(radius0_px + k, 1)
+    least = np.empty(offsets.size, np.uint16)  # votes of a circle with enough support, at each offset
+    for n in range(offsets.size):
+        least[n] = math.ceil(math.sqrt(least_support * perimeter[offsets[n] % radii]))
+    enough = np.empty(x_px.size * offsets.size // max(least.min(), 1) + 1, np.int64)
+    m = 0
+    for i in range(x_px.size):
+        centre = ((y_px[i] - top) * width + x_px[i] - left) * radii
+        for n in range(offsets.size):
+            cell = np.uint64(centre + offsets[n])
+            count = votes[cell] + np.uint16(1)
+            votes[cell] = count
+            if count == least[n]:
+                enough[m] = cell
+                m += 1
+    support = np.empty(m)
+    for j in range(m):
+        count = float(votes[enough[j]])
+        support[j] = count * count / perimeter[enough[j] % radii]
+    supports, circles = np.empty(most), np.empty((most, 3), np.int64)
+    found = 0
+    while found < most:
+        best, best_cell = 0.0, 0
+        for j in range(m):
+            # Of equal ones the first in the order of the votes, as `peak`.
+            if support[j] >= best and votes[enough[j]] > 0 and (support[j] > best or enough[j] < best_cell):
+                best, best_cell = support[j], enough[j]
+        if best < least_support:
+            break
+        pixel, k = best_cell // radii, best_cell % radii
+        a, b, near = pixel % width, pixel // width, max(1, (radius0_px + k) // 2)
+        supports[found], circles[found, 0], circles[found, 1] = best, left + a, top + b
+        circles[found, 2] = radius0_px + k
+        found += 1
+        for row in range(max(0, b - near), min(height, b + near + 1)):
+            votes[(row * width + max(0, a - near)) * radii : (row * width + min(width, a + near + 1)) * radii] = 0
+    for i in range(x_px.size):
+        centre = ((y_px[i] - top) * width + x_px[i] - left) * radii
+        for n in range(offsets.size):
+            votes[np.uint64(centre + offsets[n])] = 0
+    return supports[:found].copy(), circles[:found].copy()
 
 
 @njit(cache=True, nogil=True)

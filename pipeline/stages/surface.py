@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -33,37 +33,64 @@ class SurfaceParameters(ParameterGroup):
     cleaning: str = choice("isolated", tuple(CLEANINGS), "removal of isolated pixels before the search")
 
 
+SurfaceLevels = tuple[NDArray[np.uint8], NDArray[np.uint8]]  # `levels` and `table` of a SurfaceResult
+
+
+def _plain_table() -> NDArray[np.uint8]:
+    return np.arange(256, dtype=np.uint8)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceResult(ReadOnlyArrays):
     """The surface at the end of the tick.
 
     Attributes
     ----------
-    values : (height, width) uint8
-        0 = nothing, 255 = an event just now; not cleaned.
+    levels : (height, width) uint8
+        Indices into `table`, 0 = nothing; not cleaned.
     cleaning : str
         The rule by which `cleaned` removes isolated pixels.
+    table : (n,) uint8
+        Rising values of the levels, the first is 0. By default the levels themselves.
     """
 
-    values: NDArray[np.uint8]
+    levels: NDArray[np.uint8]
     cleaning: str
+    table: NDArray[np.uint8] = field(default_factory=_plain_table)
+
+    @property
+    def values(self) -> NDArray[np.uint8]:
+        """The surface, (height, width) uint8: 0 = nothing, 255 = an event just now; not cleaned.
+
+        Looked up with each call: the tracker needs the values of few pixels.
+        """
+        values = self._values_of(self.levels)
+        values.flags.writeable = False
+        return values
+
+    def level_of(self, value: int) -> int:
+        """The lowest level of at least this value."""
+        return int(np.searchsorted(self.table, value))
 
     def cleaned(self, x0_px: int, y0_px: int, x1_px: int, y1_px: int) -> NDArray[np.uint8]:
-        """Copy of the window [x0, x1) x [y0, y1), clipped to the image, without its isolated pixels.
+        """Values in the window [x0, x1) x [y0, y1), clipped to the image, without its isolated pixels.
 
         Returns (rows, columns) uint8, empty where the window misses the image. Pixels around the window count
         as neighbours: any window is a cut-out of the whole image cleaned.
         """
-        height, width = self.values.shape
+        height, width = self.levels.shape
         x0, y0 = min(max(x0_px, 0), width), min(max(y0_px, 0), height)
         x1, y1 = max(min(x1_px, width), x0), max(min(y1_px, height), y0)
         is_printed = CLEANINGS[self.cleaning]
-        if is_printed is None:
-            return self.values[y0:y1, x0:x1].copy()
-        window = np.empty((y1 - y0, x1 - x0), np.uint8)
-        if window.size:
-            isolated.copy_cleaned(window, self.values, x0, y0, is_printed)
-        return window
+        window = self.levels[y0:y1, x0:x1].copy()
+        if window.size and is_printed is not None:
+            isolated.copy_cleaned(window, self.levels, x0, y0, is_printed)
+        return self._values_of(window)
+
+    def _values_of(self, levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        values = np.zeros_like(levels)
+        eros.render(values, levels, self.table)
+        return values
 
 
 class OrdinalSurface:
@@ -88,16 +115,18 @@ class OrdinalSurface:
         self._levels = eros.empty_levels(width_px, height_px)  # flat uint8, see the kernel
         self._table = table(parameters.k_px)
 
-    def update(self, packet: Packet, events: EventBatch) -> NDArray[np.uint8]:
-        """Draw the tick's events and return the (height, width) uint8 surface at its end."""
+    def update(self, packet: Packet, events: EventBatch) -> SurfaceLevels:
+        """Draw the tick's events and return the surface at its end."""
         return self.drawn(events)
 
-    def drawn(self, events: EventBatch) -> NDArray[np.uint8]:
-        """Draw events and return the (height, width) uint8 surface after the last one."""
-        values = np.zeros((self._height_px, self._width_px), np.uint8)
+    def drawn(self, events: EventBatch) -> SurfaceLevels:
+        """Draw events and return the surface after the last one."""
         eros.update(self._levels, self._width_px, self._k_px, len(self._table) - 1, events.x_px, events.y_px)
-        eros.render(values, self._levels, self._table)
-        return values
+        return eros.image_levels(self._levels, self._width_px, self._height_px).copy(), self._table
+
+    def clear(self) -> None:
+        """Forget all events."""
+        self._levels[:] = 0
 
 
 class LastEventSurface:
@@ -113,12 +142,12 @@ class LastEventSurface:
         self._span_us, self._is_linear = parameters.span_us, is_linear
         self._last_us = np.full((height_px, width_px), surfaces.NEVER_US)
 
-    def update(self, packet: Packet, events: EventBatch) -> NDArray[np.uint8]:
-        """Remember the tick's events and return the (height, width) uint8 surface at its end."""
+    def update(self, packet: Packet, events: EventBatch) -> SurfaceLevels:
+        """Remember the tick's events and return the surface at its end."""
         values = np.zeros(self._last_us.shape, np.uint8)
         self._last_us[events.y_px, events.x_px] = events.t_us  # of a pixel's events the last one stays
         surfaces.render(values, self._last_us, packet.end_us, self._span_us, self._is_linear)
-        return values
+        return values, _plain_table()
 
 
 Surface = OrdinalSurface | LastEventSurface
@@ -138,7 +167,8 @@ def start(parameters: SurfaceParameters, context: Context) -> Surface:
 
 def step(parameters: SurfaceParameters, state: Surface, packet: Packet, filtered: FilterResult) -> SurfaceResult:
     """Draw the tick's filtered events and read the surface at its end."""
-    return SurfaceResult(state.update(packet, filtered.surface_events), parameters.cleaning)
+    levels, table = state.update(packet, filtered.surface_events)
+    return SurfaceResult(levels, parameters.cleaning, table)
 
 
 STAGE = Stage(

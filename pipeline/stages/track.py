@@ -30,7 +30,7 @@ from .track_limits import Limits
 from .track_outline import VOTE_US, Edge
 from .track_parameters import TrackParameters
 from .track_result import BallTrack, EndedBy, ShotEnd, Status, TrackResult
-from .track_search import support_times
+from .track_search import SearchMemory
 from .track_state import Earlier, TrackState, ball_track, follow_path, is_beyond
 
 # What speaks against one free flight, in words for people.
@@ -60,7 +60,7 @@ def start(parameters: TrackParameters, context: Context) -> TrackState:
         parameters.acceleration_m_s2,
         parameters.approach_m_s,
     )
-    return TrackState(context, limits, measuring, support_times(context.camera))
+    return TrackState(context, limits, measuring, SearchMemory.of(context.camera))
 
 
 def step(
@@ -221,7 +221,7 @@ def _is_shaking(parameters: TrackParameters, state: TrackState, end_us: int) -> 
     if (
         state.balls
         and parameters.shake_px > 0.0
-        and background_moves(state.contour, state.last_us, state.context.camera)
+        and background_moves(state.contour, state.memory.last_us, state.context.camera)
     ):
         state.shaken_us = end_us
     return state.shaken_us is not None and end_us - state.shaken_us < SHAKING_US

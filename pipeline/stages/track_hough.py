@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..events import EventBatch
 from ..kernels import hough as kernels
@@ -22,6 +23,8 @@ REACH_PX = 6
 CELL_PX, MOST_CELLS = 4, 10
 # More edge pixels than this are thinned: a ring of 40 px radius two pixels wide has 500.
 MOST_PIXELS = 250
+# Fewer cells than one, times the share of the outline that they fill, are no circle.
+LEAST_SUPPORT = 1.0
 
 
 def hough_near(
@@ -39,7 +42,7 @@ def hough_near(
     first_radius = max(1, round(radius_from_px))
     radii = max(1, round(radius_to_px) - first_radius + 1)
     margin = first_radius + radii + reach_px
-    height, width = surface.values.shape
+    height, width = surface.levels.shape
     x0, y0 = max(0, round(x_px) - margin), max(0, round(y_px) - margin)
     x1, y1 = min(width, round(x_px) + margin + 1), min(height, round(y_px) + margin + 1)
     if x0 >= x1 or y0 >= y1:
@@ -51,12 +54,19 @@ def hough_near(
     return Circle(*found) if found[3] > 0.0 else None
 
 
+def empty_votes(width_px: int, height_px: int) -> NDArray[np.uint16]:
+    """Votes of `candidates` for an image of this size, flat zeros."""
+    columns, rows = (-(-size_px // CELL_PX) + 2 * MOST_CELLS for size_px in (width_px, height_px))
+    return np.zeros(rows * columns * MOST_CELLS, np.uint16)
+
+
 def candidates(
     surface: SurfaceResult,
     events: EventBatch,
     radius_min_px: float,
     radius_max_px: float,
     most: int,
+    votes: NDArray[np.uint16],
 ) -> Iterator[Circle]:
     """Circles anywhere, best first: a coarse vote of the cells with fresh edges.
 
@@ -71,14 +81,16 @@ def candidates(
         The contour events that may belong to an edge (where the surface is bright).
     most : int
         Circles in the first octave of radii; half as many in the next ones, but one at least.
+    votes : flat uint16
+        `empty_votes`, and so again afterwards: new ones cost more than the vote.
     """
-    cells = kernels.active_cells(surface.values, events.x_px, events.y_px, EDGE_LEVEL, CELL_PX)
+    cells = kernels.active_cells(surface.levels, events.x_px, events.y_px, surface.level_of(EDGE_LEVEL), CELL_PX)
     coarse: list[tuple[float, int, Circle]] = []
     cell_px, smallest_px = CELL_PX, radius_min_px
     while smallest_px < radius_max_px and cells[0].size >= 5:
         largest_px = min(MOST_CELLS * cell_px, radius_max_px)
         if smallest_px < largest_px:
-            coarse += _coarse_circles(*cells, smallest_px, largest_px, most, cell_px)
+            coarse += _coarse_circles(votes, *cells, smallest_px, largest_px, most, cell_px)
             smallest_px = largest_px
             most = max(1, most // 2)
         cell_px *= 2
@@ -95,22 +107,19 @@ def candidates(
 
 
 def _coarse_circles(
-    columns: Integers, rows: Integers, radius_min_px: float, radius_max_px: float, most: int, cell_px: int
+    votes: NDArray[np.uint16],
+    columns: Integers,
+    rows: Integers,
+    radius_min_px: float,
+    radius_max_px: float,
+    most: int,
+    cell_px: int,
 ) -> Iterator[tuple[float, int, Circle]]:
     """Support in px of outline, cell and circle of those through these cells, best first."""
     first_radius = max(1, math.floor(radius_min_px / cell_px))
     radii = math.ceil(radius_max_px / cell_px) - first_radius + 1
-    reach = first_radius + radii
-    left, top = int(columns.min()) - reach, int(rows.min()) - reach
-    shape = (int(rows.max()) + reach + 1 - top, int(columns.max()) + reach + 1 - left, radii)
-    votes = np.zeros(shape, np.uint16)
-    kernels.vote(votes, columns, rows, left, top, first_radius)
-    for _ in range(most):
-        support, a, b, k = kernels.peak(votes, first_radius)
-        if support < 1.0:
-            return
-        near = max(1, (first_radius + k) // 2)
-        votes[max(0, b - near) : b + near + 1, max(0, a - near) : a + near + 1] = 0
-        x, y = ((left + a + 0.5) * cell_px - 0.5, (top + b + 0.5) * cell_px - 0.5)
-        share = min(1.0, math.sqrt(support / (2.0 * math.pi * (first_radius + k))))
-        yield support * cell_px, cell_px, Circle(x, y, (first_radius + k) * cell_px, share)
+    supports, circles = kernels.best_circles(votes, columns, rows, first_radius, radii, most, LEAST_SUPPORT)
+    for support, (a, b, radius) in zip(supports.tolist(), circles.tolist(), strict=True):
+        x, y = (a + 0.5) * cell_px - 0.5, (b + 0.5) * cell_px - 0.5
+        share = min(1.0, math.sqrt(support / (2.0 * math.pi * radius)))
+        yield support * cell_px, cell_px, Circle(x, y, radius * cell_px, share)

@@ -58,9 +58,9 @@ def begin_tracks(
         routes = (ROUTES[packet.end_us // LOOK_US % 2],)
     camera, limits = state.context.camera, state.limits
     expected = tuple(_circle_at(packet.end_us, since_us, sighting) for since_us, sighting in state.pending)
-    hough, found, excluded = look(surface, events, packet.end_us, camera, limits, state.last_us, most, routes, expected)
+    hough, found, excluded = look(surface, events, packet.end_us, camera, limits, state.memory, most, routes, expected)
     if not (state.balls or found or excluded):
-        excluded = removed_by_filter(state.context, packet, len(events), surface, limits)
+        excluded = removed_by_filter(state.context, packet, len(events), surface, limits, state.memory)
     state.excluded = None if state.balls else excluded or state.excluded
     pending, state.pending = state.pending, []
     for sighting, circle in found:

@@ -18,7 +18,7 @@ from ..results import Circle, Packet
 from ..stage import Context
 from .filter import STC_MODES
 from .surface import OrdinalSurface, SurfaceParameters, SurfaceResult
-from .track_hough import candidates
+from .track_hough import candidates, empty_votes
 from .track_limits import Limits
 from .track_outline import Sighting, disc_share, sight, sight_arcs
 
@@ -27,7 +27,6 @@ MOST_CANDIDATES, MOST_RIVALS = 4, 2
 # Events of the second route: the latest of a busy scene's. An edge that moves on a pixel in SUPPORT_US (the slowest
 # ball of 20 px radius does) has its neighbour within that time.
 LEAST_EVENTS, MOST_EVENTS, SUPPORT_US = 40, 10_000, 2000
-DRAWING = SurfaceParameters()  # of the surface that they are drawn on
 # The velocity vote and the first fit take in circles that are off by 0.15 radii.
 SAME_SHARE = 0.15
 # Share of the events around a circle that its disc must explain. Marks and shading on the ball draw circles as well, of
@@ -35,6 +34,36 @@ SAME_SHARE = 0.15
 LEAST_SHARE = 0.7
 # The same of an outline that shows only in part, where nothing else may move nearby.
 ISOLATED_SHARE = 0.95
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SearchMemory:
+    """Arrays that each search leaves empty again: new ones cost more than the work in them.
+
+    Attributes
+    ----------
+    last_us : (height + 2, width + 2) uint16
+        Times of each pixel's last event, see `neighbour_support.supported_events`.
+    votes : flat uint16
+        See `track_hough.candidates`.
+    drawing : OrdinalSurface
+        Surface of the second route's events.
+    """
+
+    last_us: NDArray[np.uint16]
+    votes: NDArray[np.uint16]
+    drawing: OrdinalSurface
+
+    @classmethod
+    def of(cls, camera: Camera) -> SearchMemory:
+        """Empty memory for images of this camera."""
+        width_px, height_px = camera.width_px, camera.height_px
+        return cls(
+            np.zeros((height_px + 2, width_px + 2), np.uint16),
+            empty_votes(width_px, height_px),
+            OrdinalSurface(SurfaceParameters(), width_px, height_px, table=eros.value_table),
+        )
+
 
 Found = list[tuple[Sighting, Circle]]
 # Where balls are looked for: the paper's surface, and the contour events (see `look`).
@@ -48,7 +77,7 @@ def look(
     end_us: int,
     camera: Camera,
     limits: Limits,
-    last_us: NDArray[np.uint16],
+    memory: SearchMemory,
     most: int,
     routes: tuple[Route, ...] = ROUTES,
     expected: tuple[Circle, ...] = (),
@@ -57,13 +86,13 @@ def look(
 
     Trusted ones come first, then the faster ones. The paper's surface is searched first. Where it shows no ball, the
     contour events that a neighbour supports: in low contrast an outline gives one event a pixel, of which STC lets
-    nothing pass. For that, last_us is of `support_times` and used again and again.
+    nothing pass.
 
     Outlines are also looked for at `expected` circles, where those seen before must be now: in low contrast the Hough
     transform finds one in every second tick.
     """
     stated = limits.radius_min_px, limits.radius_max_px
-    searching = _Searching(end_us, camera, limits, most, expected)
+    searching = _Searching(end_us, camera, limits, most, expected, memory.votes)
     first: Circle | None = None
     found: Found = []
     excluded: str | None = None
@@ -71,11 +100,12 @@ def look(
         first, found, excluded = searching.circles(surface, events, stated, signed=True)
     if found or "contour" not in routes or len(events) < LEAST_EVENTS:
         return first, found, excluded
-    supported = supported_events(events, last_us)
+    supported = supported_events(events, memory.last_us)
     if len(supported) < LEAST_EVENTS:
         return first, found, excluded
-    drawing = OrdinalSurface(DRAWING, camera.width_px, camera.height_px, table=eros.value_table)
-    drawn = SurfaceResult(drawing.drawn(supported), surface.cleaning)
+    levels, table = memory.drawing.drawn(supported)
+    memory.drawing.clear()
+    drawn = SurfaceResult(levels, surface.cleaning, table)
     second, found, excluded_there = searching.circles(drawn, supported, stated, signed=False)
     excluded = excluded or excluded_there
     if not found and excluded is None and stated != limits.possible_px:
@@ -85,7 +115,7 @@ def look(
 
 
 def removed_by_filter(
-    context: Context, packet: Packet, passed: int, surface: SurfaceResult, limits: Limits
+    context: Context, packet: Packet, passed: int, surface: SurfaceResult, limits: Limits, memory: SearchMemory
 ) -> str | None:
     """The setting of the outline's filter that removes a ball's outline from the packet, in words; None if none does.
 
@@ -100,9 +130,7 @@ def removed_by_filter(
     mode, camera = context["filter.contour_mode"], context.camera
     if mode not in STC_MODES or len(packet.events) <= passed:
         return None
-    _, found, _ = look(
-        surface, packet.events, packet.end_us, camera, limits, support_times(camera), MOST_CANDIDATES, ("contour",)
-    )
+    _, found, _ = look(surface, packet.events, packet.end_us, camera, limits, memory, MOST_CANDIDATES, ("contour",))
     radius_px = next((one.ring[4] for one, _ in found if one.trusted or one.explained), None)
     if radius_px is None:
         return None
@@ -121,6 +149,7 @@ class _Searching:
     limits: Limits
     most: int
     expected: tuple[Circle, ...]
+    votes: NDArray[np.uint16]
 
     def circles(
         self, surface: SurfaceResult, events: EventBatch, radii_px: tuple[float, float], *, signed: bool
@@ -129,7 +158,7 @@ class _Searching:
         tried: list[Circle] = []
         found: Found = []
         excluded: str | None = None
-        by_hough = candidates(surface, events, *radii_px, self.most)
+        by_hough = candidates(surface, events, *radii_px, self.most, self.votes)
         first = next(by_hough, None)
         for circle in chain([] if first is None else [first], by_hough, self.expected):
             if any(np.hypot(circle.x_px - s.ring[0], circle.y_px - s.ring[1]) < s.ring[4] for s, _ in found):
@@ -172,11 +201,6 @@ def _is_same(one: Circle, other: Circle) -> bool:
     error_px = SAME_SHARE * one.radius_px
     apart_px = np.hypot(one.x_px - other.x_px, one.y_px - other.y_px)
     return bool(apart_px < error_px and abs(one.radius_px - other.radius_px) < error_px)
-
-
-def support_times(camera: Camera) -> NDArray[np.uint16]:
-    """Empty times of each pixel's last event, see `neighbour_support.supported_events`."""
-    return np.zeros((camera.height_px + 2, camera.width_px + 2), np.uint16)
 
 
 def supported_events(events: EventBatch, last_us: NDArray[np.uint16]) -> EventBatch:

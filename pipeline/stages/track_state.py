@@ -17,6 +17,7 @@ from .track_outline import Sighting
 from .track_parameters import TrackParameters
 from .track_path import PathPoint
 from .track_result import BallTrack
+from .track_search import SearchMemory
 
 # States at the ends of ticks before the one in which a shot is announced, by shot.
 Earlier = dict[int, tuple[BallTrack, ...]]
@@ -29,7 +30,7 @@ class TrackState:
     context: Context
     limits: Limits
     measuring: Measuring
-    last_us: NDArray[np.uint16]
+    memory: SearchMemory
     contour: EventBatch = field(default_factory=EventBatch.empty)
     past: Past = field(default_factory=Past)
     balls: list[TrackedBall] = field(default_factory=list)

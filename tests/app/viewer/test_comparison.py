@@ -78,7 +78,7 @@ def test_equal_runs_differ_nowhere(flight: ViewedRun, tmp_path: Path) -> None:
 
 def test_what_one_surface_lacks_has_the_others_colour(flight: ViewedRun, tmp_path: Path) -> None:
     def dark(tick: Tick) -> Tick:
-        return with_results(tick, surface=dataclasses.replace(tick.surface, values=np.zeros_like(tick.surface.values)))
+        return with_results(tick, surface=dataclasses.replace(tick.surface, levels=np.zeros_like(tick.surface.levels)))
 
     darkened = dataclasses.replace(flight, ticks=[dark(tick) for tick in flight.ticks])
     for a, b, colour in ((flight, darkened, OFF), (darkened, flight, ON)):

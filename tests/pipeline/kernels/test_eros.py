@@ -30,7 +30,7 @@ class Fast:
 
     def read(self) -> NDArray[np.uint8]:
         values = np.zeros((self.height_px, self.width_px), np.uint8)
-        eros.render(values, self.levels, self.table)
+        eros.render(values, eros.image_levels(self.levels, self.width_px, self.height_px).copy(), self.table)
         return values
 
 

@@ -87,6 +87,28 @@ def test_active_cells_equal_the_twin(height: int, width: int, cell: int, events:
     assert list(zip(columns, rows, strict=True)) == reference.active_cells(values, x, y, 100, cell)
 
 
+@given(
+    pixels=st.lists(st.tuples(st.integers(0, 25), st.integers(0, 15)), min_size=1, max_size=60, unique=True),
+    radius0=st.integers(1, 4),
+    radii=st.integers(1, 5),
+    most=st.integers(1, 4),
+)
+def test_the_best_circles_are_the_peaks_of_the_vote(
+    pixels: list[tuple[int, int]], radius0: int, radii: int, most: int
+) -> None:
+    """One peak after the other, each with the votes around the last one taken away."""
+    xs, ys = np.array(pixels).T.copy()
+    memory = np.zeros(60 * 50 * 5, np.uint16)
+    supports, circles = hough.best_circles(memory, *read_only(xs, ys), radius0, radii, most, 1.0)
+    assert not memory.any(), "ready for the next vote"
+    votes = reference.vote((40, 50, radii), xs, ys, -10, -10, radius0)
+    for support, (x, y, radius) in zip(supports.tolist(), circles.tolist(), strict=True):
+        assert (support, x + 10, y + 10, radius - radius0) == reference.peak(votes, radius0)
+        near = max(1, radius // 2)
+        votes[max(0, y + 10 - near) : y + 11 + near, max(0, x + 10 - near) : x + 11 + near] = 0
+    assert len(supports) == most or reference.peak(votes, radius0)[0] < 1.0
+
+
 @given(seed=st.integers(0, 2**32 - 1))
 def test_the_best_circle_is_the_peak_of_the_vote(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -88,13 +88,14 @@ def test_the_other_kinds_look_back_across_ticks(kind: str, span_us: int) -> None
 def test_results_are_fresh_and_read_only(kind: str) -> None:
     results = run(SurfaceParameters(kind=kind))
     for one, other in itertools.combinations(results, 2):
-        assert not np.shares_memory(one.values, other.values)
+        assert not np.shares_memory(one.levels, other.levels)
     for result in results:
         assert result.values.dtype == np.uint8
         assert result.values.shape == (HEIGHT, WIDTH)
-        assert not result.values.flags.writeable
+        assert not result.values.flags.writeable and not result.levels.flags.writeable
+        assert result.level_of(128) == np.flatnonzero(result.table >= 128)[0]
         window = result.cleaned(0, 0, WIDTH, HEIGHT)
-        assert not np.shares_memory(window, result.values)
+        assert not np.shares_memory(window, result.levels)
 
 
 @pytest.mark.parametrize("cleaning", ["off", "isolated", "printed"])

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from spinscope.pipeline.kernels import hough
 from spinscope.pipeline.recordings.opening import open_recording
 from spinscope.pipeline.stages.surface import SurfaceResult
-from spinscope.pipeline.stages.track_hough import candidates, hough_near
+from spinscope.pipeline.stages.track_hough import candidates, empty_votes, hough_near
 from tests.track_runs import inputs, run, sample, setting, true_ball
 
 FRAMES = "tt_ball_frames_64x64_1ms.npz"
@@ -73,7 +73,7 @@ def test_the_surface_shows_the_ball_to_two_pixels() -> None:
     packet, filtered, surface = inputs(events.between(40_000, 80_000))[-1]
     x, y, radius = true_ball(truth, np.array([packet.end_us]))[0]
     near = hough_near(surface, x + 3, y - 3, radius - 2, radius + 2)
-    anywhere = next(candidates(surface, filtered.contour_events, 5.0, 40.0, 1))
+    anywhere = next(candidates(surface, filtered.contour_events, 5.0, 40.0, 1, empty_votes(1280, 720)))
     for circle in (near, anywhere):
         assert circle is not None
         assert math.hypot(circle.x_px - x, circle.y_px - y) < 2
@@ -86,7 +86,7 @@ def test_an_empty_surface_shows_nothing() -> None:
     events = sample("flight_back")[0].between(40_000, 45_000)
     assert hough_near(surface, 600.0, 300.0, 10.0, 20.0) is None
     assert hough_near(surface, -200.0, 300.0, 10.0, 20.0) is None
-    assert list(candidates(surface, events, 5.0, 40.0, 4)) == []
+    assert list(candidates(surface, events, 5.0, 40.0, 4, empty_votes(1280, 720))) == []
 
 
 def test_real_balls_are_found_in_single_frames() -> None:

@@ -9,7 +9,7 @@ from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.stages import track_search
 from spinscope.pipeline.stages.track_background import background_moves
 from spinscope.pipeline.stages.track_parameters import TrackParameters
-from spinscope.pipeline.stages.track_search import support_times
+from spinscope.pipeline.stages.track_search import SearchMemory
 from tests.track_runs import PAPER_CONTEXT, disc_events, inputs, merged, run, setting
 
 PLACE = setting(focal_length_mm=500.0)
@@ -61,7 +61,7 @@ def test_edges_in_most_of_the_image_are_a_moving_background() -> None:
     t_us = np.repeat([0, 1000], columns.size)
     x[t_us > 0] += 1
     edges = EventBatch(t_us, x, y, np.ones(x.size, np.bool_))
-    last_us = support_times(camera)
+    last_us = SearchMemory.of(camera).last_us
     assert background_moves(edges, last_us, camera)
     assert not background_moves(edges[edges.x_px < camera.width_px // 2], last_us, camera)
     alone = EventBatch(edges.t_us, edges.x_px // 2 * 2, edges.y_px, edges.on)  # no event of a neighbouring pixel
