@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
@@ -66,7 +67,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Let this worker wait for what another one is compiling."""
+    """Let workers and child processes share byte code, and workers wait for what another one is compiling."""
+    if sys.dont_write_bytecode and (cache := getattr(config, "cache", None)):
+        _share_bytecode(cache.mkdir("bytecode"))
     if hasattr(config, "workerinput") and fcntl is not None:
         _compile_once(Path(tempfile.gettempdir()) / f"spinscope-{config.workerinput['testrunuid']}")
 
@@ -76,6 +79,13 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
     left_out = terminalreporter.stats.get("deselected", ())
     if terminalreporter.config.option.markexpr == "not slow" and any("slow" in item.keywords for item in left_out):
         terminalreporter.write_line("tests marked slow were left out: uv run pytest -m slow")
+
+
+def _share_bytecode(folder: Path) -> None:
+    """Keep byte code in pytest's cache where none is wanted beside the sources; without it, an import takes 2 s."""
+    sys.dont_write_bytecode, sys.pycache_prefix = False, str(folder)
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    os.environ["PYTHONPYCACHEPREFIX"] = str(folder)
 
 
 def _compile_once(folder: Path) -> None:
