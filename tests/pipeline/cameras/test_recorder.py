@@ -71,6 +71,13 @@ def test_a_file_that_exists_is_kept(tmp_path: Path) -> None:
     assert (tmp_path / "a.raw").read_text() == "mine"
 
 
+def test_a_file_opens_from_the_moment_it_is_there(tmp_path: Path) -> None:
+    writing = raw_file(tmp_path / "a.raw", 640, 480, {})
+    assert open_recording(tmp_path / "a.raw").width_px == 640
+    writing.close()
+    assert [path.name for path in tmp_path.iterdir()] == ["a.raw"]
+
+
 def test_a_full_disk_is_said_and_ends_the_recording_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     notices: list[str] = []
     writing = recorder(tmp_path / "a.raw", on_notice=notices.append)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from contextlib import closing
+from errno import EEXIST
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from ....compilation import njit
 from ....errors import RecordingError
 from ....events import EventBatch
+from ....files import atomic_file
 from ...reader import Triggers
 from ..registry import RecordingContent
 from . import evt2, evt3
@@ -38,7 +40,7 @@ class Encoded(NamedTuple):
 
 
 class RawWriter:
-    """A new RAW file that is written as events come; cut off at any word it is read up to there.
+    """A new RAW file that is written as events come; it opens at any time, and cut off anywhere it is read up to there.
 
     Parameters
     ----------
@@ -56,9 +58,9 @@ class RawWriter:
     Raises
     ------
     RecordingError
-        For pixels above 2047.
-    OSError
-        The file exists or cannot be written.
+        For pixels above 2047, and where the file cannot be written.
+    FileExistsError
+        It exists.
     """
 
     def __init__(
@@ -77,7 +79,8 @@ class RawWriter:
             )
         self._named, self._state = named, np.full(3, -1, np.int64)
         self._encoding, self._words = encoding, ENCODINGS[encoding]
-        self._file = open(path, "xb")  # noqa: SIM115  until close
+        if path.exists():
+            raise FileExistsError(EEXIST, os.strerror(EEXIST), str(path))
         lines = {
             **attributes,
             "evt": self._words.version,
@@ -85,7 +88,9 @@ class RawWriter:
             "geometry": f"{width_px}x{height_px}",
         }
         text = "".join(f"% {key} {' '.join(str(value).split())}\n" for key, value in lines.items())
-        self._file.write((text + "% end\n").encode())
+        with atomic_file(path, "recording") as part:  # a file without its header would not open
+            part.write_bytes((text + "% end\n").encode())
+        self._file = open(path, "ab")  # noqa: SIM115  until close
         self._encode(EventBatch.empty(), Triggers.empty(), 0)  # has the kernel loaded before events come
 
     def write(self, events: EventBatch, triggers: Triggers | None = None) -> None:
