@@ -24,7 +24,7 @@ from spinscope.pipeline.tick import Tick
 
 from ..tuning.bias_sweep import BiasRange, BiasState, BiasSweep
 from ..viewer import entities
-from ..web.live_schemas import LiveSecond, LiveShotRow, LiveView
+from ..web.live_schemas import LiveRecording, LiveSecond, LiveShotRow, LiveView
 from .camera_sweep import CameraSweep, proposal_words, swept_biases
 from .camera_thread import CameraObserver
 from .event_rates import EventRateMeter
@@ -153,7 +153,10 @@ class CameraView(CameraObserver):
 
     def view(self) -> LiveView:
         """The last two minutes."""
-        camera, span = self.opened.camera, self.opened.recent.span_us
+        camera, span, recorded = self.opened.camera, self.opened.recent.span_us, self.opened.recording.present
+        recording = None
+        if recorded is not None:
+            recording = LiveRecording(file=str(recorded.files[-1]), events=recorded.events, markers=recorded.markers)
         with self._lock:
             return LiveView(
                 camera=f"{camera.name} {camera.serial}",
@@ -162,6 +165,7 @@ class CameraView(CameraObserver):
                 seconds=list(self._seconds),
                 shots=list(self._shots.values())[::-1],
                 notices=list(self._notices),
+                recording=recording,
             )
 
     def picture(self) -> bytes:
@@ -199,6 +203,19 @@ class CameraView(CameraObserver):
                 with suppress(OSError):  # still open, where that keeps a file
                     file.unlink()
         return path
+
+    def set_recording(self, is_on: bool) -> None:
+        """Begin a recording of the camera named by date and time, or end the one under way."""
+        if not is_on:
+            self.opened.recording.end()
+        elif self._is_running:
+            self.opened.recording.begin()
+        else:
+            raise RecordingError("the camera has ended: there is nothing to record")
+
+    def mark(self, text: str, seconds_ago: float) -> None:
+        """Note a text beside the recording."""
+        self.opened.recording.mark(text, seconds_ago)
 
     def take_parameters(self, parameters: Parameters) -> None:
         """Go on with other parameters, from the next tick on."""

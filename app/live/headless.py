@@ -23,7 +23,7 @@ from ..tuning.bias_sweep import BiasSweep
 from .camera_sweep import MEASURED_S, CameraSweep, proposal_words, proposed_value
 from .json_lines import JsonLines, JsonServer
 from .opening import CameraChoice, open_live
-from .recording import RecordChoice, recorder, take_markers
+from .recording import CameraRecording, RecordChoice, take_markers
 from .shot_table import ShotTable
 from .sweep_figure import write_sweep_figure
 
@@ -85,12 +85,15 @@ class OpenLive:
         Camera, parameters and run.
     recent : RecentEvents
         Its last events.
+    recording : CameraRecording
+        Its recording, which can begin and end.
     """
 
     camera: EventCamera
     session: Session
     run: LiveRun
     recent: RecentEvents
+    recording: CameraRecording
 
 
 class LiveObserver(Protocol):
@@ -133,16 +136,19 @@ def run_headless(
             note(f"lines of JSON at 127.0.0.1 port {server.port}")
         recent = RecentEvents() if observer is None else RecentEvents(observer.kept_us)
 
-        def stream(tick_us: int, on_notice: Callable[[str], None]) -> EventStream:
-            sinks: list[Sink] = [] if table is None else [recent]
-            if to.record is not None:
-                recording = recorder(to.record, camera, session, on_notice)
-                at_end.callback(recording.close)
-                take_markers(recording)
-                sinks.append(recording)
-            return EventStream(camera, tick_us, reopen=reopen, sinks=tuple(sinks), on_notice=on_notice)
-
+        recording: CameraRecording
         sweep: CameraSweep | None = None
+
+        def stream(tick_us: int, on_notice: Callable[[str], None]) -> EventStream:
+            nonlocal recording
+            folder = Path.cwd() if to.record is None else to.record.path.parent
+            recording = CameraRecording(camera, session, folder, on_notice)
+            at_end.callback(recording.end)
+            if to.record is not None:
+                recording.begin(to.record)
+                take_markers(recording)
+            sinks: list[Sink] = [recording] if table is None else [recent, recording]
+            return EventStream(camera, tick_us, reopen=reopen, sinks=tuple(sinks), on_notice=on_notice)
 
         def on_tick(arrived: ArrivedTick, tick: Tick, latency_ms: float) -> None:
             if sweep is not None:
@@ -162,7 +168,7 @@ def run_headless(
             )
         note(f"live: {camera.name} {camera.serial}, {camera.width_px} x {camera.height_px} px; Ctrl-C ends it")
         if observer is not None:
-            observer.begin(OpenLive(camera, session, run, recent))
+            observer.begin(OpenLive(camera, session, run, recent, recording))
         if table is not None:
             at_end.callback(table.close)
         with ends_on_signals(run.stop) if observer is None else nullcontext():

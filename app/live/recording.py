@@ -1,4 +1,4 @@
-"""Recording of a live run: the camera's events, with its settings beside them and markers that people type."""
+"""Recording of a live run: the camera's events, with its settings beside them and markers of people."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import sys
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,8 @@ import tomli_w
 
 from spinscope.pipeline.biases import BiasParameters
 from spinscope.pipeline.cameras import EventCamera, Recorder
-from spinscope.pipeline.errors import ParameterError, SpinscopeError
+from spinscope.pipeline.errors import ParameterError, RecordingError, SpinscopeError
+from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.live import raw_file
 from spinscope.pipeline.registry import Parameters
 from spinscope.pipeline.session import Session
@@ -60,6 +62,63 @@ def recorder(chosen: RecordChoice, camera: EventCamera, session: Session, on_not
     )
 
 
+class CameraRecording:
+    """Recording that begins and ends while the camera runs: a sink of its `EventStream`.
+
+    Parameters
+    ----------
+    camera, session
+        Camera, and session with the parameters to be kept beside the recording.
+    folder : Path
+        Where recordings go that nobody named.
+    on_notice : callable
+        Told in words why a recording ended early.
+    """
+
+    def __init__(self, camera: EventCamera, session: Session, folder: Path, on_notice: Callable[[str], None]) -> None:
+        self._camera, self._session, self._folder, self._on_notice = camera, session, folder, on_notice
+        self._recorder: Recorder | None = None
+        self._lock = threading.Lock()  # of beginnings and ends
+
+    def __call__(self, clock: int, events: EventBatch) -> None:
+        """Take events; called by the camera's thread."""
+        if (present := self._recorder) is not None:
+            present(clock, events)
+
+    @property
+    def present(self) -> Recorder | None:
+        """The recording under way; None where there is none."""
+        present = self._recorder
+        return present if present is not None and present.is_running else None
+
+    def begin(self, chosen: RecordChoice | None = None) -> None:
+        """Begin a recording, by default one named by date and time; raises SpinscopeError."""
+        with self._lock:
+            if (present := self.present) is not None:
+                raise RecordingError(f"the camera is recorded already: end that recording first: {present.path}")
+            self._close()
+            if chosen is None:
+                chosen = RecordChoice(self._folder / f"live_{datetime.now():%Y-%m-%d_%H-%M-%S}.raw")
+            self._recorder = recorder(chosen, self._camera, self._session, self._on_notice)
+
+    def end(self) -> None:
+        """Finish the recording, if there is one."""
+        with self._lock:
+            self._close()
+
+    def mark(self, text: str, seconds_ago: float = 0.0) -> None:
+        """Note a text beside the recording, see `Recorder.mark`; raises RecordingError."""
+        present = self.present
+        if present is None:
+            raise RecordingError("nothing is recorded, markers are kept beside a recording: begin one first")
+        present.mark(text, seconds_ago)
+
+    def _close(self) -> None:
+        ended, self._recorder = self._recorder, None
+        if ended is not None:
+            ended.close()
+
+
 def sidecar_tables(parameters: Parameters) -> dict[str, dict[str, Any]]:
     """Camera and ball as the file beside a recording states them."""
     return {"camera": parameters.camera.as_dict(), "ball": parameters.ball.as_dict()}
@@ -71,7 +130,7 @@ def toml_text(tables: dict[str, dict[str, Any]]) -> str:
     return tomli_w.dumps(stated)
 
 
-def take_markers(recording: Recorder) -> None:
+def take_markers(recording: CameraRecording) -> None:
     """Note every line that somebody types at the terminal beside the recording."""
     if not sys.stdin.isatty():
         return

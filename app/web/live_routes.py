@@ -1,11 +1,19 @@
-"""Routes of a running camera: its state, its picture, its last seconds as a recording, and parameters from now on."""
+"""Routes of a running camera: its state and picture, its recording, and parameters from now on."""
 
 from __future__ import annotations
 
 from fastapi import FastAPI, HTTPException, Response
 from starlette.concurrency import run_in_threadpool
 
-from .live_schemas import LiveParametersRequest, LiveSource, LiveView, LiveWindow, LiveWindowRequest
+from .live_schemas import (
+    LiveMarkerRequest,
+    LiveParametersRequest,
+    LiveRecordingRequest,
+    LiveSource,
+    LiveView,
+    LiveWindow,
+    LiveWindowRequest,
+)
 from .schemas import Done
 
 
@@ -30,6 +38,16 @@ def add_live_routes(app: FastAPI, live: LiveSource | None) -> None:
     async def window(request: LiveWindowRequest) -> LiveWindow:
         path = await run_in_threadpool(running().save_window, request.seconds)
         return LiveWindow(recording=path.name)
+
+    @app.post("/api/live/recording")
+    async def recording(request: LiveRecordingRequest) -> LiveView:
+        await run_in_threadpool(running().set_recording, request.is_on)
+        return running().view()
+
+    @app.post("/api/live/marker")
+    async def marker(request: LiveMarkerRequest) -> LiveView:
+        await run_in_threadpool(running().mark, request.text, request.seconds_ago)
+        return running().view()
 
     @app.post("/api/live/parameters")
     async def parameters(request: LiveParametersRequest) -> Done:

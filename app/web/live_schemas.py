@@ -75,6 +75,27 @@ class LiveShotRow(Response):
     recording: str | None
 
 
+class LiveRecording(Response):
+    """Recording of the camera under way: its present file, and numbers of events and markers."""
+
+    file: str
+    events: int
+    markers: int
+
+
+class LiveRecordingRequest(Request):
+    """Begin a recording of the camera, or end the one under way."""
+
+    is_on: bool
+
+
+class LiveMarkerRequest(Request):
+    """Note a text beside the recording, at the time of so many seconds ago."""
+
+    text: str = Field(max_length=500)
+    seconds_ago: float = Field(ge=0.0, le=3600.0, allow_inf_nan=False)
+
+
 class LiveView(Response):
     """Running camera as the page shows it."""
 
@@ -84,6 +105,7 @@ class LiveView(Response):
     seconds: list[LiveSecond]
     shots: list[LiveShotRow]
     notices: list[str]
+    recording: LiveRecording | None
 
 
 class LiveSource(Protocol):
@@ -97,6 +119,12 @@ class LiveSource(Protocol):
 
     def save_window(self, seconds: float) -> Path:
         """Save the last seconds as a recording; raises SpinscopeError."""
+
+    def set_recording(self, is_on: bool) -> None:
+        """Begin a recording, or end the one under way; raises SpinscopeError."""
+
+    def mark(self, text: str, seconds_ago: float) -> None:
+        """Note a text beside the recording; raises RecordingError."""
 
     def take_parameters(self, parameters: Parameters) -> None:
         """Go on with other parameters; raises ParameterError."""

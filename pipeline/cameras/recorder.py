@@ -6,7 +6,7 @@ import json
 import queue
 import threading
 from collections.abc import Callable, Mapping
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Protocol
 
@@ -54,6 +54,13 @@ class Recorder:
     on_notice : callable
         Told in words why the recording ended early, as when the disk is full; live goes on.
 
+    Attributes
+    ----------
+    files : list of Path
+        Files so far.
+    events, markers : int
+        Numbers of events and markers that were written.
+
     Raises
     ------
     RecordingError
@@ -70,19 +77,24 @@ class Recorder:
         most_us: int | None = None,
         on_notice: Callable[[str], None] = lambda text: None,
     ) -> None:
-        self.path, self.files = path, list[Path]()
+        self.path, self.files, self.events, self.markers = path, list[Path](), 0, 0
         self._open_file, self._beside, self._on_notice = open_file, dict(beside or {}), on_notice
         self._most_bytes, self._most_us = most_bytes, most_us
         self._coming: queue.SimpleQueue[tuple[int, EventBatch] | None] = queue.SimpleQueue()
         self._waiting_events = 0
-        self._clock, self._start_us, self._last_us = 0, None, 0
+        self._clock: int | None = None  # of the present file, as soon as it has events
+        self._start_us: int | None = None
+        self._last_us = 0
         self._has_failed = False
         self._file: EventFile | None
         self._file = self._next_file()
         self._thread = threading.Thread(target=self._write_all, name="recorder", daemon=True)
         self._thread.start()
 
-    _start_us: int | None
+    @property
+    def is_running(self) -> bool:
+        """Whether it goes on, as long as it is not closed."""
+        return not self._has_failed
 
     def __call__(self, clock: int, events: EventBatch) -> None:
         """Take events; called by the camera's thread."""
@@ -90,15 +102,21 @@ class Recorder:
             self._waiting_events += len(events)
             self._coming.put((clock, events))
 
-    def mark(self, text: str) -> None:
-        """Note a text beside the recording with the date, the file and its time so far; raises RecordingError."""
-        line = {"date": datetime.now(UTC).isoformat(), "file": self.files[-1].name, "t_us": self._last_us, "text": text}
+    def mark(self, text: str, seconds_ago: float = 0.0) -> None:
+        """Note a text beside the recording with the date, the file and its time so far; raises RecordingError.
+
+        Both are those of so many seconds ago, but not before the file's first event.
+        """
+        t_us = max(self._last_us - round(seconds_ago * 1e6), self._start_us or 0)
+        date = datetime.now(UTC) - timedelta(seconds=seconds_ago)
+        line = {"date": date.isoformat(), "file": self.files[-1].name, "t_us": t_us, "text": text}
         markers = self.path.with_suffix(".markers.jsonl")
         try:
             with open(markers, "a", encoding="utf-8") as file:
                 file.write(json.dumps(line) + "\n")
         except OSError as error:
             raise RecordingError(f"the marker cannot be written ({error.strerror}): {markers}") from error
+        self.markers += 1
 
     def close(self) -> None:
         """Write what waits and finish the file."""
@@ -133,13 +151,14 @@ class Recorder:
         start_us = self._last_us if self._start_us is None else self._start_us
         is_full = self._most_bytes is not None and self._file.size_bytes >= self._most_bytes
         is_full = is_full or (self._most_us is not None and int(events.t_us[-1]) - start_us > self._most_us)
-        if clock != self._clock or (is_full and self._start_us is not None):
+        if self._start_us is not None and (clock != self._clock or is_full):
             self._file.close()
-            self._file, self._clock, self._start_us = self._next_file(), clock, None
+            self._file, self._start_us = self._next_file(), None
         if self._start_us is None:
-            self._start_us = int(events.t_us[0])
+            self._clock, self._start_us = clock, int(events.t_us[0])
         self._file.write(events)
         self._last_us = int(events.t_us[-1])
+        self.events += len(events)
 
     def _next_file(self) -> EventFile:
         number = len(self.files) + 1

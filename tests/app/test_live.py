@@ -23,6 +23,7 @@ from spinscope.app.live import camera_view, headless, page
 from spinscope.app.live.camera_view import WINDOWS_KEPT, CameraView
 from spinscope.app.live.headless import OpenLive
 from spinscope.app.live.json_lines import JsonServer
+from spinscope.app.live.recording import CameraRecording
 from spinscope.app.live.shot_table import ShotTable
 from spinscope.pipeline.cameras import RecentEvents
 from spinscope.pipeline.errors import CameraError, RecordingError
@@ -156,15 +157,41 @@ def _check_view(live: CameraView, bounce: Session) -> None:
         live.set_biases({"fo": 1000})
     live.set_biases({"fo": 10})
     assert live.bias_state().values["fo"] == 10 and live.bias_state().of_camera
+    with pytest.raises(RecordingError, match="the camera has ended"):
+        live.set_recording(True)
     other = bounce.parameters.with_assignments(["logo.pad_px=6"])
     live.take_parameters(other)
     assert live.opened.run.parameters is other and live.opened.session.parameters is other
 
 
+def test_a_recording_begins_and_ends_while_the_camera_runs(bounce: Session, tmp_path: Path) -> None:
+    """With another clock than the first, and markers of the moment in which they were thought of."""
+    camera: Any = SimpleNamespace(width_px=1280, height_px=720, name="stand-in", serial="7", biases={})
+    recording, events = CameraRecording(camera, bounce, tmp_path, print), bounce.source.between(0, 10**9)
+    with pytest.raises(RecordingError, match="nothing is recorded"):
+        recording.mark("too early")
+    recording(0, events)
+    recording.begin()
+    with pytest.raises(RecordingError, match="is recorded already"):
+        recording.begin()
+    recording(1, events)
+    present = recording.present
+    assert present is not None
+    while present.events < len(events):
+        time.sleep(0.001)
+    recording.mark("serve", seconds_ago=0.05)
+    recording.end()
+    recording(1, events)
+    (path,) = tmp_path.glob("live_*.raw")
+    assert open_recording(path).read().t_us.tolist() == events.t_us.tolist() and recording.present is None
+    (line,) = map(json.loads, path.with_suffix(".markers.jsonl").read_text().splitlines())
+    assert (line["text"], line["t_us"], present.markers) == ("serve", int(events.t_us[-1]) - 50_000, 1)
+
+
 def test_old_recordings_of_the_last_seconds_are_removed(tmp_path: Path) -> None:
     recent, live = RecentEvents(), CameraView(tmp_path, 30.0)
     opened: Any = SimpleNamespace(width_px=4, height_px=4, biases={}, parameters=Parameters())
-    live.begin(OpenLive(opened, opened, opened, recent))
+    live.begin(OpenLive(opened, opened, opened, recent, opened))
     with pytest.raises(RecordingError, match="no event"):
         live.save_window(1.0)
     for number in range(WINDOWS_KEPT + 2):

@@ -1,6 +1,6 @@
 // A running camera beside the recordings that come from it: picture, state, plots against time, its last seconds.
 
-/** @import { LiveSecond, LiveShotRow, LiveView } from "./messages.d.ts" */
+/** @import { LiveRecording, LiveSecond, LiveShotRow, LiveView } from "./messages.d.ts" */
 
 import { attempt, drawing, element, milliseconds, notice, number, pause } from "./elements.js";
 import { linkOf } from "./link.js";
@@ -51,6 +51,9 @@ const PLOTS = [
 
 export class Live {
   isPaused = false;
+  /** @type {LiveRecording | null} */
+  recording = null;
+  marked_ms = 0;
   /** @type {string[]} */
   #told = [];
 
@@ -76,6 +79,22 @@ export class Live {
       onclick: () => attempt(() => this.#apply()),
       title: "The camera's stages go on with the sliders as they are; a shot in flight ends there",
     };
+    this.record = element("button", { onclick: () => this.toggleRecording() });
+    this.marker = element("input", {
+      type: "text",
+      maxLength: 500,
+      placeholder: "Text of a marker",
+      "aria-label": "Text of a marker",
+      title: "Enter notes it beside the recording, with the time at which you began to type or pressed m",
+      oninput: () => this.marked_ms ||= performance.now(),
+    });
+    const note = element("button", { title: "Note the time, and the text if there is one" }, "Mark");
+    this.markers = element("form.row", {}, this.marker, note);
+    this.markers.addEventListener("submit", (/** @type {Event} */ event) => {
+      event.preventDefault();
+      attempt(() => this.#mark());
+    });
+    this.recorded = element("p.note", { role: "status" });
     this.state = element("p.note", { role: "status" });
     this.shots = element("div.shots", { "aria-label": "Shots so far" });
     this.plots = element("div");
@@ -83,11 +102,15 @@ export class Live {
       this.image,
       element("div.row", {}, this.hold, this.seconds, element("button.primary", look, "Look at them")),
       element("div.row", {}, element("button", apply, "Use the sliders from now on")),
+      element("div.row", {}, this.record),
+      this.markers,
+      this.recorded,
       this.state,
       this.shots,
       this.plots,
     );
     this.#name();
+    this.#showRecording(null);
     this.#showPictures();
     this.#showViews();
   }
@@ -119,6 +142,39 @@ export class Live {
     notice("The camera's stages go on with these settings.", "info", 3);
   }
 
+  toggleRecording() {
+    return attempt(async () => {
+      const { recording } = await post("/api/live/recording", { is_on: this.recording === null });
+      const before = this.recording;
+      this.#showRecording(recording);
+      if (before && !recording) notice(`Recorded: ${words(before)}`, "info", 12);
+    });
+  }
+
+  // The time is now, whatever is typed afterwards.
+  beginMarker() {
+    if (!this.recording) return notice("Nothing is recorded: begin a recording first.", "warning");
+    this.marked_ms = performance.now();
+    this.marker.focus();
+  }
+
+  async #mark() {
+    const seconds_ago = this.marked_ms ? Math.min((performance.now() - this.marked_ms) / 1000, 3600) : 0;
+    const { recording } = await post("/api/live/marker", { text: this.marker.value.trim(), seconds_ago });
+    this.marked_ms = 0;
+    this.marker.value = "";
+    this.marker.blur();
+    this.#showRecording(recording);
+  }
+
+  #showRecording(/** @type {LiveRecording | null} */ recording) {
+    this.recording = recording;
+    this.record.textContent = recording ? "End the recording" : "Record";
+    this.record.title = recording ? "The camera runs on" : "Write all events from now on to a file (RAW)";
+    this.markers.hidden = !recording;
+    this.recorded.textContent = recording ? `recording ${words(recording)}` : "";
+  }
+
   async #showPictures() {
     for (;;) {
       if (!this.isPaused && !document.hidden) {
@@ -141,7 +197,7 @@ export class Live {
     }
   }
 
-  #show(/** @type {LiveView} */ { camera, is_running, kept_s, seconds, shots, notices }) {
+  #show(/** @type {LiveView} */ { camera, is_running, kept_s, seconds, shots, notices, recording }) {
     const now = seconds.at(-1);
     const parts = [is_running ? camera : `${camera} has ended`];
     if (now) {
@@ -157,6 +213,7 @@ export class Live {
     this.state.textContent = parts.join(" · ");
     for (const text of notices) if (!this.#told.includes(text)) notice(text, "warning", 12);
     this.#told = notices;
+    this.#showRecording(recording);
     if (this.isPaused) return;
     this.shots.replaceChildren(...shots.map((shot) => this.#row(shot)));
     this.plots.replaceChildren(...PLOTS.map((plot) => drawn(plot, seconds)));
@@ -168,6 +225,9 @@ export class Live {
     return element(`button.shot${is_final ? ".final" : ""}`, { onclick: open, disabled: !recording, title }, text);
   }
 }
+
+const words = (/** @type {LiveRecording} */ { file, events, markers }) =>
+  `${file} · ${number(events / 1e6, 3)} Mev${markers ? ` · ${markers} markers` : ""}`;
 
 /**
  * One plot over the seconds that are known, from zero.

@@ -57,14 +57,20 @@ export type Labels = { path: string; version: string; labels: Label[] };
 export type Landings = { landings: Record<string, [number, number]> };
 /** A recording of a folder, or a dropped one; `name` opens it. */
 export type ListedRecording = { name: string; size_bytes: number };
+/** Note a text beside the recording, at the time of so many seconds ago. */
+export type LiveMarkerRequest = { text: string; seconds_ago: number };
 /** Have the running camera's stages go on with these parameters. */
 export type LiveParametersRequest = { parameters: Record<string, Record<string, any>> };
+/** Recording of the camera under way: its present file, and numbers of events and markers. */
+export type LiveRecording = { file: string; events: number; markers: number };
+/** Begin a recording of the camera, or end the one under way. */
+export type LiveRecordingRequest = { is_on: boolean };
 /** State of one second, `t_s` after the start; latencies and rates are None where there is nothing to measure. */
 export type LiveSecond = { t_s: number; rate_mev_s: number; p50_ms: number | null; p99_ms: number | null; announced_ms: number | null; final_ms: number | null; dropped: number; skipped: number; backlog_ms: number; spin_backlog_ms: number; noise_on_hz: number | null; noise_off_hz: number | null; ball_on_hz: number | null; ball_off_hz: number | null };
 /** A shot that has ended, in words; `recording` has its events as soon as its spin is final. */
 export type LiveShotRow = { text: string; is_final: boolean; recording: string | null };
 /** Running camera as the page shows it. */
-export type LiveView = { camera: string; is_running: boolean; kept_s: number; seconds: LiveSecond[]; shots: LiveShotRow[]; notices: string[] };
+export type LiveView = { camera: string; is_running: boolean; kept_s: number; seconds: LiveSecond[]; shots: LiveShotRow[]; notices: string[]; recording: LiveRecording | null };
 /** Recording of the last seconds: its name in the folder. */
 export type LiveWindow = { recording: string };
 /** Save the last seconds as a recording of its own. */
@@ -185,7 +191,9 @@ export interface Posts {
   "/api/biases/read": { sent: TextRequest; answered: BiasValues };
   "/api/biases/write": { sent: BiasRequest; answered: BiasText };
   "/api/drop": { sent: null; answered: Dropped };
+  "/api/live/marker": { sent: LiveMarkerRequest; answered: LiveView };
   "/api/live/parameters": { sent: LiveParametersRequest; answered: Done };
+  "/api/live/recording": { sent: LiveRecordingRequest; answered: LiveView };
   "/api/live/window": { sent: LiveWindowRequest; answered: LiveWindow };
   "/api/sessions": { sent: OpenRequest; answered: Opening };
 }

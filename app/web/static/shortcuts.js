@@ -2,6 +2,7 @@
 
 /** @import { Key } from "./keyboard.js" */
 /** @import { Opening } from "./messages.d.ts" */
+/** @import { Live } from "./live.js" */
 /** @import { Overview } from "./overview.js" */
 /** @import { Settings } from "./settings.js" */
 /** @import { Viewer } from "./viewer.js" */
@@ -9,11 +10,11 @@
 import { byId } from "./elements.js";
 
 /**
- * @param {{viewer: Viewer, overview: Overview, settings: Settings, opening: Opening}} app
+ * @param {{viewer: Viewer, overview: Overview, settings: Settings, opening: Opening, live: Live | undefined}} app
  * @param {boolean} hasTools
  * @returns {Key[]}
  */
-export function shortcuts({ viewer, overview, settings, opening }, hasTools) {
+export function shortcuts({ viewer, overview, settings, opening, live }, hasTools) {
   const moves = true;
   const tick_us = () => settings.get("track.tick_us");
   const seek = (/** @type {number} */ time_us) => {
@@ -53,7 +54,13 @@ export function shortcuts({ viewer, overview, settings, opening }, hasTools) {
     { keys: ["]"], shown: "]", label: "Show or fold the results and tools", act: press("fold-side") },
     { keys: ["/"], shown: "/", label: "Search the settings", act: () => byId("search").focus() },
   ];
-  return [...viewing, ...(hasTools ? tools : [])];
+  const recording = live
+    ? [
+      { keys: ["r"], shown: "r", label: "Record the camera, and end the recording", act: () => live.toggleRecording() },
+      { keys: ["m"], shown: "m", label: "Mark this moment in the recording", act: () => live.beginMarker() },
+    ]
+    : [];
+  return [...viewing, ...(hasTools ? [...tools, ...recording] : [])];
 }
 
 function fullScreen() {

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from spinscope.app.tuning.bias_sweep import BiasRange, BiasState, BiasSweep, BiasSweepPoint, SweptBias
-from spinscope.app.web.live_schemas import LiveSecond, LiveShotRow, LiveView
-from spinscope.pipeline.errors import CameraError
+from spinscope.app.web.live_schemas import LiveRecording, LiveSecond, LiveShotRow, LiveView
+from spinscope.pipeline.errors import CameraError, RecordingError
 from spinscope.pipeline.registry import Parameters
 
 from .browser_tab import Tab, needs_browser
@@ -26,13 +26,20 @@ class StandIn:
 
     def __init__(self, window: Path) -> None:
         self.window, self.asked = window, list[object]()
+        self.recording: LiveRecording | None = None
 
     def view(self) -> LiveView:
         second = dict.fromkeys(LiveSecond.model_fields, 1.0) | {"dropped": 2, "skipped": 0, "final_ms": None}
         shots = [LiveShotRow(text="12.0 rps", is_final=True, recording=self.window.name)]
         seconds = [LiveSecond.model_validate(second | {"t_s": float(t_s)}) for t_s in range(3)]
         return LiveView(
-            camera="stand-in 1", is_running=True, kept_s=3.0, seconds=seconds, shots=shots, notices=["unplugged"]
+            camera="stand-in 1",
+            is_running=True,
+            kept_s=3.0,
+            seconds=seconds,
+            shots=shots,
+            notices=["unplugged"],
+            recording=self.recording,
         )
 
     def picture(self) -> bytes:
@@ -41,6 +48,15 @@ class StandIn:
     def save_window(self, seconds: float) -> Path:
         self.asked.append(seconds)
         return self.window
+
+    def set_recording(self, is_on: bool) -> None:
+        self.recording = LiveRecording(file="today.raw", events=2_500_000, markers=0) if is_on else None
+
+    def mark(self, text: str, seconds_ago: float) -> None:
+        if self.recording is None:
+            raise RecordingError("nothing is recorded")
+        self.recording.markers += 1
+        self.asked.append((text, seconds_ago < 60.0))
 
     def take_parameters(self, parameters: Parameters) -> None:
         self.asked.append(parameters.logo.pad_px)
@@ -77,7 +93,13 @@ def test_state_picture_parameters_and_the_last_seconds(running: tuple[Served, St
         assert http.post("api/live/window", json={"seconds": 0.0}).status_code == 422
         assert http.post("api/live/parameters", json={"parameters": {"logo": {"pad_px": 6.0}}}).status_code == 200
         assert http.post("api/live/parameters", json={"parameters": {"logo": {"pad_px": -6.0}}}).status_code == 400
-    assert live.asked == [2.5, 6.0]
+        marker = {"text": "serve", "seconds_ago": 1.5}
+        assert http.post("api/live/marker", json=marker).json()["error"] == "nothing is recorded"
+        assert http.post("api/live/recording", json={"is_on": True}).json()["recording"]["file"] == "today.raw"
+        assert http.post("api/live/marker", json=marker).json()["recording"]["markers"] == 1
+        assert http.post("api/live/marker", json=marker | {"seconds_ago": -1.0}).status_code == 422
+        assert http.post("api/live/recording", json={"is_on": False}).json()["recording"] is None
+    assert live.asked == [2.5, 6.0, ("serve", True)]
 
 
 def test_biases_act_on_the_camera(running: tuple[Served, StandIn]) -> None:
@@ -118,7 +140,14 @@ def test_the_buttons_of_the_panel(browser: Any, running: tuple[Served, StandIn])
     tab.page.locator("#notices").get_by_text("go on with these settings").wait_for()
     tab.panel("Biases").locator("[data-bias=gain] input[type=range]").press("ArrowUp")
     tab.until("!document.querySelector('[data-bias=gain] input').disabled")
+    tab.page.keyboard.press("r")
+    panel.get_by_text("recording today.raw · 2.5 Mev").wait_for()
+    tab.page.keyboard.press("m")
+    tab.page.keyboard.type("serve\n")
+    panel.get_by_text("1 markers").wait_for()
+    panel.get_by_text("End the recording").click()
+    panel.get_by_text("Record", exact=True).wait_for()
     panel.get_by_text("Look at them").click()
     tab.until(f"location.hash.includes('recording={live.window.name}')")
     tab.page.close()
-    assert live.asked == [Parameters().logo.pad_px, {"gain": 4}, 10.0] and not tab.errors
+    assert live.asked == [Parameters().logo.pad_px, {"gain": 4}, ("serve", True), 10.0] and not tab.errors
