@@ -26,6 +26,7 @@ from spinscope.pipeline.evaluation.rendering import render
 from spinscope.pipeline.evaluation.suites import SUITES, biases, filters, runtime, spinner, thrower
 from spinscope.pipeline.evaluation.suites.biases import picture_of
 from spinscope.pipeline.evaluation.tables import Row, where
+from spinscope.pipeline.evaluation.tasks import run as run_tasks
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.recordings import open_recording, write_recording
 from spinscope.pipeline.registry import Parameters
@@ -57,27 +58,26 @@ def keep(made: SimulatedRecording, path: Path, truth: dict[str, object], **table
 
 
 @pytest.fixture(scope="module")
-def lab(tmp_path_factory: pytest.TempPathFactory) -> Lab:
+def lab(tmp_path_factory: pytest.TempPathFactory, cache: Path) -> Lab:
     """Recordings of the thinned suites, as a lab would have them, and the suites' own rows."""
-    folder, cache = tmp_path_factory.mktemp("lab"), tmp_path_factory.mktemp("cache")
+    folder = tmp_path_factory.mktemp("lab")
     context = TaskContext(cache)
-    own: dict[str, list[Row]] = {"spinner": [], "thrower": []}
-    for number, task in enumerate(spinner.tasks(True)[:2]):
+    spinners, throws = spinner.tasks(True)[:2], thrower.tasks(True)[:2]
+    for number, task in enumerate(spinners):
         ball, kind, rps, seed = (task.arguments[name] for name in ("ball", "kind", "rps", "seed"))
         made = render(context, spinner_scene(ball=ball, kind=kind, magnitude_rps=rps, seed=seed), seed=seed)
         circle = spinner.known_circle(made.truth, seed)
         fixed = {name: circle[f"fixed_{name}"] for name in ("x_px", "y_px", "radius_px")}
         truth = {"spin_rps": made.truth.spin_rps[0].tolist(), "ball": ball, "setting": kind}
         keep(made, folder / f"spinner{number}.raw", truth, fixed_ball=fixed)
-        own["spinner"] += spinner.measure(context, **task.arguments)
-    for number, flight in enumerate(thrower.flights(True)[:2]):
+    for number, task in enumerate(throws):
+        flight = task.arguments
         made, about = thrower.flight_of(context, **flight)
         middle = len(made.truth.t_us) // 2
         setting = f"velocity {flight['velocity']}, spin {flight['spin']}, {'side' if flight['side'] else 'top'}"
         truth = {"spin_rps": made.truth.spin_rps[middle].tolist(), "speed_m_s": about["speed_m_s"], "setting": setting}
         keep(made, folder / f"day2-flight{number}.npz", truth)
-        own["thrower"] += thrower.measure(context, **flight)
-    return folder, own
+    return folder, {"spinner": run_tasks(spinners, context), "thrower": run_tasks(throws, context)}
 
 
 def comparable(rows: list[Row]) -> list[tuple[object, ...]]:

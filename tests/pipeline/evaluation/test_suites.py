@@ -17,12 +17,6 @@ from spinscope.pipeline.evaluation.suites.biases import picture_of
 from spinscope.pipeline.evaluation.tables import Row, where
 
 
-@pytest.fixture(scope="session")
-def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Recordings that several suites share are rendered once."""
-    return tmp_path_factory.mktemp("evaluation")
-
-
 def run(name: str, cache: Path) -> Report:
     report = evaluate(name, TaskContext(cache), quick=True)
     assert report.rows and report.tables

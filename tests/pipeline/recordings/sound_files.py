@@ -40,7 +40,7 @@ def write_evt21(path: Path, events: EventBatch) -> None:
 def write_ecf(path: Path, events: EventBatch) -> None:
     """Prophesee's HDF5 with its own compression."""
     kind = np.dtype([("x", "<u2"), ("y", "<u2"), ("p", "<i2"), ("t", "<i8")])
-    rows = 600
+    rows = 200
     with h5py.File(path, "w") as file:
         plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
         plist.set_chunk((rows,))
