@@ -227,7 +227,7 @@ export class Live {
 }
 
 const words = (/** @type {LiveRecording} */ { file, events, markers }) =>
-  `${file} · ${number(events / 1e6, 3)} Mev${markers ? ` · ${markers} markers` : ""}`;
+  `${file} · ${number(events / 1e6, 3)} Mev${markers ? ` · ${markers} marker${markers > 1 ? "s" : ""}` : ""}`;
 
 /**
  * One plot over the seconds that are known, from zero.
