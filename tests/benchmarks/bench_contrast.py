@@ -36,7 +36,9 @@ def recorded(name: str) -> tuple[list[Tick], Context]:
     """The chain's results up to the spin, where there is a ball."""
     session = Session.open(SAMPLES / f"{name}.h5", Choices(fixed_ball=BALLS.get(name)))
     ticks = [
-        tick for tick in session.ticks(("logo", "normal_flow"), forget=("surface",)) if tick.track.ball is not None
+        tick
+        for tick in session.ticks(("rate", "logo", "normal_flow"), forget=("surface",))
+        if tick.track.ball is not None
     ]
     with_ball = [tick for tick in ticks if tick.track.ball is not None]
     return with_ball, session.chain.context(session.parameters, contrast.STAGE)
@@ -48,7 +50,7 @@ def costs_ms(ticks: list[Tick], context: Context) -> tuple[list[float], list[flo
     state, full, followed = contrast.start(parameters, context), [], []
     for tick in ticks:
         started = time.thread_time()
-        result = contrast.step(parameters, state, tick.packet, tick.track.ball, tick.logo, tick.normal_flow)
+        result = contrast.step(parameters, state, tick.packet, tick.track.ball, tick.rate, tick.logo, tick.normal_flow)
         (full if result.full else followed).append((time.thread_time() - started) * 1e3)
     return full, followed
 

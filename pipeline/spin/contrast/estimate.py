@@ -272,15 +272,23 @@ def _refined(
     """The estimate around a spin, with the ball's offsets; `events` are thinned from those of the stretch."""
     objective = _with_place(events, ball, settings)
     spin, offsets, sharp, model = maximise(objective, spin_rad_s, offsets_px, iterations)
-    covariance = spin_covariance(objective, model, events, ball, settings, stretch)
-    window = objective.window
-    shuffled = window.events._replace(t_s=np.random.default_rng(0).permutation(events.t_s))
-    chance = objective._replace(window=window._replace(events=shuffled))
-    by_chance = scores_near(np.empty((1, len(events))), chance, spin, offsets, np.zeros((1, 6)))
-    contrast = (sharp - float(by_chance[0])) / len(events)
     return ContrastEstimate(
-        spin / TURN, covariance / TURN**2, *stretch, offsets_px=offsets, contrast=contrast, patch_rad=events.patch_rad
+        spin / TURN,
+        spin_covariance(objective, model, events, ball, settings, stretch) / TURN**2,
+        *stretch,
+        offsets_px=offsets,
+        contrast=_contrast(objective, spin, offsets, sharp),
+        patch_rad=events.patch_rad,
     )
+
+
+def _contrast(objective: Objective, spin_rad_s: Floats, offsets_px: Floats, score: float) -> float:
+    """A spin's score per event less that of permuted times."""
+    events = objective.window.events
+    shuffled = events._replace(t_s=np.random.default_rng(0).permutation(events.t_s))
+    chance = objective._replace(window=objective.window._replace(events=shuffled))
+    by_chance = scores_near(np.empty((1, events.t_s.size)), chance, spin_rad_s, offsets_px, np.zeros((1, 6)))
+    return (score - float(by_chance[0])) / events.t_s.size
 
 
 def _with_alternatives(
@@ -297,7 +305,7 @@ def _with_alternatives(
     A near rival adds its distance, by the odds that it is the right one, where these are not NEGLIGIBLE.
     """
     assert answer.spin_rps is not None and answer.covariance_rps2 is not None
-    kept = _polarity_covariance(answer, events, ball, settings, stretch)
+    kept = _polarity_covariance(answer, events, ball, settings)
     gaps = spins_rad_s[1:] / TURN - answer.spin_rps
     near = np.linalg.norm(gaps, axis=1) < NEAR * np.linalg.norm(answer.spin_rps)
     odds = np.exp(-LOG_ODDS_PER_SIGMA * margins[1:])
@@ -320,7 +328,7 @@ def _with_alternatives(
 
 
 def _polarity_covariance(
-    answer: ContrastEstimate, events: SphereEvents, ball: BallUncertainty, settings: ContrastSettings, stretch: Stretch
+    answer: ContrastEstimate, events: SphereEvents, ball: BallUncertainty, settings: ContrastSettings
 ) -> Floats:
     """Covariance (3, 3), rps^2, that the polarities' own maxima show beyond the stated one; zero where one is missing.
 
@@ -336,10 +344,10 @@ def _polarity_covariance(
         own = events.at(events.polarity == polarity)
         if len(own) < settings.min_events:
             return np.zeros((3, 3))
-        alone = _refined(own, answer.spin_rps * TURN, ball, settings, stretch, answer.offsets_px, 2)
-        assert alone.spin_rps is not None
-        found.append(alone.spin_rps)
-        gains.append(max(alone.contrast, 0.0) * len(own))
+        objective = _with_place(own, ball, settings)
+        spin, offsets, sharp, _ = maximise(objective, answer.spin_rps * TURN, answer.offsets_px, 2)
+        found.append(spin / TURN)
+        gains.append(max(_contrast(objective, spin, offsets, sharp), 0.0) * len(own))
     shares = gains[0] * gains[1] / max(gains[0] + gains[1], 1e-9) ** 2
     apart = found[0] - found[1]
     excess = shares * float(apart @ np.linalg.solve(answer.covariance_rps2, apart))

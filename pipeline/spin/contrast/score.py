@@ -25,6 +25,7 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from ...kernels.arrays import Flags, Floats, Integers
 from ...kernels.rotation import axis_and_length, orthonormal_axes, rotate
@@ -35,8 +36,12 @@ ONE, TWO = np.uint64(1), np.uint64(2)  # cells: an unsigned index plus a signed 
 # The quadratic B-spline's overlap with itself in two dimensions, mean over its place on the grid (11/20 each):
 # what one coinciding event adds to a density.
 COINCIDENCE = 0.55 * 0.55
+SQRT2, LOG2 = math.sqrt(2.0), math.log(2.0)
 # Splatting and reading are each smeared by the spline (variance 1/4 cell^2): kernel of 1 sigma = cell / sqrt(2).
 CELLS_PER_SIGMA = math.sqrt(2.0)
+# Fused multiply-adds and sums in any order, 1.2 times as fast; the last bits may differ. Divisors are never zero
+# (`error_model`), which spares a look for it.
+FAST = {"contract", "reassoc", "nsz"}
 # The map's pole need not be exact: so many events are enough for the mean of the turned points.
 POLE_EVENTS = 64
 # Steps of the finite differences.
@@ -46,7 +51,7 @@ OFFSET_STEP_PX = 0.3
 BURST_S, BURST_SIGMA_RAD, BURST_FLOOR, BURST_LOG_RATIO, USUAL_EVENTS = 0.5e-3, 0.1, 0.3, 0.2, 600
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def derotate(derotated: Floats, spin_rad_s: Floats, t_s: Floats, normals: Floats) -> None:
     """Write the normals (3, n), each turned by -spin t_s, into `derotated` (3, n).
 
@@ -59,7 +64,7 @@ def derotate(derotated: Floats, spin_rad_s: Floats, t_s: Floats, normals: Floats
     to_x, to_y, to_z = derotated[0], derotated[1], derotated[2]
     for k in range(t_s.size):
         turns = t_s[k] * turns_per_s
-        half = math.pi * (turns - math.floor(turns + 0.5))
+        half = math.pi * (turns - np.floor(turns + 0.5))
         h2 = half * half
         s = half * (1.0 + h2 * (-1 / 6 + h2 * (1 / 120 + h2 * (-1 / 5040 + h2 * (1 / 362880 - h2 * (1 / 39916800))))))
         c = 1.0 + h2 * (
@@ -79,18 +84,41 @@ def _mean_direction(points: Floats) -> tuple[float, float, float]:
     return x / length, y / length, z / length
 
 
-@numba.njit(cache=True, nogil=True)
-def _to_map(points: Floats, pole: tuple[float, float, float], per_cell: float, middle: float) -> None:
-    """Replace the first two rows of unit vectors `points` (3, n) by their places on the map around the pole."""
+class Splats(NamedTuple):
+    """Splats of n events in the flat maps, size x size cells a polarity.
+
+    Attributes
+    ----------
+    cells : (n,) int32
+        Index of the first of the nine cells that an event is splatted into.
+    weights : (6, n) float64
+        B-spline at the three columns of these cells, then at their three rows.
+    """
+
+    cells: NDArray[np.int32]
+    weights: Floats
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _set_splats(
+    splats: Splats, points: Floats, polarity: Integers, pole: tuple[float, float, float], cell_rad: float, size: int
+) -> None:
+    """Write the splats of unit vectors (3, n) on the map around the pole into `splats`."""
     px, py, pz = pole
     _, (ux, uy, uz), (vx, vy, vz) = orthonormal_axes(px, py, pz)
     xs, ys, zs = points[0], points[1], points[2]
+    cells, weights = splats
+    left, centre, right, above, level, below = weights[0], weights[1], weights[2], weights[3], weights[4], weights[5]
+    middle, rows = 0.5 * (size - 1), float(size)
     for k in range(xs.size):
         x, y, z = xs[k], ys[k], zs[k]
         near = 1.0 + px * x + py * y + pz * z  # 2 at the pole, 0 at its antipode, whose place is anywhere on the rim
-        scale = per_cell * math.sqrt(2.0 / max(near, 1e-6))
-        xs[k] = (ux * x + uy * y + uz * z) * scale + middle
-        ys[k] = (vx * x + vy * y + vz * z) * scale + middle
+        scale = math.sqrt(2.0 / max(near, 1e-6)) / cell_rad
+        across, down = (ux * x + uy * y + uz * z) * scale + middle, (vx * x + vy * y + vz * z) * scale + middle
+        column, row = np.floor(across + 0.5), np.floor(down + 0.5)
+        cells[k] = np.int32((polarity[k] * rows + row - 1.0) * rows + column - 1.0)
+        left[k], centre[k], right[k] = _spline(across - column)
+        above[k], level[k], below[k] = _spline(down - row)
 
 
 @numba.njit(cache=True, nogil=True, inline="always")
@@ -99,31 +127,62 @@ def _spline(offset: float) -> tuple[float, float, float]:
     return 0.5 * (0.5 - offset) ** 2, 0.75 - offset * offset, 0.5 * (0.5 + offset) ** 2
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
-def _first_cell(polarity: int, row: int, column: int, size: int) -> np.uint64:
-    """Index of the first of the nine cells around a place; unsigned, which spares a look for negative ones."""
-    return np.uint64((polarity * size + row - 1) * size + column - 1)
-
-
-@numba.njit(cache=True, nogil=True)
-def _splat(
-    density: Floats, places: Floats, polarity: Integers, first: int, last: int, size: int, weight: float
-) -> None:
-    """Add one splat of this weight a place [first, last) to the flat maps, size x size cells a polarity."""
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _add_splats(density: Floats, splats: Splats, first: int, last: int, size: int, weight: float) -> None:
+    """Add splats [first, last) of this weight to the flat maps."""
+    cells, weights = splats
     for k in range(first, last):
-        x, y = places[0, k], places[1, k]
-        column, row = int(x + 0.5), int(y + 0.5)
-        x0, x1, x2 = _spline(x - column)
-        y0, y1, y2 = _spline(y - row)
-        at = _first_cell(polarity[k], row, column, size)
-        for part in (y0 * weight, y1 * weight, y2 * weight):
+        x0, x1, x2 = weights[0, k], weights[1, k], weights[2, k]
+        at = np.uint64(cells[k])
+        for part in (weights[3, k] * weight, weights[4, k] * weight, weights[5, k] * weight):
             density[at] += part * x0
             density[at + ONE] += part * x1
             density[at + TWO] += part * x2
             at += np.uint64(size)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _set_ratios(
+    ratios: Floats, splats: Splats, sharp: Floats, blurred: Floats, first: int, last: int, size: int, added: float
+) -> None:
+    """Write (I + added) / (B + added) of the events [first, last) into `ratios` (n,)."""
+    cells, weights = splats
+    for i in range(first, last):
+        x0, x1, x2 = weights[0, i], weights[1, i], weights[2, i]
+        y0, y1, y2 = weights[3, i], weights[4, i], weights[5, i]
+        at = np.uint64(cells[i])
+        density = -(x0 * x0 + x1 * x1 + x2 * x2) * (y0 * y0 + y1 * y1 + y2 * y2)
+        expected = 0.0
+        for part in (y0, y1, y2):
+            density += part * (x0 * sharp[at] + x1 * sharp[at + ONE] + x2 * sharp[at + TWO])
+            expected += part * (x0 * blurred[at] + x1 * blurred[at + ONE] + x2 * blurred[at + TWO])
+            at += np.uint64(size)
+        ratios[i] = (max(density, 0.0) + added) / (expected + added)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def take_logarithms(values: Floats) -> float:
+    """Replace positive numbers (n,) by their natural logarithms; return the sum of these.
+
+    The binary exponent apart, a number is a mantissa m in [1, 2): log m = log sqrt(2) + 2 artanh of
+    (m - sqrt(2)) / (m + sqrt(2)), whose series' terms left out are below 1e-12: plain arithmetic, so that the
+    compiler handles several numbers at once (2.5 times as fast as the library's).
+    """
+    bits, exponents = values.view(np.int64), np.empty(values.size)
+    for k in range(values.size):
+        exponents[k] = (bits[k] >> 52) - 1023
+        bits[k] = (bits[k] & 0x000FFFFFFFFFFFFF) | 0x3FF0000000000000
+    total = 0.0
+    for k in range(values.size):
+        a = (values[k] - SQRT2) / (values[k] + SQRT2)
+        a2 = a * a
+        series = 1.0 + a2 * (1 / 3 + a2 * (1 / 5 + a2 * (1 / 7 + a2 * (1 / 9 + a2 * (1 / 11 + a2 * (1 / 13))))))
+        values[k] = (exponents[k] + 0.5) * LOG2 + 2.0 * a * series
+        total += values[k]
+    return total
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def score(log_ratios: Floats, spin_rad_s: Floats, window: ScoreWindow, cell_rad: float, floor: float) -> float:
     """Score of one spin; each event's log((I + floor) / (B + floor)) is written into `log_ratios` (n,).
 
@@ -138,40 +197,28 @@ def score(log_ratios: Floats, spin_rad_s: Floats, window: ScoreWindow, cell_rad:
     """
     events, permuted = window.events, window.permuted
     size = int(4.0 / cell_rad) + 5
-    middle = 0.5 * (size - 1)
     added = floor * COINCIDENCE
-    places, permuted_places = np.empty_like(events.normals), np.empty_like(permuted.normals)
-    derotate(places, spin_rad_s, events.t_s, events.normals)
-    derotate(permuted_places, spin_rad_s, permuted.t_s, permuted.normals)
-    pole = _mean_direction(places)
-    _to_map(places, pole, 1.0 / cell_rad, middle)
-    _to_map(permuted_places, pole, 1.0 / cell_rad, middle)
+    points, permuted_points = np.empty_like(events.normals), np.empty_like(permuted.normals)
+    derotate(points, spin_rad_s, events.t_s, events.normals)
+    derotate(permuted_points, spin_rad_s, permuted.t_s, permuted.normals)
+    pole = _mean_direction(points)
+    splats = Splats(np.empty(events.t_s.size, np.int32), np.empty((6, events.t_s.size)))
+    permuted_splats = Splats(np.empty(permuted.t_s.size, np.int32), np.empty((6, permuted.t_s.size)))
+    _set_splats(splats, points, events.polarity, pole, cell_rad, size)
+    _set_splats(permuted_splats, permuted_points, permuted.polarity, pole, cell_rad, size)
     sharp, blurred = np.zeros(2 * size * size), np.zeros(2 * size * size)
-    total = 0.0
     for segment in range(events.starts.size - 1):
         first, last = events.starts[segment], events.starts[segment + 1]
         begin, end = permuted.starts[segment], permuted.starts[segment + 1]
         if segment > 0:
             sharp[:] = 0.0
             blurred[:] = 0.0
-        _splat(sharp, places, events.polarity, first, last, size, 1.0)
+        _add_splats(sharp, splats, first, last, size, 1.0)
         # An event has no share in the density that it is compared with: count - 1 others.
         weight = (last - first - 1) / max(end - begin, 1)
-        _splat(blurred, permuted_places, permuted.polarity, begin, end, size, weight)
-        for i in range(first, last):
-            x, y = places[0, i], places[1, i]
-            column, row = int(x + 0.5), int(y + 0.5)
-            x0, x1, x2 = _spline(x - column)
-            y0, y1, y2 = _spline(y - row)
-            at = _first_cell(events.polarity[i], row, column, size)
-            density = -(x0 * x0 + x1 * x1 + x2 * x2) * (y0 * y0 + y1 * y1 + y2 * y2)
-            expected = 0.0
-            for part in (y0, y1, y2):
-                density += part * (x0 * sharp[at] + x1 * sharp[at + ONE] + x2 * sharp[at + TWO])
-                expected += part * (x0 * blurred[at] + x1 * blurred[at + ONE] + x2 * blurred[at + TWO])
-                at += np.uint64(size)
-            log_ratios[i] = math.log((max(density, 0.0) + added) / (expected + added))
-            total += log_ratios[i]
+        _add_splats(blurred, permuted_splats, begin, end, size, weight)
+        _set_ratios(log_ratios, splats, sharp, blurred, first, last, size, added)
+    total: float = take_logarithms(log_ratios)
     return total
 
 

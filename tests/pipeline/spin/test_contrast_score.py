@@ -28,7 +28,7 @@ from spinscope.pipeline.spin.contrast.events import (
     shifted_normals,
     whole_window,
 )
-from spinscope.pipeline.spin.contrast.score import score
+from spinscope.pipeline.spin.contrast.score import score, take_logarithms
 from spinscope.pipeline.spin.contrast.search import cholesky_solve, distinct
 from tests.reference.contrast import dotted_ball, naive_score
 from tests.reference.rotation import turned
@@ -76,6 +76,13 @@ def test_the_score_is_its_twins(seed, count, speed, spread, segment_s, times_eac
     expected, shares = naive_score(spin, *window.events, times_each, cell, floor)
     np.testing.assert_allclose(ratios, shares, atol=2e-4)
     assert total == pytest.approx(expected, abs=2e-4 * count)
+
+
+def test_logarithms_are_the_librarys() -> None:
+    values = np.concatenate([np.geomspace(1e-3, 1e3, 400), [1.0, 2.0, math.sqrt(2.0), 1.0 - 1e-9]])
+    expected = np.log(values)
+    assert take_logarithms(values) == pytest.approx(expected.sum(), abs=1e-9)
+    np.testing.assert_allclose(values, expected, atol=1e-11)
 
 
 @settings(max_examples=50)
