@@ -27,7 +27,7 @@ Value = TypeVar("Value")
 # Sound files give their next part within some hundredths of a second of computing. What a library that loops needs is
 # counted in CPU time: a busy machine or a slow disk refuses no sound file. An error within 5 s is what a user is
 # promised, start of the process included.
-MAX_CPU_S = 2.5
+MAX_CPU_S = 2.0
 # Where a library waits without computing, for a network that is gone; and on Windows, which cannot limit CPU time.
 MAX_SILENCE_S = 20.0 if hasattr(signal, "setitimer") else 3.0
 # What a process may take besides the libraries it loads (a part of a million events takes 13 MB, and some copies).

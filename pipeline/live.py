@@ -27,7 +27,7 @@ from .event_source import EventsInMemory
 from .events import EventBatch
 from .live_outputs import LiveBall, LiveNotice, LiveOutput, LiveStatus
 from .live_spins import SWITCH_S, SegmentStart, SpinRun, TrackedTick, load_stages
-from .recordings import RawWriter
+from .recordings.formats.prophesee_raw.writer import RawWriter
 from .recordings.in_memory import RecordingInMemory
 from .registry import STAGES, Parameters
 from .results import Packet

@@ -1,9 +1,9 @@
 """Recordings on disk: open, read in streams, summarise, write, convert.
 
-Nothing else of this package is meant to be imported from outside.
+Nothing else of this package is meant to be imported from outside, but for the writer of a running camera's events: it
+loads numba, which takes as long as all the rest, and processes that read for others do without it.
 """
 
-from .formats.prophesee_raw.writer import RawWriter as RawWriter
 from .formats.registry import FORMATS as FORMATS
 from .formats.registry import RecordingContent as RecordingContent
 from .formats.registry import RecordingFormat as RecordingFormat

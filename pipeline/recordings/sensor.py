@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from decimal import Decimal
 
 from ..errors import RecordingError
 
@@ -37,10 +38,10 @@ def check_resolution(resolution: Resolution) -> None:
     width_px, height_px = resolution.width_px, resolution.height_px
     possible = 0 < width_px <= MAX_SIDE_PX and 0 < height_px <= MAX_SIDE_PX and width_px * height_px <= MAX_PIXELS
     if not possible:
+        size_px = f"{Decimal(width_px):.7g} x {Decimal(height_px):.7g}"  # thousands of digits are no float
         raise RecordingError(
-            f"sensor size {width_px:.7g} x {height_px:.7g} from the {resolution.origin} is not 1 to {MAX_SIDE_PX} "
-            f"pixels each way, {MAX_PIXELS / 1e6:.1f} million at most: "
-            "state it with --sensor WxH, like --sensor 1280x720"
+            f"sensor size {size_px} from the {resolution.origin} is not 1 to {MAX_SIDE_PX} pixels each way, "
+            f"{MAX_PIXELS / 1e6:.1f} million at most: state it with --sensor WxH, like --sensor 1280x720"
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import struct
 import sys
@@ -110,14 +111,14 @@ def peak_bytes() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
 
 
-def fuzz(name: str, folder: Path, cases: int, clock: Callable[[], float]) -> None:
-    """Damage the sound files of a format in turn."""
+def fuzz(name: str, folder: Path, cases: int, clock: Callable[[], float], first: int = 0) -> None:
+    """Damage the sound files of a format in turn; `first` is the number of the first case."""
     files = sound_files(folder, name, some_events(EVENTS))
     sound = [path.read_bytes() for path in files]
     for path in files:
         assert read(path) is not None
     peak, read_cases, slowest = peak_bytes(), 0, (0.0, 0)
-    for case in range(cases):
+    for case in range(first, cases):
         rng = np.random.default_rng([case, cases])
         path, data = files[case % len(files)], bytearray(sound[case % len(files)])
         damage = DAMAGES[int(rng.integers(0, len(DAMAGES)))]
@@ -131,7 +132,7 @@ def fuzz(name: str, folder: Path, cases: int, clock: Callable[[], float]) -> Non
             raise
         slowest = max(slowest, (clock() - start, case))
     growth = peak_bytes() - peak
-    print(f"{name}: {read_cases} of {cases} read, slowest {slowest}, {growth >> 20} MB more")  # noqa: T201
+    print(f"{name}: {read_cases} of cases {first} to {cases} read, slowest {slowest}, {growth >> 20} MB more")  # noqa: T201
     assert slowest[0] < MOST_S and growth < MOST_GROWTH_BYTES
 
 
@@ -143,7 +144,8 @@ def test_damaged_files_are_refused_or_read(tmp_path: Path, name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_twenty_thousand_damaged_files_are_refused_or_read(tmp_path: Path, name: str) -> None:
-    fuzz(name, tmp_path, 20_000, time.monotonic)
+    """A run that was stopped goes on: SPINSCOPE_FUZZ_FIRST=CASE uv run pytest -m slow -k twenty_thousand."""
+    fuzz(name, tmp_path, 20_000, time.monotonic, int(os.environ.get("SPINSCOPE_FUZZ_FIRST", "0")))
 
 
 def flip_one(data: bytearray, start: int, rng: Random) -> None:

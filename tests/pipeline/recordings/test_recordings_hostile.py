@@ -22,7 +22,7 @@ from tests.pipeline.recordings.test_recordings_columns import some_columns, writ
 from tests.pipeline.recordings.test_recordings_fuzz import MOST_GROWTH_BYTES, peak_bytes
 
 HOSTILE = Path(__file__).parent / "hostile"
-# The library is ended after 2.5 s; the rest is for a machine that does much else. Without a limit it takes for ever.
+# The library is ended after 2 s; the rest is for a machine that does much else. Without a limit it takes for ever.
 MOST_S = 30.0
 
 
@@ -72,6 +72,11 @@ def huge_sensor_of_dat(path: Path) -> None:
     path.write_bytes(path.read_bytes().replace(b"Width 320", b"Width 65535"))
 
 
+def endless_sensor(path: Path) -> None:
+    """A size with more digits than a float can hold."""
+    path.write_text("1" + 899 * "0" + " 240\n1.0 5 6 1\n", encoding="ascii")
+
+
 def objects(path: Path) -> None:
     """Python objects, which run code when they are loaded."""
     np.savez(path, **some_columns(50) | {"t": np.array([{}] * 50, object)})
@@ -101,6 +106,7 @@ HARM: dict[str, tuple[str, Callable[[Path], object], str]] = {
     "a virtual column": ("a.h5", virtual, "in another file"),
     "65535 x 65535 pixels": ("a.h5", huge_sensor, "sensor size 65535 x 65535 .* --sensor"),
     "65535 columns": ("a.dat", huge_sensor_of_dat, "sensor size 65535 x 240 .* --sensor"),
+    "900 digits of columns": ("a.txt", endless_sensor, r"sensor size 1.000000e\+899 x 240 .* --sensor"),
     "Python objects": ("a.npz", objects, "holds Python objects"),
     "an open bracket": ("a.npz", broken_header, "damaged"),
     "no ordinary file": ("a.raw", pipe, "not an ordinary file"),
