@@ -6,17 +6,16 @@ import dataclasses
 import json
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor
 from dataclasses import astuple, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from joblib import cpu_count
-from joblib.externals.loky.process_executor import TerminatedWorkerError
-
 from spinscope.pipeline.errors import ParameterError, RecordingError, SpinscopeError
 from spinscope.pipeline.evaluation.tables import Row
-from spinscope.pipeline.evaluation.tasks import Task, TaskContext, digest, executor, performed, text_digest
+from spinscope.pipeline.evaluation.tasks import Task, TaskContext, digest, performed, text_digest
+from spinscope.pipeline.evaluation.workers import local_workers, processor_count, task_workers
 from spinscope.pipeline.files import check_writable
 from spinscope.pipeline.recordings.recording import file_identity
 from spinscope.pipeline.result_rows import ResultRow, shot_columns, shot_rows, tick_columns, tick_rows
@@ -184,21 +183,21 @@ def _lines(tasks: Mapping[int, Task], work: BatchWork) -> Iterator[dict[str, Any
     of its own, and costs its own row only.
     """
     left = dict(tasks)
-    jobs = min(cpu_count() if work.jobs is None else work.jobs, len(left))
+    jobs = min(processor_count() if work.jobs is None else work.jobs, len(left))
     while left:
         try:
-            with executor(jobs, work.cluster) as parallel:
-                for number, rows in performed(dict(left), TaskContext(), parallel):
+            with task_workers(jobs, work.cluster) as workers:
+                for number, rows in performed(dict(left), TaskContext(), workers):
                     del left[number]
                     yield json.loads(str(rows[0]["line"]))
-        except TerminatedWorkerError:
-            for number in list(left)[: 2 * jobs]:  # joblib hands out two tasks a process ahead
+        except BrokenExecutor:
+            for number in list(left)[: 2 * jobs]:  # under way, or done and not handed on
                 task = left.pop(number)
                 try:
-                    with executor(2) as parallel:
-                        ((_, rows),) = performed({number: task}, TaskContext(), parallel)
+                    with local_workers(1) as workers:
+                        ((_, rows),) = performed({number: task}, TaskContext(), workers)
                     yield json.loads(str(rows[0]["line"]))
-                except TerminatedWorkerError:
+                except BrokenExecutor:
                     error = "the process that read it was ended, by lack of memory or a fault of a library"
                     yield {**task.arguments["line"], "shots": [{"error": error}]}
 

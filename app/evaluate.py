@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import Any
 
 import platformdirs
-from joblib import cpu_count
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table as ScreenTable
@@ -31,7 +30,8 @@ from spinscope.pipeline.evaluation import (
     SceneChoices,
     TaskContext,
     evaluate,
-    executor,
+    processor_count,
+    task_workers,
 )
 from spinscope.pipeline.evaluation.best_methods import best_methods
 from spinscope.pipeline.evaluation.plots import draw
@@ -113,11 +113,11 @@ def evaluate_suite(
     folder = cache or platformdirs.user_cache_path("spinscope") / "evaluation"
     context = TaskContext(folder, choices.parameters(), choices, scene)
     begin = time.perf_counter()
-    with executor(cpu_count() if workers is None else workers, cluster) as parallel:
+    with task_workers(processor_count() if workers is None else workers, cluster) as started:
         if real is None:
-            report = evaluate(name, context, quick=quick, parallel=parallel, on_progress=on_progress)
+            report = evaluate(name, context, quick=quick, workers=started, on_progress=on_progress)
         else:
-            report = evaluate_real(name, real, context, parallel=parallel, on_progress=on_progress)
+            report = evaluate_real(name, real, context, workers=started, on_progress=on_progress)
     seconds = time.perf_counter() - begin
     today = datetime.datetime.now(datetime.UTC).date().isoformat()
     return Evaluation(report, today, _machine(), version("spinscope"), seconds)
@@ -136,8 +136,8 @@ def make_training_set(
     """Write a training set for learned estimators; see `write_training_set`. Returns what it holds, in words."""
     choices = choices or Choices()
     context = TaskContext(None, choices.parameters(), choices)
-    with executor(cpu_count() if workers is None else workers, cluster) as parallel:
-        rows = write_training_set(folder, context, shards=shards, seed=seed, parallel=parallel, on_progress=on_progress)
+    with task_workers(processor_count() if workers is None else workers, cluster) as started:
+        rows = write_training_set(folder, context, shards=shards, seed=seed, workers=started, on_progress=on_progress)
     samples, events = (sum(int(row[name] or 0) for row in rows) for name in ("samples", "events"))
     return f"wrote {samples} windows with {events} events in {len(rows)} files: {folder}"
 
@@ -273,4 +273,4 @@ def _machine() -> str:
         cpuinfo = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
         if model := re.search(r"^model name\s*:\s*(.+?)\s*$", cpuinfo, re.MULTILINE):
             name = model[1]
-    return f"{name}, {cpu_count()} cores, {platform.system()}, Python {platform.python_version()}"
+    return f"{name}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}"

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
-
-from joblib import cpu_count
-from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from spinscope.app.batch import program_version
 from spinscope.app.terminal import note
 from spinscope.pipeline.errors import RecordingError, SpinscopeError
 from spinscope.pipeline.evaluation.tables import Row
-from spinscope.pipeline.evaluation.tasks import Task, TaskContext, digest, executor, performed
+from spinscope.pipeline.evaluation.tasks import Task, TaskContext, digest, performed
+from spinscope.pipeline.evaluation.workers import processor_count, task_workers
 from spinscope.pipeline.live_spins import load_stages
 from spinscope.pipeline.recording_folders import recordings_in
 from spinscope.pipeline.recordings.recording import file_identity
@@ -88,6 +88,8 @@ class SessionAnalysis:
     def close(self) -> None:
         """End the work; what is under way in other processes is left undone."""
         self._ended.set()
+        for process in multiprocessing.active_children():
+            process.kill()
         if self._thread.is_alive():
             self._thread.join(5.0)
 
@@ -164,14 +166,16 @@ class SessionAnalysis:
                 continue
             arguments = {"path": path, "content": known.recording_hash, "choices": self.choices}
             left[number] = Task(session_rows, {**arguments, "folder": self.session.folder}, keep=False)
-        jobs = min(cpu_count() if self._jobs is None else self._jobs, len(left))
+        jobs = min(processor_count() if self._jobs is None else self._jobs, len(left))
         while left:
             try:
-                with executor(jobs) as parallel:
-                    for number, rows in performed(dict(left), TaskContext(), parallel):
+                with task_workers(jobs) as workers:
+                    for number, rows in performed(dict(left), TaskContext(), workers):
                         del left[number]
                         yield (pending[number][0], *_unpacked(pending[number][1], str(rows[0]["found"])))
-            except TerminatedWorkerError:
+            except BrokenExecutor:
+                if self._ended.is_set():
+                    return
                 if jobs == 1 or len(left) == 1:  # the one that ends its process
                     number = next(iter(left))
                     del left[number]

@@ -7,7 +7,8 @@ batches of recordings need the tasks alone.
 from .lab_recordings import LabFolder, LabRecording
 from .suite import Report, Suite, evaluate
 from .tables import ResultTable, Row, Summary
-from .tasks import SceneChoices, Task, TaskContext, executor
+from .tasks import SceneChoices, Task, TaskContext
+from .workers import TaskWorkers, processor_count, task_workers
 
 __all__ = [
     "LabFolder",
@@ -20,6 +21,8 @@ __all__ = [
     "Summary",
     "Task",
     "TaskContext",
+    "TaskWorkers",
     "evaluate",
-    "executor",
+    "processor_count",
+    "task_workers",
 ]

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from joblib import Parallel
-
 from ..errors import SpinscopeError
 from ..recordings import is_recording
 from ..recordings.recording import file_identity
@@ -14,6 +12,7 @@ from .suite import Report, check_choices
 from .suites import SUITES
 from .tables import Row
 from .tasks import Progress, Task, TaskContext, digest, run
+from .workers import TaskWorkers
 
 
 def evaluate_real(
@@ -21,7 +20,7 @@ def evaluate_real(
     folder: Path,
     context: TaskContext,
     *,
-    parallel: Parallel | None = None,
+    workers: TaskWorkers | None = None,
     on_progress: Progress | None = None,
 ) -> Report:
     """Run a suite on the real recordings of a folder, with truth from their sidecars.
@@ -33,7 +32,7 @@ def evaluate_real(
     name : str
     folder : Path
         With its recordings, those in folders below, and their sidecars.
-    context, parallel, on_progress
+    context, workers, on_progress
         As of `evaluate`.
 
     Raises
@@ -58,7 +57,7 @@ def evaluate_real(
         for recording in found.recordings
         if recording.kind in suite.real_kinds
     ]
-    every = run(tasks, context, None if suite.timed else parallel, on_progress)
+    every = run(tasks, context, None if suite.timed else workers, on_progress)
     rows = [row for row in every if "error" not in row]
     tables = [table for table in suite.tables(rows) if table.rows] if rows else []
     return Report(suite, False, rows, [recordings_table(found, suite.real_kinds, every), *tables], folder)

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from joblib import Parallel
-
 from ..errors import ParameterError
 from ..extensions import Registry
 from ..session import Choices
@@ -16,6 +14,7 @@ from .lab_recordings import LabRecording
 from .plots import Figures
 from .tables import ResultTable, Row
 from .tasks import Progress, SceneChoices, Task, TaskContext, run
+from .workers import TaskWorkers
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,7 +107,7 @@ def evaluate(
     context: TaskContext,
     *,
     quick: bool = False,
-    parallel: Parallel | None = None,
+    workers: TaskWorkers | None = None,
     on_progress: Progress | None = None,
 ) -> Report:
     """Run the registered suite of this name.
@@ -119,8 +118,8 @@ def evaluate(
     context : TaskContext
     quick : bool
         Whether to thin the suite to about ten seconds.
-    parallel : joblib.Parallel or None
-        From `tasks.executor`; None, and every timed suite, runs in this process.
+    workers : TaskWorkers or None
+        From `task_workers`; None, and every timed suite, runs in this process.
     on_progress : callable or None
         Called with the share done (0..1) and what is being done.
 
@@ -130,5 +129,5 @@ def evaluate(
         As of `check_choices`, or for a cache that cannot be written.
     """
     suite = check_choices(name, context.choices, context.scene, is_real=False)
-    rows = run(suite.tasks(quick), context, None if suite.timed else parallel, on_progress)
+    rows = run(suite.tasks(quick), context, None if suite.timed else workers, on_progress)
     return Report(suite, quick, rows, suite.tables(rows))

@@ -3,31 +3,24 @@
 from __future__ import annotations
 
 import hashlib
-import importlib
 import json
-import os
-import threading
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from joblib import Parallel, delayed, parallel_config
-
-from ..errors import ParameterError
 from ..files import atomic_file
 from ..registry import Parameters
 from ..session import Choices
 from .tables import Row
+from .workers import TaskWorkers
 
 PIPELINE = Path(__file__).parents[1]
 CACHE_BYTES = 2 << 30  # a full run of all suites keeps some 200 MB; older versions' files go first
-WORKER_IDLE_S = 5  # after so long without work a process ends
-PARENT_CHECK_S = 1.0  # how often a process looks whether the one that started it still lives
-CLUSTER_WAIT_S = 10.0  # the longest that a cluster and its first worker are waited for
 Progress = Callable[[float, str], None]  # share done (0..1) and what is being done
 
 
@@ -90,57 +83,13 @@ class Task:
     needs: tuple[str, ...] = ("",)
 
 
-@contextmanager
-def executor(workers: int = 1, cluster: str | None = None) -> Iterator[Parallel]:
-    """joblib's `Parallel` over this process, processes of this machine or a running Dask cluster.
-
-    Parameters
-    ----------
-    workers : int
-        Number of processes; up to 1, this process does the work.
-    cluster : str or None
-        Address of a Dask scheduler, like "tcp://127.0.0.1:8786", whose workers do the work instead; raises
-        ParameterError where Dask is not installed, none answers or it has no workers.
-    """
-    options: dict[str, Any] = {"return_as": "generator_unordered", "batch_size": 1}
-    if cluster is None:
-        if workers > 1:
-            options |= {"backend": "loky", "idle_worker_timeout": WORKER_IDLE_S, "initializer": end_with_parent}
-        yield Parallel(max(workers, 1), **options)
-        return
-    try:
-        dask = importlib.import_module("distributed")  # an extra: not everybody has a cluster
-    except ImportError:
-        raise ParameterError("a cluster needs Dask: install it with `pip install spinscope[cluster]`") from None
-    try:
-        client = dask.Client(cluster, timeout=CLUSTER_WAIT_S)
-    except (OSError, ValueError) as error:
-        reason = " ".join(str(error).split())[:200]
-        raise ParameterError(f"no Dask cluster answers at {cluster} ({reason}): is it running?") from error
-    with client, parallel_config("dask"):
-        try:
-            client.wait_for_workers(1, timeout=CLUSTER_WAIT_S)
-        except TimeoutError as error:
-            raise ParameterError(f"the Dask cluster at {cluster} has no workers: start some") from error
-        yield Parallel(-1, **options)
-
-
-def end_with_parent() -> None:
-    """End this process when the one that started it has been killed, which joblib's processes do not notice."""
-    parent = os.getppid()
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(PARENT_CHECK_S)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
 def run(
-    tasks: Sequence[Task], context: TaskContext, parallel: Parallel | None = None, on_progress: Progress | None = None
+    tasks: Sequence[Task],
+    context: TaskContext,
+    workers: TaskWorkers | None = None,
+    on_progress: Progress | None = None,
 ) -> list[Row]:
-    """All tasks' rows in the tasks' order, run by an `executor` (None: by this process) unless kept by an earlier run.
+    """All tasks' rows in the tasks' order, run by `workers` (None: by this process) unless kept by an earlier run.
 
     An error in a task cancels the others; the rows of those that are done stay on disk.
     """
@@ -148,7 +97,7 @@ def run(
         _limit_cache(context.cache)
     rows = {number: kept for number, task in enumerate(tasks) if (kept := _kept(context, task)) is not None}
     pending = {number: task for number, task in enumerate(tasks) if number not in rows}
-    for number, result in performed(pending, context, parallel):
+    for number, result in performed(pending, context, workers):
         rows[number] = result
         if on_progress:
             on_progress(len(rows) / len(tasks), f"{len(rows)} of {len(tasks)}")
@@ -156,14 +105,33 @@ def run(
 
 
 def performed(
-    tasks: Mapping[int, Task], context: TaskContext, parallel: Parallel | None = None
+    tasks: Mapping[int, Task], context: TaskContext, workers: TaskWorkers | None = None
 ) -> Iterator[tuple[int, list[Row]]]:
-    """Each task's number and rows as soon as they are known, in any order; `parallel`: see `run`.
+    """Each task's number and rows as soon as they are known, in any order; `workers`: see `run`.
 
-    An error in a task, or closing the iterator, cancels the others.
+    An error in a task, or closing the iterator, leaves those that were not begun. Of a worker that has ended a
+    BrokenExecutor tells.
     """
-    parallel = parallel or Parallel(return_as="generator")
-    yield from parallel(delayed(_perform)(context, task, number) for number, task in tasks.items())
+    if workers is None:
+        for number, task in tasks.items():
+            yield _perform(context, task, number)
+        return
+    coming = iter(tasks.items())
+    executor = workers.executor
+
+    def begun(count: int) -> set[Future[tuple[int, list[Row]]]]:
+        return {executor.submit(_perform, context, task, number) for number, task in islice(coming, count)}
+
+    under_way = begun(workers.count)
+    try:
+        while under_way:
+            done, under_way = wait(under_way, return_when=FIRST_COMPLETED)
+            under_way |= begun(len(done))
+            for future in done:
+                yield future.result()
+    finally:
+        for future in under_way:
+            future.cancel()
 
 
 def _perform(context: TaskContext, task: Task, number: int) -> tuple[int, list[Row]]:

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from joblib import Parallel
 from numpy.typing import NDArray
 
 from ..camera import Camera
@@ -27,6 +26,7 @@ from .rendering import camera_of, render
 from .suites.spinner import known_circle
 from .tables import Row
 from .tasks import Progress, Task, TaskContext, make_folder, run, text_digest, write_whole
+from .workers import TaskWorkers
 
 RECORDINGS_A_SHARD = 8
 WINDOWS_A_RECORDING = 32
@@ -85,7 +85,7 @@ def write_training_set(
     *,
     shards: int = 16,
     seed: int = 0,
-    parallel: Parallel | None = None,
+    workers: TaskWorkers | None = None,
     on_progress: Progress | None = None,
 ) -> list[Row]:
     """Write the shards of a training set and what they hold; one row a shard.
@@ -100,7 +100,7 @@ def write_training_set(
         Number of files, of RECORDINGS_A_SHARD recordings each.
     seed : int
         Another one gives another set.
-    parallel, on_progress
+    workers, on_progress
         As of `tasks.run`.
 
     Raises
@@ -117,7 +117,7 @@ def write_training_set(
         Task(write_shard, {"folder": str(folder.absolute()), "shard": shard, "seed": seed}, keep=False)
         for shard in range(shards)
     ]
-    rows = run(tasks, context, parallel, on_progress)
+    rows = run(tasks, context, workers, on_progress)
     windows = ", ".join(f"{us / 1000:g}" for us in WINDOWS_US)
     about = README.format(lowest=LOWEST_RPS, highest=HIGHEST_RPS, windows=windows, fewest=FEWEST_EVENTS)
     write_whole(folder / "README.md", about)

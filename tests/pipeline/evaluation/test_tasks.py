@@ -7,16 +7,20 @@ import resource
 import signal
 import subprocess
 import sys
+import threading
+import time
 import types
 from collections.abc import Iterator
+from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from joblib import Parallel
 
 from spinscope.pipeline.errors import ParameterError, RecordingError
 from spinscope.pipeline.evaluation.tables import Row
-from spinscope.pipeline.evaluation.tasks import Task, TaskContext, _limit_cache, executor, run, write_whole
+from spinscope.pipeline.evaluation.tasks import Task, TaskContext, _limit_cache, run, write_whole
+from spinscope.pipeline.evaluation.workers import TaskWorkers, local_workers, task_workers
 from spinscope.pipeline.registry import Parameters
 
 CALLS: list[int] = []
@@ -42,13 +46,16 @@ def squares(count: int, keep: bool = True) -> list[Task]:
     return [Task(square, {"number": number}, keep) for number in range(count)]
 
 
-def threads(count: int) -> Parallel:
-    return Parallel(count, backend="threading", return_as="generator_unordered")
+@contextmanager
+def threads(count: int) -> Iterator[TaskWorkers]:
+    with ThreadPoolExecutor(count) as executor:
+        yield TaskWorkers(executor, count)
 
 
 def test_rows_come_in_the_order_of_tasks(tmp_path: Path) -> None:
     shares: list[float] = []
-    rows = run(squares(20), TaskContext(tmp_path), threads(3), lambda share, what: shares.append(share))
+    with threads(3) as workers:
+        rows = run(squares(20), TaskContext(tmp_path), workers, lambda share, what: shares.append(share))
     assert [row["square"] for row in rows] == [n * n for n in range(20)]
     assert shares == sorted(shares) and shares[-1] == 1.0
 
@@ -67,8 +74,8 @@ def test_interrupted_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
 
 
 def test_error_of_a_task_stops_the_run_and_keeps_what_is_done(tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="no"):
-        run([*squares(1), Task(failing), *squares(3)[1:]], TaskContext(tmp_path), threads(1))
+    with pytest.raises(ParameterError, match="no"), threads(1) as workers:
+        run([*squares(1), Task(failing), *squares(3)[1:]], TaskContext(tmp_path), workers)
     assert len(list((tmp_path / "results").iterdir())) >= 1
     assert not list(tmp_path.rglob("*.part"))
 
@@ -95,11 +102,27 @@ def test_times_and_runs_without_a_cache_are_not_kept(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_local_processes_do_the_work(tmp_path: Path) -> None:
-    with executor(2) as parallel:
-        rows = run(squares(2), TaskContext(tmp_path), parallel)
+@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")  # NumPy's threads end before a copy is made
+@pytest.mark.parametrize("has_threads", [False, True])
+def test_local_processes_do_the_work(tmp_path: Path, has_threads: bool) -> None:
+    """As copies of this process, or started anew beside threads."""
+    is_done = threading.Event()
+    if has_threads:
+        threading.Thread(target=is_done.wait).start()
+    with task_workers(2) as workers:
+        rows = run(squares(2), TaskContext(tmp_path), workers)
+    is_done.set()
     assert [row["square"] for row in rows] == [0, 1]
     assert not CALLS  # not in this process
+
+
+def test_an_error_ends_the_processes_at_once() -> None:
+    """Else the block would end with their work."""
+    with pytest.raises(KeyboardInterrupt), local_workers(1) as workers:
+        working = workers.executor.submit(time.sleep, 600)
+        raise KeyboardInterrupt
+    with pytest.raises(BrokenExecutor):
+        working.result()
 
 
 @pytest.mark.slow  # tests/app/test_batch.py kills a command with its workers
@@ -107,11 +130,10 @@ def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
     """Also when it is killed and cannot stop them."""
     script = (
         "import os, signal\n"
-        "from joblib import delayed\n"
-        "from spinscope.pipeline.evaluation.tasks import executor\n"
+        "from spinscope.pipeline.evaluation.workers import local_workers\n"
         "if __name__ == '__main__':\n"
-        "    with executor(2) as parallel:\n"
-        "        print(next(parallel(delayed(os.getpid)() for _ in range(2))), flush=True)\n"
+        "    with local_workers(2) as workers:\n"
+        "        print(workers.executor.submit(os.getpid).result(), flush=True)\n"
         "        os.kill(os.getpid(), signal.SIGKILL)\n"
     )
     (tmp_path / "run.py").write_text(script)
@@ -130,7 +152,7 @@ def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
 
 def test_cluster_without_dask_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(ParameterError, match="needs Dask"), executor(cluster="tcp://nowhere:1"):
+    with pytest.raises(ParameterError, match="needs Dask"), task_workers(cluster="tcp://nowhere:1"):
         pass
 
 
@@ -141,7 +163,7 @@ def test_cluster_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", types.SimpleNamespace(Client=client))
     with (
         pytest.raises(ParameterError, match="no Dask cluster answers at tcp://nowhere:1"),
-        executor(cluster="tcp://nowhere:1"),
+        task_workers(cluster="tcp://nowhere:1"),
     ):
         pass
 
@@ -190,11 +212,11 @@ def test_two_workers_of_a_dask_cluster(tmp_path: Path) -> None:
 
     with (
         dask.LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
-        executor(cluster=cluster.scheduler_address) as parallel,
+        task_workers(cluster=cluster.scheduler_address) as workers,
     ):
-        rows = run([Task(pow_of, {"number": number}) for number in range(6)], TaskContext(tmp_path), parallel)
+        rows = run([Task(pow_of, {"number": number}) for number in range(6)], TaskContext(tmp_path), workers)
         with pytest.raises(ParameterError, match="no"):
-            run([*squares(3), Task(failing), *squares(9)[3:]], TaskContext(tmp_path), parallel)
+            run([*squares(3), Task(failing), *squares(9)[3:]], TaskContext(tmp_path), workers)
     assert [row["power"] for row in rows] == [2**n for n in range(6)]
 
 
@@ -203,11 +225,11 @@ def test_two_workers_of_a_dask_cluster(tmp_path: Path) -> None:
 def test_a_cluster_without_workers_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     import distributed as dask
 
-    monkeypatch.setattr("spinscope.pipeline.evaluation.tasks.CLUSTER_WAIT_S", 0.1)
+    monkeypatch.setattr("spinscope.pipeline.evaluation.workers.CLUSTER_WAIT_S", 0.1)
     with (
         dask.LocalCluster(n_workers=0, processes=False, dashboard_address=None) as cluster,
         pytest.raises(ParameterError, match="has no workers"),
-        executor(cluster=cluster.scheduler_address),
+        task_workers(cluster=cluster.scheduler_address),
     ):
         pass
 
