@@ -214,7 +214,7 @@ def calibrate_outline(
     outlines: list[MeasuredOutline] = []
     for path, distance_m in zip(recordings, distances_m, strict=True):
         try:
-            session = Session.open(path, Choices(preset=camera, reading=reading))
+            session = Session.open(path, Choices(camera, ("track.outline_px=0",), reading=reading))
             if not session.states_focal_length:
                 raise RecordingError(f"nothing states the focal length: give --camera: {path}")
             shots = ShotLog.of(session.ticks(("track",), forget=STAGES.names)).shots
@@ -226,8 +226,7 @@ def calibrate_outline(
         shot, lens = max(shots, key=lambda shot: shot.t_us.size), session.camera
         x, y, _, _, radius = shot.state[shot.measured].T
         at = int(np.argmin(np.hypot(x - lens.principal_x_px, y - lens.principal_y_px)))
-        seen_px = float(radius[at]) + session.parameters.track.outline_px
-        outlines.append(MeasuredOutline(float(x[at]), float(y[at]), seen_px, distance_m))
+        outlines.append(MeasuredOutline(float(x[at]), float(y[at]), float(radius[at]), distance_m))
     if not outlines:
         raise RecordingError("; ".join(said))
     found = outline_offset(outlines, session.ball_radius_m, lens)

@@ -27,6 +27,8 @@ ON_OUTLINE_PX = 1.2
 # Behind, the ball's shading fires up to a fifth of the radius before the edge comes.
 EARLY_SHARE = 0.2
 SECTORS = 32
+# Where the motion passes an outline at a smaller |cos| than this, few events tell its place.
+GRAZING = 0.25
 # Events that vote for the velocity: a circle of them stands out among some 200 velocities.
 MOST_VOTERS = 120
 
@@ -112,7 +114,7 @@ def support(
 
     On the outline = within ON_OUTLINE_PX of it, and behind the centre up to EARLY_SHARE of the radius inside. The
     outline is cut into SECTORS, which count from two events on, from one where there are fewer than three a sector;
-    sectors that the motion passes at a grazing angle (|cos| < 0.25) yield few events and do not count.
+    sectors that the motion passes at a grazing angle (|cos| < GRAZING) yield few events and do not count.
 
     Returns
     -------
@@ -153,7 +155,7 @@ def support(
             continue
         in_view += 1
         across = (nx * circle[2] + ny * circle[3]) / speed
-        if abs(across) < 0.25:
+        if abs(across) < GRAZING:
             continue
         side = 0 if across > 0.0 else 1
         visible[side] += 1.0
@@ -170,6 +172,28 @@ def support(
             float(inside),
         ]
     )
+
+
+@njit(cache=True, nogil=True)
+def distance_behind(
+    circle: Floats, ellipticity: Floats, tau_s: Floats, x_px: Floats, y_px: Floats, on: Flags, bright: bool
+) -> float:
+    """Median distance in px from a moving outline, > 0 outside, of those events (n,) that its half behind gives.
+
+    They lie where the outline moves inwards, at no grazing angle, and are OFF if the disc is bright, else ON. NaN with
+    fewer than LEAST_EVENTS.
+    """
+    error = residuals(circle, ellipticity, tau_s, x_px, y_px)
+    behind = np.empty(tau_s.size)
+    m = 0
+    for i in range(tau_s.size):
+        dx = x_px[i] - (circle[0] + circle[2] * tau_s[i])
+        dy = y_px[i] - (circle[1] + circle[3] * tau_s[i])
+        across = dx * circle[2] + dy * circle[3]
+        if on[i] != bright and across < -GRAZING * math.hypot(dx, dy) * math.hypot(circle[2], circle[3]):
+            behind[m] = error[i]
+            m += 1
+    return float(np.partition(behind[:m], m // 2)[m // 2]) if m >= LEAST_EVENTS else np.nan
 
 
 @njit(cache=True, nogil=True)
@@ -199,7 +223,7 @@ def fit_outline(
     part: int,
     width_px: int,
     height_px: int,
-) -> tuple[Floats, Floats, float, Floats]:
+) -> tuple[Floats, Floats, float, Floats, float]:
     """Fit a part of the outline near an expected circle, and count what supports the fit.
 
     Parameters
@@ -221,9 +245,11 @@ def fit_outline(
         1 sigma of the residuals.
     support : (8,) float64
         See `support`.
+    distance_behind_px : float
+        See `distance_behind`; the disc is bright where more of the events ahead than of those behind are ON.
     """
     chosen = near_outline(expected, events, reference_us, gate_px, MOST_EVENTS, part)
-    nothing = np.full(5, np.nan), np.zeros((5, 5)), 0.0, np.zeros(8)
+    nothing = np.full(5, np.nan), np.zeros((5, 5)), 0.0, np.zeros(8), np.nan
     if chosen.size < LEAST_EVENTS:
         return nothing
     tau_s, x, y = relative_events(chosen, events, reference_us)
@@ -234,7 +260,9 @@ def fit_outline(
     around = near_outline(circle, events, reference_us, around_px, MOST_AROUND, WHOLE)
     tau_s, x, y = relative_events(around, events, reference_us)
     on = events[3][around]
-    return circle, covariance, scatter, support(circle, ellipticity, tau_s, x, y, on, width_px, height_px)
+    found = support(circle, ellipticity, tau_s, x, y, on, width_px, height_px)
+    behind_px = distance_behind(circle, ellipticity, tau_s, x, y, on, found[1] > found[2])
+    return circle, covariance, scatter, found, behind_px
 
 
 @njit(cache=True, nogil=True)

@@ -13,22 +13,22 @@ from ..camera import Camera
 from ..events import EventBatch
 from ..kernels import crossing
 from ..kernels.moving_circle import HALF_AHEAD
-from ..kernels.outline import ON_OUTLINE_PX
 from ..kernels.take_events import take_events
 from ..results import Circle, Packet
 from .track_contact import Contact
 from .track_kalman import OBSERVED, OBSERVED_BLOCK, BallFilter
 from .track_outline import FREE, LEAST_ARC, Edge, Sighting, measure
 from .track_path import PathPoint
-from .track_result import BeganBy
+from .track_result import BallTrack, BeganBy
 from .track_rolling import JUDGED_US, ROLLING_M_S, SLOWEST_FLIGHT_M_S, rolls
 
 Floats = NDArray[np.float64]
 
 # Share of the half outline ahead that a tracked ball must show to be measured: a third pins down its circle.
 LEAST_AHEAD = 0.3
-# Arcs of both halves lag behind the ball by so much more, 1 sigma: in low contrast the pixels answer late.
-ARCS_LAG_STD_PX = 0.5
+# Arcs of both halves lag behind the ball by so much more, 1 sigma: in low contrast the pixels answer late. They may be
+# arcs of the ball's shading: their radii are off by so much on white walls of our simulator (seeds 96000-96010).
+ARCS_LAG_STD_PX, ARCS_RADIUS_STD_PX = 0.5, 1.2
 # Squared Mahalanobis distance (three degrees of freedom) beyond which an outline is not the ball's: 5 sigma.
 MOST_SURPRISE = 25.0
 # Scatter of an outline's centre and radius from tick to tick beyond the statistical one, on the samples.
@@ -41,9 +41,13 @@ ARCS_COVARIANCE = 0.5**2 * np.eye(3)
 LATENCY_STD_US = 12.0
 PLACE_STD_PX, RADIUS_STD_PX = 0.06, 0.3
 COMMON_COVARIANCE = np.diag([PLACE_STD_PX**2, PLACE_STD_PX**2, 0.0, 0.0, RADIUS_STD_PX**2])
-# Events just outside a measured outline may be those of the ball's rim, before ground that hides most of it: the
-# outline is then one of the ball's shading. Those that count lie up to so far out (`kernels.outline.support`).
-OUTSIDE_PX = 4.0 * ON_OUTLINE_PX
+# Before ground about as bright as the ball's shaded rim, the events ahead are those of its shading further in. Those
+# behind still come at the rim, RIM_PX outside it: the ball reaches as far as they say. By radii on our simulator
+# (bright floors of seeds 96000-96002; grounds of albedo 0.1 to 0.55 under blur of 0.3 to 0.9 px, thresholds of 0.18 to
+# 0.5 and slow pixels of seeds 98000-98027), what the outline lacks is 0.5 to 2.7 px and so known to 0.1 to 0.6 px. It
+# may be nothing at all where thresholds of OFF are twice those of ON: hence RIM_ERROR of it as 1 sigma. So much
+# off is the centre as well, by 0.3 to 0.9 px: the shading is not in the ball's middle, and moves on it with the view.
+RIM_PX, RIM_ERROR = 0.1, 0.5
 # A velocity from one outline is wrong by what the ball accelerates within its window; the paper: high enough to
 # converge fast.
 FIRST_SPEED_STD_M_S = 0.2
@@ -124,8 +128,12 @@ class TrackedBall:
         Whether it is taken for a flight: until it is seen to roll, or to be another's shadow.
     doubt : str, optional
         What speaks against one free flight so far, in words for people.
-    contrast, clutter : float
+    contrast : float
         Of its outline when it was last measured (see `Sighting`).
+    behind_px : float
+        How far outside its outline the events behind lie, on average over the outlines wholly in view.
+    outlines : int
+        Number of these.
     part : int
         Part of the outline that it is measured by.
     """
@@ -140,7 +148,8 @@ class TrackedBall:
     is_shot: bool = True
     doubt: str | None = None
     contrast: float = 0.0
-    clutter: float = 0.0
+    behind_px: float = -math.inf
+    outlines: int = 0
     part: int = HALF_AHEAD
 
     @classmethod
@@ -157,7 +166,16 @@ class TrackedBall:
         state = contact.path.state(first_us)
         new = measuring.filter_at(state, FIRST_COVARIANCE)
         return TrackedBall(
-            shot, contact.latest_us, contact.kind, new, first_us, state, contrast=self.contrast, part=self.part
+            shot,
+            contact.latest_us,
+            contact.kind,
+            new,
+            first_us,
+            state,
+            contrast=self.contrast,
+            behind_px=self.behind_px,
+            outlines=self.outlines,
+            part=self.part,
         )
 
     def extended(self, path: list[PathPoint], start_us: int, state: Floats, measuring: Measuring) -> TrackedBall:
@@ -311,8 +329,27 @@ class TrackedBall:
         if self.part != HALF_AHEAD:
             lag = velocity / np.hypot(*velocity) * ARCS_LAG_STD_PX
             covariance[:2, :2] += lag[:, None] * lag
-        covariance[4, 4] += (OUTSIDE_PX * self.clutter / (1.0 + self.clutter)) ** 2
+            covariance[4, 4] += ARCS_RADIUS_STD_PX**2
         return covariance
+
+    def track(self, end_us: int, latency_us: float, outline_px: float, earlier: tuple[BallTrack, ...]) -> BallTrack:
+        """Its present state, that of the whole ball where the outline is one of its shading."""
+        rim_px = max(self.behind_px - RIM_PX + outline_px, 0.0)
+        covariance, circle = self.total_covariance(), self.measured
+        covariance[OBSERVED, OBSERVED] += (RIM_ERROR * rim_px) ** 2
+        return BallTrack(
+            self.shot,
+            end_us - latency_us,
+            latency_us,
+            self.filter.mean + np.array([0.0, 0.0, 0.0, 0.0, rim_px]),
+            covariance,
+            None if circle is None else replace(circle, radius_px=circle.radius_px + rim_px),
+            self.start_us,
+            self.began_by,
+            self.is_shot,
+            earlier,
+            self.doubt,
+        )
 
     def _noise(self, measuring: Measuring, sighting: Sighting, start_us: int, end_us: int) -> Floats:
         # Outlines taken further back than one tick share events with the tick before and so count for less.
@@ -323,7 +360,12 @@ class TrackedBall:
 
     def _see(self, measuring: Measuring, sighting: Sighting, noise: Floats, end_us: int) -> None:
         self.seen_us, self.seen = end_us, self.filter.mean
-        self.contrast, self.clutter, self.part = sighting.contrast, sighting.clutter, sighting.part
+        self.contrast, self.part = sighting.contrast, sighting.part
+        whole = sighting.part == HALF_AHEAD and sighting.visible == 1.0
+        if whole and not math.isnan(sighting.behind_px):
+            before_px = self.behind_px if self.outlines else sighting.behind_px
+            self.outlines += 1
+            self.behind_px = before_px + (sighting.behind_px - before_px) / self.outlines
         hidden = HIDDEN_ERROR * (1.0 - sighting.visible) * sighting.ring[4]
         self._add(PathPoint(end_us, measuring.circle(sighting), noise + hidden**2 * np.eye(3)))
 

@@ -83,6 +83,8 @@ class Sighting:
         Share of the outline that is in the image.
     clutter : float
         Events just outside the outline, for each one on it.
+    behind_px : float
+        How far outside the outline the events behind lie, px: see `kernels.outline.distance_behind`.
     part : int
         Part of the outline that was fitted, see `kernels.moving_circle.near_outline`.
     """
@@ -97,6 +99,7 @@ class Sighting:
     ahead_on: float
     visible: float
     clutter: float
+    behind_px: float = math.nan
     part: int = HALF_AHEAD
 
     @property
@@ -203,7 +206,7 @@ def measure(
     part : int
         Part of the outline that is fitted, see `kernels.moving_circle.near_outline`.
     """
-    ring, covariance, scatter, found = kernels.fit_outline(
+    ring, covariance, scatter, found, behind_px = kernels.fit_outline(
         expected,
         prior_std,
         oval_of(camera, expected[0], expected[1]),
@@ -228,6 +231,7 @@ def measure(
         ahead_on,
         visible,
         outside / max(events_on, 1.0),
+        behind_px,
         part,
     )
 

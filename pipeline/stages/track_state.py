@@ -53,19 +53,7 @@ def ball_track(
     parameters: TrackParameters, ball: TrackedBall, end_us: int, earlier: tuple[BallTrack, ...] = ()
 ) -> BallTrack:
     """The ball's present state."""
-    return BallTrack(
-        ball.shot,
-        end_us - parameters.latency_us,
-        parameters.latency_us,
-        ball.filter.mean,
-        ball.total_covariance(),
-        ball.measured,
-        ball.start_us,
-        ball.began_by,
-        ball.is_shot,
-        earlier,
-        ball.doubt,
-    )
+    return ball.track(end_us, parameters.latency_us, parameters.outline_px, earlier)
 
 
 def is_beyond(mean: NDArray[np.float64], camera: Camera) -> bool:

@@ -193,6 +193,23 @@ def support(
     )
 
 
+def distance_behind(
+    circle: Floats,
+    ellipticity: Floats,
+    tau_s: Floats,
+    x_px: Floats,
+    y_px: Floats,
+    on: NDArray[np.bool_],
+    bright: bool,
+    least: int,
+) -> float:
+    """Upper median of the distances of the events of the other polarity, 105 degrees and more from the motion."""
+    dx, dy = from_centre(circle, tau_s, x_px, y_px)
+    angle = np.arctan2(dy, dx) - math.atan2(circle[3], circle[2])
+    error = residuals(circle, ellipticity, tau_s, x_px, y_px)[(on != bright) & (np.cos(angle) < -0.25)]
+    return math.nan if error.size < least else float(np.sort(error)[error.size // 2])
+
+
 def outside_circles(circles: Floats, tau_s: Floats, x_px: Floats, y_px: Floats, margins_px: Floats) -> Ints:
     """Indices of the events farther out than every circle and its margin."""
     outside = [

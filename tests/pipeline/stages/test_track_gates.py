@@ -16,6 +16,7 @@ from spinscope.pipeline.stages.track_ball import TrackedBall
 from spinscope.pipeline.stages.track_kalman import BallFilter
 from spinscope.pipeline.stages.track_outline import Sighting
 from spinscope.pipeline.stages.track_parameters import TrackParameters
+from spinscope.pipeline.stages.track_result import BallTrack
 from spinscope.pipeline.stages.track_search import agree
 from tests.track_runs import PAPER_CONTEXT
 
@@ -270,19 +271,36 @@ def test_an_outline_cut_by_the_border_counts_less_in_the_path(monkeypatch: pytes
 
 
 def test_the_stated_error_holds_what_no_filtering_takes_away() -> None:
-    """12 us of latency along the flight, 0.06 px of place and 0.3 px of radius, beside the filter's own.
-
-    And where events lie outside the outline, it may be one of the ball's shading: the rim is up to 4.8 px farther out.
-    """
+    """12 us of latency along the flight, 0.06 px of place and 0.3 px of radius, beside the filter's own."""
     late_px = np.array([3000.0, -4000.0]) * 12e-6
     expected = SPREAD + np.diag([0.06**2, 0.06**2, 0.0, 0.0, 0.3**2])
     expected[:2, :2] += np.outer(late_px, late_px)
-    ball = dataclasses.replace(tracked_ball(), filter=ball_filter(), clutter=0.0)
-    np.testing.assert_allclose(ball.total_covariance(), expected, rtol=1e-12)
-    ball.clutter = 3.0
-    expected[4, 4] += (0.75 * 4.8) ** 2
+    ball = dataclasses.replace(tracked_ball(), filter=ball_filter())
     np.testing.assert_allclose(ball.total_covariance(), expected, rtol=1e-12)
     np.testing.assert_array_equal(ball.filter.covariance, SPREAD)
+
+
+def test_a_ball_reaches_as_far_as_the_events_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Less 0.1 px, on average over the outlines wholly in view; arcs, fitted to both halves, say nothing of it."""
+
+    def state(behind_px: float, **changes: object) -> BallTrack:
+        _, ball, _ = updated(monkeypatch, sighting(behind_px=behind_px, **changes))
+        return ball.track(20_000, 40.0, 0.5, ())
+
+    usual, bright = state(-0.7), state(0.8)
+    rim_px = 0.8 - 0.1 + 0.5
+    np.testing.assert_allclose(bright.mean - usual.mean, [0.0, 0.0, 0.0, 0.0, rim_px], atol=1e-9)
+    assert usual.measured is not None and bright.measured is not None
+    assert bright.measured.radius_px - usual.measured.radius_px == pytest.approx(rim_px)
+    spread = np.diag([1.0, 1.0, 0.0, 0.0, 1.0]) * (0.5 * rim_px) ** 2
+    np.testing.assert_allclose(bright.covariance - usual.covariance, spread, atol=1e-9)
+    for other in (state(math.nan), state(0.8, part=OF_DARK), state(0.8, visible=0.9)):
+        assert other.mean[4] == usual.mean[4]
+    ball = tracked_ball()
+    for behind_px in (0.2, math.nan, 0.6):
+        monkeypatch.setattr(track_ball, "measure", lambda *_, behind_px=behind_px: sighting(behind_px=behind_px))
+        ball.measure(MEASURING, EventBatch.empty(), 15_000, 20_000)
+    assert ball.behind_px == pytest.approx(0.4)
 
 
 @pytest.mark.parametrize("axis", [0, 1])
