@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .cameras import ArrivedTick, EventCamera, EventStream
+from .cameras import ArrivedTick, EventCamera, EventStream, Notice
 from .cameras.clock import now_s
 from .chain import Chain
 from .errors import CameraError, ParameterError
@@ -138,7 +138,7 @@ class LiveRun:
 
     def __init__(
         self,
-        stream: Callable[[int, Callable[[str], None]], EventStream],
+        stream: Callable[[int, Notice], EventStream],
         parameters: Parameters,
         method: str = "all",
         *,
@@ -146,7 +146,7 @@ class LiveRun:
         on_tick: Callable[[ArrivedTick, Tick, float], None] | None = None,
     ) -> None:
         self._outputs: queue.SimpleQueue[LiveOutput | BaseException | None] = queue.SimpleQueue()
-        self.stream = stream(parameters.track.tick_us, lambda text: self._outputs.put(LiveNotice(text)))
+        self.stream = stream(parameters.track.tick_us, lambda kind, text: self._outputs.put(LiveNotice(kind, text)))
         self.parameters = parameters
         self._with_balls, self._on_tick = with_balls, on_tick
         spin_run = SpinRun(method_targets(method), with_balls, self.stream.width_px, self.stream.height_px)

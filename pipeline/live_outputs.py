@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from .camera import Camera
+from .cameras import NoticeKind
 from .shots import Shot
 from .spin_so_far import SpinSoFar
 from .stages.track_result import BallTrack, EndedBy
@@ -139,8 +140,9 @@ class LiveStatus:
 
 @dataclass(frozen=True, slots=True)
 class LiveNotice:
-    """Sentence for people about the camera or the work."""
+    """Incident of the camera or the work: its kind, and a sentence for people."""
 
+    kind: NoticeKind
     text: str
 
     def to_dict(self) -> dict[str, Any]:

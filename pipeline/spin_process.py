@@ -188,10 +188,12 @@ class SpinProcess:
             raise SpinscopeError(f"{ended} {MOST_ENDS} times without an answer: please report this")
         ticks = sum(isinstance(one.message, TrackedTick) and one.number < self._next for one in self._kept)
         if self._ends == 1:
-            self._put(LiveNotice(f"{ended}: another one works on the last {ticks} ticks again"))
+            self._put(LiveNotice("spins", f"{ended}: another one works on the last {ticks} ticks again"))
         else:
             self._forget(self._next)
-            self._put(LiveNotice(f"{ended} again over the same events: the spins of {ticks} ticks are left out"))
+            self._put(
+                LiveNotice("spins", f"{ended} again over the same events: the spins of {ticks} ticks are left out")
+            )
         self._next = self._done = self._kept[0].number if self._kept else self._next
         self._flying = sum(_has_ball(one.message) for one in self._kept)
         self._process = self._begun()

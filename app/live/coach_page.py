@@ -23,6 +23,7 @@ from ..coach.session_analysis import SessionAnalysis
 from ..coach.session_folders import other_sessions
 from ..coach.shot_record import RecordingShots, live_record
 from ..web.coach_application import CoachState
+from ..web.coach_schemas import CameraNotice
 from ..web.server import serve_coach
 from .camera_thread import CameraObserver, CameraThread
 from .headless import OpenLive, Outputs, run_headless
@@ -55,11 +56,11 @@ class LiveSession(CameraObserver):
         super().__init__()
         self.has_begun = threading.Event()
         self._session, self._version = session, program_version()
-        self._notice: str | None = None
+        self._notice: CameraNotice | None = None
         self._ball_s = -math.inf  # when a ball was last in flight
 
-    def notice(self) -> str | None:
-        """Words on what happened to the camera since the last shot; None where nothing did."""
+    def notice(self) -> CameraNotice | None:
+        """Last thing that happened to the camera since the last shot; None where nothing did."""
         return self._notice
 
     def begin(self, live: OpenLive) -> None:
@@ -79,7 +80,7 @@ class LiveSession(CameraObserver):
     def add_output(self, output: LiveOutput, row: ResultRow | None) -> None:
         """Take a result; raises RecordingError when the session cannot be written."""
         if isinstance(output, LiveNotice):
-            self._notice = output.text
+            self._notice = CameraNotice(kind=output.kind, text=output.text)
         if not isinstance(output, LiveShot) or row is None or row["events_file"] is None:
             return
         self._notice = None
@@ -93,7 +94,7 @@ class LiveSession(CameraObserver):
 
     def end(self, error: Exception | None) -> None:
         """Take note that the run has ended."""
-        self._notice = "the camera has ended" if error is None else str(error)
+        self._notice = CameraNotice(kind="ended", text="the camera has ended" if error is None else str(error))
         self.has_begun.set()
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from spinscope.pipeline.cameras import ArrivedTick, EventCamera, EventStream, RecentEvents
+from spinscope.pipeline.cameras import ArrivedTick, EventCamera, EventStream, Notice, RecentEvents
 from spinscope.pipeline.cameras.event_stream import Sink
 from spinscope.pipeline.live import LiveRun, load_kernels
 from spinscope.pipeline.live_outputs import LiveBall, LiveNotice, LiveOutput, LiveShot, LiveSpin
@@ -139,7 +139,7 @@ def run_headless(
         recording: CameraRecording
         sweep: CameraSweep | None = None
 
-        def stream(tick_us: int, on_notice: Callable[[str], None]) -> EventStream:
+        def stream(tick_us: int, on_notice: Notice) -> EventStream:
             nonlocal recording
             folder = Path.cwd() if to.record is None else to.record.path.parent
             recording = CameraRecording(camera, session, folder, on_notice)

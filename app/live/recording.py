@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -13,7 +12,7 @@ from typing import Any
 import tomli_w
 
 from spinscope.pipeline.biases import BiasParameters
-from spinscope.pipeline.cameras import EventCamera, Recorder
+from spinscope.pipeline.cameras import EventCamera, Notice, Recorder
 from spinscope.pipeline.errors import ParameterError, RecordingError, SpinscopeError
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.live import raw_file
@@ -40,7 +39,7 @@ class RecordChoice:
     most_s: float | None = None
 
 
-def recorder(chosen: RecordChoice, camera: EventCamera, session: Session, on_notice: Callable[[str], None]) -> Recorder:
+def recorder(chosen: RecordChoice, camera: EventCamera, session: Session, on_notice: Notice) -> Recorder:
     """A recorder of the camera; raises SpinscopeError when the first file cannot be created."""
     if chosen.path.suffix.lower() != ".raw":
         raise ParameterError(f"a camera is recorded as RAW: give a name that ends with .raw instead of {chosen.path}")
@@ -72,10 +71,10 @@ class CameraRecording:
     folder : Path
         Where recordings go that nobody named.
     on_notice : callable
-        Told in words why a recording ended early.
+        Told why a recording ended early.
     """
 
-    def __init__(self, camera: EventCamera, session: Session, folder: Path, on_notice: Callable[[str], None]) -> None:
+    def __init__(self, camera: EventCamera, session: Session, folder: Path, on_notice: Notice) -> None:
         self._camera, self._session, self._folder, self._on_notice = camera, session, folder, on_notice
         self._recorder: Recorder | None = None
         self._lock = threading.Lock()  # of beginnings and ends

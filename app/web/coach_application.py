@@ -29,6 +29,7 @@ from spinscope.pipeline.session import Choices
 
 from .coach_schemas import (
     AnalysisState,
+    CameraNotice,
     CoachShot,
     Kept,
     Landings,
@@ -68,14 +69,14 @@ class CoachState:
     analyses : sequence of SessionAnalysis
         Started with the server.
     camera_notice : callable
-        Words on what happened to a running camera; None where nothing did.
+        What happened to a running camera last; None where nothing did.
     """
 
     def __init__(
         self,
         sessions: Sequence[ShotSession],
         analyses: Sequence[SessionAnalysis] = (),
-        camera_notice: Callable[[], str | None] = lambda: None,
+        camera_notice: Callable[[], CameraNotice | None] = lambda: None,
     ) -> None:
         self.camera_notice = camera_notice
         self.sessions: dict[str, ShotSession] = {}
@@ -305,7 +306,7 @@ def coach_shot(session: str, row: Row) -> CoachShot:
 async def _revisions(state: CoachState, session: ShotSession) -> AsyncIterator[str]:
     """Server-sent events: the revision, whenever it or the work in the background has changed."""
     yield "retry: 500\n\n"
-    told: tuple[int, AnalysisProgress, str | None] | None = None
+    told: tuple[int, AnalysisProgress, CameraNotice | None] | None = None
     while not state.is_closed:
         present = (await asyncio.to_thread(lambda: session.revision), state.progress(session), state.camera_notice())
         if present != told:

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from spinscope.app.coach.flight_path import FlightPath
 from spinscope.app.coach.statistics import SeriesStatistics
+from spinscope.pipeline.cameras import NoticeKind
 
 from .schemas import Request, Response
 
@@ -89,6 +90,13 @@ class CoachShot(Response):
     corkscrew_share: float | None
 
 
+class CameraNotice(Response):
+    """Incident of a running camera: its kind, of which the page has the words (`camera_...`), and details."""
+
+    kind: NoticeKind | Literal["ended"]
+    text: str
+
+
 class AnalysisState(Response):
     """Work in the background: recordings done of all, those that cannot be read, and what happened to a camera."""
 
@@ -96,7 +104,7 @@ class AnalysisState(Response):
     done: int
     is_working: bool
     failures: dict[str, str]
-    camera_notice: str | None
+    camera_notice: CameraNotice | None
 
 
 class SessionShots(Response):

@@ -13,6 +13,8 @@ from .event_camera import ListedCamera as ListedCamera
 from .event_camera import open_camera as open_camera
 from .event_stream import ArrivedTick as ArrivedTick
 from .event_stream import EventStream as EventStream
+from .event_stream import Notice as Notice
+from .event_stream import NoticeKind as NoticeKind
 from .recent_events import RecentEvents as RecentEvents
 from .recorder import Recorder as Recorder
 from .replay import FAULTS as FAULTS

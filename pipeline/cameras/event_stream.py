@@ -6,6 +6,7 @@ import queue
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -22,7 +23,8 @@ RETRY_S = 0.5  # between two attempts to open a camera that was unplugged
 LARGEST_JUMP_US = 60_000_000
 
 Sink = Callable[[int, EventBatch], None]  # number of the clock and events, from the reading thread
-Notice = Callable[[str], None]
+NoticeKind = Literal["unplugged", "back", "clock", "behind", "biases", "recording", "spins"]
+Notice = Callable[[NoticeKind, str], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,7 +88,7 @@ class EventStream:
     sinks : sequence of callable
         `sink(clock, events)` gets all events as they come, in the reading thread: it must not wait.
     on_notice : callable
-        Told in words what happens to the camera.
+        Told what kind of thing happens to the camera, and in words.
     """
 
     def __init__(
@@ -96,7 +98,7 @@ class EventStream:
         *,
         reopen: Callable[[], EventCamera] | None = None,
         sinks: tuple[Sink, ...] = (),
-        on_notice: Notice = lambda text: None,
+        on_notice: Notice = lambda kind, text: None,
     ) -> None:
         self.width_px, self.height_px = camera.width_px, camera.height_px
         self.counts = StreamCounts()
@@ -176,12 +178,12 @@ class EventStream:
             try:
                 self._camera.set_biases(self._commands.get())
             except CameraError as error:
-                self._on_notice(str(error))
+                self._on_notice("biases", str(error))
 
     def _wait_for_return(self, error: CameraError) -> None:
         """Open the camera anew as soon as it is back."""
         assert self._reopen is not None
-        self._on_notice(f"{error}; waiting for it")
+        self._on_notice("unplugged", f"{error}; waiting for it")
         self._next_clock()
         self._camera.close()
         while not self._stop.wait(RETRY_S):
@@ -189,7 +191,7 @@ class EventStream:
                 self._camera = self._reopen()
             except CameraError:
                 continue
-            self._on_notice("the camera is back")
+            self._on_notice("back", "the camera is back")
             return
 
     def _take(self, packet: CameraPacket) -> None:
@@ -197,7 +199,8 @@ class EventStream:
         came_s, counts, events = now_s(), self.counts, packet.events
         if self._end_us is not None and not 0 <= packet.end_us - self._end_us <= LARGEST_JUMP_US:
             self._on_notice(
-                f"the camera's clock went from {self._end_us} to {packet.end_us} us: a shot in flight ends here"
+                "clock",
+                f"the camera's clock went from {self._end_us} to {packet.end_us} us: a shot in flight ends here",
             )
             self._next_clock()
         counts.dropped += packet.dropped
@@ -233,7 +236,7 @@ class EventStream:
         is_behind = not self._camera.can_wait and self.waiting > self._most_waiting
         if is_behind or (self._skipping and self.waiting):
             if not self._skipping:
-                self._on_notice("the work cannot keep up: events are left out of it until it has caught up")
+                self._on_notice("behind", "the work cannot keep up: events are left out of it until it has caught up")
                 self._segment += 1  # what follows the gap
             self._skipping = True
             self.counts.skipped += 1

@@ -13,6 +13,7 @@ from typing import Protocol
 from ..errors import RecordingError
 from ..events import EventBatch
 from .clock import now_s
+from .event_stream import Notice
 
 TO_DISK_S = 0.5  # between two times that a file is made safe against a power cut; the system has it at once
 WAITING_BYTES = 1 << 29  # events that may wait for a slow disk: 13 bytes each, 10 s at 4 Mev/s
@@ -52,7 +53,7 @@ class Recorder:
     most_bytes, most_us : int, optional
         Largest file, and longest.
     on_notice : callable
-        Told in words why the recording ended early, as when the disk is full; live goes on.
+        Told why the recording ended early, as when the disk is full (`EventStream`); live goes on.
 
     Attributes
     ----------
@@ -75,7 +76,7 @@ class Recorder:
         beside: Mapping[str, str] | None = None,
         most_bytes: int | None = None,
         most_us: int | None = None,
-        on_notice: Callable[[str], None] = lambda text: None,
+        on_notice: Notice = lambda kind, text: None,
     ) -> None:
         self.path, self.files, self.events, self.markers = path, list[Path](), 0, 0
         self._open_file, self._beside, self._on_notice = open_file, dict(beside or {}), on_notice
@@ -177,7 +178,7 @@ class Recorder:
         """End the recording with what is in its files."""
         why = getattr(error, "strerror", None) or str(error)
         self._has_failed = True
-        self._on_notice(f"recording ended ({why}), live goes on; what was recorded is in {self.files[-1]}")
+        self._on_notice("recording", f"recording ended ({why}), live goes on; what was recorded is in {self.files[-1]}")
         file, self._file = self._file, None
         try:
             if file is not None:

@@ -167,7 +167,10 @@ def _check_view(live: CameraView, bounce: Session) -> None:
 def test_a_recording_begins_and_ends_while_the_camera_runs(bounce: Session, tmp_path: Path) -> None:
     """With another clock than the first, and markers of the moment in which they were thought of."""
     camera: Any = SimpleNamespace(width_px=1280, height_px=720, name="stand-in", serial="7", biases={})
-    recording, events = CameraRecording(camera, bounce, tmp_path, print), bounce.source.between(0, 10**9)
+    recording, events = (
+        CameraRecording(camera, bounce, tmp_path, lambda kind, text: pytest.fail(text)),
+        bounce.source.between(0, 10**9),
+    )
     with pytest.raises(RecordingError, match="nothing is recorded"):
         recording.mark("too early")
     recording(0, events)

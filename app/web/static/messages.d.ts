@@ -1,6 +1,6 @@
 // Generated from app/web/schemas.py by `python -m tests.app.web.message_types`: do not edit.
 /** Work in the background: recordings done of all, those that cannot be read, and what happened to a camera. */
-export type AnalysisState = { total: number; done: number; is_working: boolean; failures: Record<string, string>; camera_notice: string | null };
+export type AnalysisState = { total: number; done: number; is_working: boolean; failures: Record<string, string>; camera_notice: CameraNotice | null };
 /** Declaration of one bias. */
 export type BiasRange = { low: number; high: number; default: number; help: string };
 /** Biases to simulate the scene with, or to write to a file. */
@@ -21,6 +21,8 @@ export type BiasText = { text: string };
 export type BiasValues = { biases: Record<string, number> };
 /** Progress of a re-simulation. */
 export type BiasesMessage = { kind: "biases"; state: "running" | "done" | "cancelled" | "failed"; error: string | null; content: Resimulation | null };
+/** Incident of a running camera: its kind, of which the page has the words (`camera_...`), and details. */
+export type CameraNotice = { kind: "unplugged" | "back" | "clock" | "behind" | "biases" | "recording" | "spins" | "ended"; text: string };
 /** Cancel the job of a kind. */
 export type CancelRequest = { kind: "sweep" | "optimization" | "biases" | "bias_sweep" };
 /** Anything that the page offers by name. */

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 from click.testing import CliRunner
 
 from spinscope.app.cli import cli
 from spinscope.app.coach.session import ShotSession
+from spinscope.app.coach.texts import texts
 from spinscope.app.web.coach_application import CoachState
+from spinscope.pipeline.cameras import NoticeKind
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.session import Session
 
@@ -40,7 +42,14 @@ def test_shots_stand_in_the_session_before_they_are_analyzed_again_and_keep_thei
     done = CliRunner().invoke(cli, ["coach", "live", *options, "--no-browser"])
     assert done.exit_code == 0, done.output
     ((session, first, analyzed, notice, page),) = asked
-    assert notice == "the camera has ended" and page["place"] == "live"
+    assert notice.kind == "ended" and page["place"] == "live"
+    kinds = (*get_args(NoticeKind), "ended")
+    assert {
+        language: [kind for kind in kinds if f"camera_{kind}" not in words] for language, words in texts().items()
+    } == {
+        "en": [],
+        "de": [],
+    }
     truth = Session.open(recording).estimate().shots
     assert [one["end_us"] for one in first] == [shot.end_us for shot in truth]
     assert [one["spin_rps"] for one in first] == [

@@ -77,7 +77,7 @@ def test_a_tick_waits_for_events_of_its_last_microsecond() -> None:
 def test_a_clock_that_steps_back_begins_another_segment() -> None:
     notices: list[str] = []
     given = [*packets(EVENTS), CameraPacket(at(10, 20), 20), CameraPacket(at(1500), 1500)]
-    ticks, stream = ticks_of(ListedPackets(given), on_notice=notices.append)
+    ticks, stream = ticks_of(ListedPackets(given), on_notice=lambda kind, text: notices.append(text))
     assert [one.segment for one in ticks] == [0] * 8 + [1, 1]
     assert [one.clock for one in ticks] == [0] * 8 + [1, 1]
     assert ticks[7].packet.end_us == 7002 and ticks[8].packet.index == 0
@@ -89,7 +89,7 @@ def test_an_unplugged_camera_is_waited_for() -> None:
     unplugged, notices = CameraError("toy 1: the camera was unplugged"), []
     first = ListedPackets([CameraPacket(at(100), 100), unplugged])
     second = ListedPackets([CameraPacket(at(50), 50)])
-    ticks, _ = ticks_of(first, reopen=lambda: second, on_notice=notices.append)
+    ticks, _ = ticks_of(first, reopen=lambda: second, on_notice=lambda kind, text: notices.append(text))
     assert [(one.clock, one.packet.events.t_us.tolist()) for one in ticks] == [(0, [100]), (1, [50])]
     assert first.closed == second.closed == 1
     assert "unplugged; waiting" in notices[0] and "is back" in notices[1]
@@ -119,7 +119,7 @@ def test_work_that_cannot_keep_up_misses_ticks_but_sinks_do_not() -> None:
         ListedPackets(given),
         TICK_US,
         sinks=(lambda clock, events: recorded.extend(events.t_us),),
-        on_notice=notices.append,
+        on_notice=lambda kind, text: notices.append(text),
     )
     stream.start()
     stream.join()  # nobody takes a tick meanwhile
@@ -147,7 +147,7 @@ def test_when_the_work_has_caught_up_another_segment_begins() -> None:
 def test_biases_are_set_by_the_reading_thread() -> None:
     notices: list[str] = []
     camera = ListedPackets([CameraPacket(at(100), 100)])
-    stream = EventStream(camera, TICK_US, on_notice=notices.append)
+    stream = EventStream(camera, TICK_US, on_notice=lambda kind, text: notices.append(text))
     stream.set_biases({"diff_on": 5})
     stream.set_biases({"diff_on": 11})
     stream.set_biases({"diff": 0})

@@ -80,7 +80,7 @@ def test_a_file_opens_from_the_moment_it_is_there(tmp_path: Path) -> None:
 
 def test_a_full_disk_is_said_and_ends_the_recording_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     notices: list[str] = []
-    writing = recorder(tmp_path / "a.raw", on_notice=notices.append)
+    writing = recorder(tmp_path / "a.raw", on_notice=lambda kind, text: notices.append(text))
     batches = [some(start_us) for start_us in range(0, 10_000, 1000)]
     file = writing._file
     assert file is not None

@@ -169,7 +169,11 @@ class Page {
         ),
       )
       : null;
-    const camera = analysis.camera_notice && element("span.failures", { role: "status" }, analysis.camera_notice);
+    const camera = analysis.camera_notice && element(
+      "span.failures",
+      { role: "status", title: analysis.camera_notice.text },
+      text(`camera_${analysis.camera_notice.kind}`),
+    );
     const working = analysis.is_working
       ? element(
         "span.working",
