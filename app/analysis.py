@@ -12,6 +12,7 @@ import numpy as np
 
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.flight_calibration import estimate_with_measured_up
+from spinscope.pipeline.recordings import Recording
 from spinscope.pipeline.session import Choices, Progress, Result, Session
 
 # The fastest hit measured is 116 km/h, 32 m/s (L. Budner, 2016); speeds of a few ticks are known to 10 %.
@@ -23,7 +24,18 @@ def analyzed(path: Path, choices: Choices, method: str = "all", on_progress: Pro
 
     See `analyzed_session`.
     """
-    return analyzed_session(Session.open(path, choices, on_progress), method, on_progress)
+    return analyzed_session(_opened(path, choices, on_progress), method, on_progress)
+
+
+def _opened(path: Path, choices: Choices, on_progress: Progress | None) -> Session:
+    """Open a recording; raises SpinscopeError, also for times that no camera sends in the unit assumed for them.
+
+    Their analysis would take a thousand times as long and find nothing.
+    """
+    session = Session.open(path, choices, on_progress)
+    if isinstance(session.recording, Recording) and session.recording.time_doubt:
+        raise RecordingError(f"{session.recording.time_doubt}: {path}")
+    return session
 
 
 def analyzed_session(session: Session, method: str = "all", on_progress: Progress | None = None) -> Result:
@@ -109,7 +121,7 @@ def report_on(
         Whether this is the process's first; loading the kernels is then told apart from the work itself.
     """
     begin = time.perf_counter()
-    session = Session.open(path, choices, on_progress)
+    session = _opened(path, choices, on_progress)
     if on_open:
         on_open(session)
     load_seconds = session.load_kernels(method) if cold else 0.0

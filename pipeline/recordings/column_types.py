@@ -91,6 +91,8 @@ class ColumnTypes:
     ----------
     warnings : list of str
         What was assumed, and what is implausible about it.
+    time_doubt : str
+        As of `FormatReader`.
     """
 
     def __init__(
@@ -107,6 +109,7 @@ class ColumnTypes:
         """
         self.path = path
         self.warnings: list[str] = []
+        self.time_doubt = ""
         check_unit(options.time_unit)
         finite = sampled_times[np.isfinite(sampled_times)] if sampled_times.dtype.kind == "f" else sampled_times
         self.unit = options.time_unit or stated or "us"
@@ -118,7 +121,9 @@ class ColumnTypes:
             self.warnings.append(f"times are floating-point numbers without a unit: taken as {why}")
         if finite.size:
             warning = rate_warning(self.unit, events, float(np.ptp(finite)))
-            if warning is None and not stated and sampled_times.dtype.kind in "iu":
+            if warning and not stated:
+                self.time_doubt = f"{warning}, or --time-unit {self.unit} if that is right"
+            elif warning is None and not stated and sampled_times.dtype.kind in "iu":
                 warning = resolution_warning(sampled_times)
             self.warnings += [warning] if warning else []
 

@@ -16,7 +16,10 @@ from .reader import CameraFrame, Damage, FormatReader, Place, ReadingOptions, Re
 ReaderOpener = Callable[[Path, ReadingOptions], FormatReader]
 
 # What a reader says of its file once it is open.
-STATEMENTS = ("format", "strict_order", "seeks", "takes", "attributes", "warnings", "stated", "t_offset_us", "events")
+STATEMENTS = (
+    "format", "strict_order", "seeks", "takes", "attributes", "warnings", "time_doubt", "stated", "t_offset_us",
+    "events",
+)  # fmt: skip
 
 
 class IsolatedReader(FormatReader):

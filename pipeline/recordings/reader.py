@@ -217,6 +217,9 @@ class FormatReader(ABC):
         Root attributes or header lines.
     warnings : list of str
         Assumptions made on opening.
+    time_doubt : str
+        Why the times cannot be in the unit assumed, with the options that state one; empty without doubt, and where
+        file or user state the unit.
     stated : Resolution or None
         Size of the sensor where the file states it.
     t_offset_us, events : int or None
@@ -232,6 +235,7 @@ class FormatReader(ABC):
         self.path, self.options = path, options
         self.attributes: dict[str, str | float] = {}
         self.warnings: list[str] = []
+        self.time_doubt = ""
         self.stated: Resolution | None = None
         self.t_offset_us: int | None = None
         self.events: int | None = None

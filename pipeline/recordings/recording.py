@@ -87,6 +87,8 @@ class Recording:
         Origin of this size: "file", "command line", "system_ID 49" or "guess".
     attributes : dict of str to str or float
         Root attributes or header lines of the file; `camera.focal_length_mm` and the like among them.
+    time_doubt : str
+        As of `FormatReader`.
     seeks : bool
         Whether reading can begin anywhere in the file, once there is an index.
     t_offset_us : int or None
@@ -107,7 +109,7 @@ class Recording:
         self._sensor = self._chosen_sensor(on_progress)
         self.width_px, self.height_px = self._sensor.width_px, self._sensor.height_px
         self.sensor_from = self._sensor.origin
-        self.attributes = dict(reader.attributes)
+        self.attributes, self.time_doubt = dict(reader.attributes), reader.time_doubt
         self.t_offset_us, self.events = reader.t_offset_us, reader.events
 
     def __repr__(self) -> str:

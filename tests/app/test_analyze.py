@@ -18,10 +18,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from spinscope.app.analysis import implausible_speed
+from spinscope.app.analysis import analyzed, implausible_speed, report_on
 from spinscope.app.cli import cli
 from spinscope.app.commands.analyze import PrintedRecording, print_shots
 from spinscope.pipeline import calibrate_flights, estimate
+from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.flight_calibration import estimate_with_measured_up
 from spinscope.pipeline.recordings import open_recording, write_recording
 from spinscope.pipeline.result_rows import shot_rows
@@ -84,6 +85,16 @@ def test_a_ball_faster_than_any_is_warned_of() -> None:
 
     assert "8000 m/s" in warnings(8.0, 8000.0) and "--time-unit" in warnings(8000.0)
     assert not warnings(8.0, 33.0) and not warnings()
+
+
+def test_times_that_no_camera_sends_are_not_analyzed(tmp_path: Path) -> None:
+    """A ball of 0.1 s whose nanoseconds are taken as microseconds would be 100 s of nothing."""
+    t_ns = np.arange(2000) * 50_001
+    np.savez(tmp_path / "ns.npz", t=t_ns, x=t_ns % 640, y=t_ns % 480, p=t_ns % 2)
+    for work in (analyzed, report_on):
+        with pytest.raises(RecordingError, match=r"--time-unit ns \(2e\+04 a second\), or --time-unit us if that is"):
+            work(tmp_path / "ns.npz", Choices(), "triplet")
+    assert not open_recording(tmp_path / "ns.npz", time_unit="us").time_doubt
 
 
 def test_an_assumed_focal_length_is_said_with_the_distance(

@@ -63,6 +63,7 @@ class NumpyReader(FormatReader):
         unit = split_unit(time_name)[1] or next((unit_of(stated[n]) for n in TIME_UNIT_NAMES if n in stated), None)
         self._types = ColumnTypes(path, options, unit, times, times.size)
         self.warnings += self._types.warnings
+        self.time_doubt = self._types.time_doubt
 
     @abstractmethod
     def _opened(self) -> AbstractContextManager[tuple[Opener, dict[str, NpyArray]]]:

@@ -89,6 +89,7 @@ class TextReader(FormatReader):
         unit = split_unit(self._layout.time_name)[1]
         self._types = ColumnTypes(path, options, unit, sample["t"], len(sample))
         self.warnings += self._types.warnings
+        self.time_doubt = self._types.time_doubt
 
     def columns(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
         """Yield the events; lines that are none are counted as damage."""

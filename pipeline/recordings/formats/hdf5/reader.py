@@ -58,6 +58,7 @@ class Hdf5Reader(FormatReader):
             unit = _stated_unit(file, table)
         self._types = ColumnTypes(path, options, unit, np.concatenate([first, last]), table.rows)
         self.warnings += self._types.warnings
+        self.time_doubt = self._types.time_doubt
 
     def columns(self, reading: ReadPass) -> Iterator[UncheckedEvents]:
         """Yield the events."""
