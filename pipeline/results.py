@@ -66,7 +66,7 @@ class SpinEstimate(ReadOnlyArrays):
     events : int
         Number of events (or constraints) behind the answer.
     against : str, optional
-        The method whose answer excludes this one, which is refused for that; neither is then to be trusted.
+        A method that is not to be trusted either where this one is refused: its answer excludes this one, or says less.
     """
 
     method: str

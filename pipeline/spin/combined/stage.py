@@ -126,6 +126,9 @@ def step(
         reason = f"no spin of {np.linalg.norm(spins_rps[0][0]):.0f} rps across the flight bends it like this one"
         estimate = SpinEstimate.refused(METHOD, reason, contrast.estimate.events)
     estimate = estimate.up_to(state.context["spin.max_spin_rps"])
+    if estimate.status != "ok" and basis != "flight":
+        # The logo is seen but leaves the spin open: the flight alone would tell its magnitude to a third at best.
+        estimate = replace(estimate, against="trajectory")
     by_witness = {name: log_mean(values) for name, values in logs.items()}
     if basis in NAMED_BY:
         by_witness[NAMED_BY[basis]] = own

@@ -132,6 +132,16 @@ def test_two_spins_that_explain_the_logo_are_left_open_by_the_pattern_alone() ->
     assert "two spins open" in (result.estimate.reason or "")
 
 
+def test_the_flight_does_not_answer_alone_where_the_logo_is_seen() -> None:
+    """Of a hidden logo it does; one that is seen and leaves the spin open tells more than the flight."""
+    of_flight = {"trajectory": SpinEstimate("trajectory", TOP, covariance(TOP, 5.0, 15.0), None)}
+    seen = answered(pattern(SLOW, [TOP], [0.5])).estimate
+    hidden = answered(ContrastResult.nothing(REFUSED), flight(TOP)).estimate
+    assert seen.status == hidden.status == "refused"
+    assert trusted_method(of_flight | {"contrast": REFUSED, "combined": seen}) is None
+    assert trusted_method(of_flight | {"contrast": REFUSED, "combined": hidden}) == "trajectory"
+
+
 def test_a_spin_that_changes_is_trusted_to_no_witness() -> None:
     clear = pattern(TOP, [OTHER], [6.0])
     of_flight = {"trajectory": SpinEstimate("trajectory", TOP, covariance(TOP, 5.0, 3.0), None)}
