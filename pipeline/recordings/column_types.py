@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 from ..errors import RecordingError
 from ..events import EventBatch
 from .reader import Damage, ReadingOptions, UncheckedEvents
-from .time_units import UNITS_US, check_unit, microseconds, rate_warning, resolution_warning, split_unit
+from .time_units import (
+    UNITS_US,
+    check_unit,
+    is_slow_throughout,
+    microseconds,
+    rate_warning,
+    resolution_warning,
+    split_unit,
+)
 
 # Names in use for the four columns, in lower case and without a unit behind them; ours and DSEC's first.
 NAMES = {
@@ -121,7 +129,7 @@ class ColumnTypes:
             self.warnings.append(f"times are floating-point numbers without a unit: taken as {why}")
         if finite.size:
             warning = rate_warning(self.unit, events, float(np.ptp(finite)))
-            if warning and not stated:
+            if warning and not stated and is_slow_throughout(self.unit, finite):
                 self.time_doubt = f"{warning}, or --time-unit {self.unit} if that is right"
             elif warning is None and not stated and sampled_times.dtype.kind in "iu":
                 warning = resolution_warning(sampled_times)

@@ -86,6 +86,15 @@ def rate_warning(unit: str, events: int, span: float) -> str | None:
     )
 
 
+def is_slow_throughout(unit: str, times: NDArray[Any]) -> bool:
+    """Whether times (n,) in rising order come slower than any camera's also from one to the next, by their median.
+
+    Shots far apart, recorded without noise, are as few a second on average, but not while one lasts.
+    """
+    steps = np.diff(times.astype(np.float64))
+    return bool(steps.size) and float(np.median(steps)) * UNITS_US[unit] * 1e-6 * PLAUSIBLE_HZ[0] > 1.0
+
+
 def resolution_warning(times: NDArray[np.integer[Any]]) -> str | None:
     """Sentence about whole-number times (n,), taken as microseconds, that look like nanoseconds; None for others.
 

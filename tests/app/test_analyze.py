@@ -95,6 +95,10 @@ def test_times_that_no_camera_sends_are_not_analyzed(tmp_path: Path) -> None:
         with pytest.raises(RecordingError, match=r"--time-unit ns \(2e\+04 a second\), or --time-unit us if that is"):
             work(tmp_path / "ns.npz", Choices(), "triplet")
     assert not open_recording(tmp_path / "ns.npz", time_unit="us").time_doubt
+    t_us = t_ns // 1000 + np.repeat([0, 600_000_000], 1000)  # two shots ten minutes apart, without noise
+    np.savez(tmp_path / "rare.npz", t=t_us, x=t_us % 640, y=t_us % 480, p=t_us % 2)
+    rare = open_recording(tmp_path / "rare.npz")
+    assert not rare.time_doubt and any("no event camera" in warning for warning in rare.warnings)
 
 
 def test_an_assumed_focal_length_is_said_with_the_distance(
