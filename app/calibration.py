@@ -214,6 +214,7 @@ def calibrate_outline(
     outlines: list[MeasuredOutline] = []
     for path, distance_m in zip(recordings, distances_m, strict=True):
         try:
+            # The circles are then those of the outline itself.
             session = Session.open(path, Choices(camera, ("track.outline_px=0",), reading=reading))
             if not session.states_focal_length:
                 raise RecordingError(f"nothing states the focal length: give --camera: {path}")

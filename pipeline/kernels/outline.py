@@ -184,13 +184,14 @@ def distance_behind(
     fewer than LEAST_EVENTS.
     """
     error = residuals(circle, ellipticity, tau_s, x_px, y_px)
+    least = GRAZING**2 * (circle[2] * circle[2] + circle[3] * circle[3])
     behind = np.empty(tau_s.size)
     m = 0
     for i in range(tau_s.size):
         dx = x_px[i] - (circle[0] + circle[2] * tau_s[i])
         dy = y_px[i] - (circle[1] + circle[3] * tau_s[i])
         across = dx * circle[2] + dy * circle[3]
-        if on[i] != bright and across < -GRAZING * math.hypot(dx, dy) * math.hypot(circle[2], circle[3]):
+        if on[i] != bright and across < 0.0 and across * across > least * (dx * dx + dy * dy):
             behind[m] = error[i]
             m += 1
     return float(np.partition(behind[:m], m // 2)[m // 2]) if m >= LEAST_EVENTS else np.nan

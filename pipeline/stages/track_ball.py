@@ -43,10 +43,10 @@ PLACE_STD_PX, RADIUS_STD_PX = 0.06, 0.3
 COMMON_COVARIANCE = np.diag([PLACE_STD_PX**2, PLACE_STD_PX**2, 0.0, 0.0, RADIUS_STD_PX**2])
 # Before ground about as bright as the ball's shaded rim, the events ahead are those of its shading further in. Those
 # behind still come at the rim, RIM_PX outside it: the ball reaches as far as they say. By radii on our simulator
-# (bright floors of seeds 96000-96002; grounds of albedo 0.1 to 0.55 under blur of 0.3 to 0.9 px, thresholds of 0.18 to
-# 0.5 and slow pixels of seeds 98000-98027), what the outline lacks is 0.5 to 2.7 px and so known to 0.1 to 0.6 px. It
-# may be nothing at all where thresholds of OFF are twice those of ON: hence RIM_ERROR of it as 1 sigma. So much
-# off is the centre as well, by 0.3 to 0.9 px: the shading is not in the ball's middle, and moves on it with the view.
+# (bright floors of seeds 96000-96002 and 97000; grounds of albedo 0.1 to 0.55 under blur of 0.3 to 0.9 px, thresholds
+# of 0.18 to 0.5 and slow pixels of seeds 98000-98027), the outline lacks 0.5 to 2.7 px, and 0.0 to 1.1 px with these.
+# It may lack nothing where thresholds of OFF are twice those of ON: hence RIM_ERROR of it as 1 sigma. So much off is
+# the centre as well, by 0.3 to 0.9 px: the shading is not in the ball's middle, and moves on it with the view.
 RIM_PX, RIM_ERROR = 0.1, 0.5
 # A velocity from one outline is wrong by what the ball accelerates within its window; the paper: high enough to
 # converge fast.
