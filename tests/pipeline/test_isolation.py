@@ -20,6 +20,7 @@ from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.isolation import IsolationError, call, iterate, without_time_limit
 
 SHORT_S = 2.0  # of waiting, where a test would have to wait for the usual limit
+SHORT_CPU_S = 1.5  # of computing, in every test: those that hang compute for as long
 
 
 def blocks(count: int, size: int) -> Iterator[dict[str, np.ndarray]]:
@@ -57,6 +58,16 @@ def test_readers_in_a_process_of_their_own_start_without_a_compiler() -> None:
     """It takes as long to load as the library may then loop, until a hostile file is refused."""
     code = "import sys, spinscope.pipeline.recordings.isolated_reader; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
+@pytest.fixture(autouse=True, scope="module")
+def impatient() -> Iterator[None]:
+    """The processes of these tests may compute less than usual."""
+    isolation._idle.end()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(isolation, "MAX_CPU_S", SHORT_CPU_S)
+        yield
+    isolation._idle.end()
 
 
 @pytest.fixture
@@ -114,7 +125,7 @@ def test_each_of_several_calls_at_a_time_has_a_process() -> None:
 @pytest.mark.parametrize(
     ("function", "arguments", "message"),
     [
-        (hang, (), "no progress in 2 s of computing"),
+        (hang, (), f"no progress in {SHORT_CPU_S:g} s of computing"),
         (crash, (), "crashes the library"),
         (take, (2 << 30,), "over 512 MB of memory"),
     ],
