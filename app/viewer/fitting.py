@@ -1,8 +1,9 @@
-"""Layouts fitted to the viewer's size: panes that would be too small to read share one place as tabs."""
+"""Layouts fitted to the viewer's size: panes that are too small share one place as tabs, low plots have no legend."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,8 @@ TITLE_PX = 28  # height of a pane's title, and of a row of tabs
 TIME_PANEL_PX = 34
 # A pane's buttons take 120 px of its title; plots are read in a lower pane than pictures and text.
 MIN_WIDTH_PX, MIN_HEIGHT_PX, MIN_PLOT_HEIGHT_PX = 200, 120, 75
+# Two rows of a legend hide half of a plot that is lower: it is left without, and tells a curve's name at the mouse.
+MIN_LEGEND_HEIGHT_PX = 160
 PLOTS = (rrb.TimeSeriesView, rrb.StateTimelineView, rrb.BarChartView)
 LARGER_PX = {at.WITNESSES: (320, 250)}  # width and height by a pane's origin: it has words in many rows
 
@@ -33,7 +36,7 @@ class ViewerSize:
 
 
 def fitted(part: Part, width_px: float, height_px: float) -> Part:
-    """Part of a layout in which neighbours that are too many for a size are tabs of one pane.
+    """Part of a layout in which neighbours that are too many for a size are tabs of one pane, low plots without legend.
 
     Parameters
     ----------
@@ -42,6 +45,10 @@ def fitted(part: Part, width_px: float, height_px: float) -> Part:
     width_px, height_px : float
         Its size.
     """
+    if isinstance(part, rrb.TimeSeriesView) and height_px < MIN_LEGEND_HEIGHT_PX:
+        low = copy(part)
+        low.properties = {**part.properties, "PlotLegend": rrb.PlotLegend(visible=False)}
+        return low
     if isinstance(part, rrb.View):
         return part
     contents = list(part.contents)

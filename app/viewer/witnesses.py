@@ -150,7 +150,8 @@ def _frame() -> list[Chunk]:
     marks = np.arange(0.0, MAX_RPS + 1.0, GRID_RPS)
     scale = [np.array([[x, BARS_TOP_PX], [x, bottom]]) for x in _bar_x(marks)]
     rims = [rim, rim + np.array([2 * DISC_RADIUS_PX + GAP_PX, 0.0])]
-    labels = [(f"{mark:.0f} rps", (x, bottom + 16)) for mark, x in zip(marks, _bar_x(marks), strict=True)]
+    numbers = [*(f"{mark:.0f}" for mark in marks[:-1]), f"{marks[-1]:.0f} rps"]
+    labels = [(number, (x, bottom + 16)) for number, x in zip(numbers, _bar_x(marks), strict=True)]
     labels += [("towards", (DISC_RADIUS_PX, -16.0)), ("away", (3 * DISC_RADIUS_PX + GAP_PX, -16.0))]
     labels.append(("odds over the next", (ODDS_X_PX, BARS_TOP_PX - 18.0)))
     names = [*("Logo seen or not" if name == SIGHTINGS else STAGES[name].label for name in NAMES), "Truth"]

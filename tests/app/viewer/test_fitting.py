@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 import rerun.blueprint as rrb
 
-from spinscope.app.viewer.fitting import MIN_PLOT_HEIGHT_PX, MIN_WIDTH_PX, ViewerSize, fitted
+from spinscope.app.viewer.fitting import MIN_LEGEND_HEIGHT_PX, MIN_PLOT_HEIGHT_PX, MIN_WIDTH_PX, ViewerSize, fitted
 from spinscope.app.viewer.run import ViewedRun
 from spinscope.app.viewer.views import views
 
@@ -55,6 +55,16 @@ def test_shares_give_way_before_neighbours_become_tabs() -> None:
     assert kind(tabs) == "Tabs" and names(tabs) == ["a", "b"] and names(alone) == ["c"]
     only: Any = fitted(row("a", "b", "c"), 0.5 * MIN_WIDTH_PX, 400)
     assert [kind(one) for one in only.contents] == ["Tabs"]
+
+
+def test_a_low_plot_has_no_legend() -> None:
+    plot = rrb.TimeSeriesView(plot_legend=rrb.PlotLegend(visible=True))
+    low: Any = fitted(rrb.Vertical(plot, plot), 400, 2 * MIN_LEGEND_HEIGHT_PX - 2)
+    high: Any = fitted(rrb.Vertical(plot, plot), 400, 2 * MIN_LEGEND_HEIGHT_PX)
+    shown = [
+        [one.properties["PlotLegend"].visible.as_arrow_array().to_pylist() for one in of.contents] for of in (low, high)
+    ]
+    assert shown == [[[False]] * 2, [[True]] * 2]
 
 
 @pytest.mark.parametrize("size", [(600, 400), (800, 600), (950, 650), (1600, 900)])
