@@ -225,3 +225,38 @@ def test_without_tools_the_viewer_fills_the_page_on_the_chosen_tab(browser: Any,
         context.close()
     finally:
         own.stop()
+
+
+def test_a_picture_that_a_newer_one_overtakes_is_not_shown(tab: Tab) -> None:
+    """The first one is held in the viewer until two more wait behind it."""
+    tab.page.evaluate(
+        """(() => {
+            const { viewer } = window.spinscope, { api } = viewer, show = viewer.show.bind(viewer);
+            const released = new Promise((resolve) => { window.release = resolve; });
+            window.shows = [];
+            viewer.show = async (...picture) => {
+                const row = [picture[1], null];
+                window.shows.push(row);
+                return row[1] = await show(...picture);
+            };
+            api.set_time = async (where) => {
+                await released;
+                delete api.set_time;
+                return api.set_time(where);
+            };
+        })()"""
+    )
+    newest = ""
+    for pad in (5.1, 5.3, 5.5):
+        before = tab.serial
+        tab.page.evaluate(f"window.spinscope.settings.set('logo.pad_px', {pad}, true)")
+        tab.until(f"window.spinscope.runner.serial > {before}")
+        newest = tab.page.evaluate("`${window.spinscope.connection.session}-${window.spinscope.runner.serial}`")
+        tab.until(f"window.shows.some(([id]) => id.startsWith('{newest}'))")
+    tab.page.evaluate("window.release()")
+    tab.settled("shown")
+    first, *later = tab.page.evaluate("window.shows")
+    assert first[1]
+    assert len(later) >= 2 and all(is_shown == name.startswith(newest) for name, is_shown in (later[0], later[-1]))
+    assert all(name.startswith(newest) for name, is_shown in later if is_shown)  # a part of it may come before it
+    tab.page.evaluate("delete window.spinscope.viewer.show")

@@ -73,6 +73,18 @@ def test_without_the_viewer_a_preview_follows_the_playhead(bare: Tab) -> None:
     bare.until(f"{shown_ms} <= {end_ms - tick_ms}")
 
 
+def test_without_the_viewer_a_video_shows_the_previews(bare: Tab) -> None:
+    made = bare.page.evaluate(
+        """import("/static/video.js").then(async ({ filmed }) => {
+            const part = { settings: { clip: [50000, 52000] }, overview: { shots: [] } };
+            const video = await filmed({ ...window.spinscope, ...part });
+            return [video.type, video.size];
+        })"""
+    )
+    assert made[0] == "video/mp4" and made[1] > 1000
+    assert bare.page.locator("dialog.ask").count() == 0
+
+
 def test_notices_stay_until_read_and_can_be_looked_up(bare: Tab) -> None:
     page = bare.page
     bare.until("window.spinscope.runner.isBlind")  # of which there is a notice
