@@ -18,7 +18,6 @@ from ..errors import ParameterError
 
 PARENT_CHECK_S = 1.0  # how often a process looks whether the one that started it still lives
 CLUSTER_WAIT_S = 10.0  # the longest that a cluster and its first worker are waited for
-MOST_PROCESSES = 61 if sys.platform == "win32" else 1 << 10  # Windows waits for no more at once
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +71,7 @@ def local_workers(count: int) -> Iterator[TaskWorkers]:
     """
     is_copied = sys.platform == "linux" and threading.active_count() == 1
     context = multiprocessing.get_context("fork" if is_copied else "spawn")
-    count = min(count, MOST_PROCESSES)
+    count = min(count, 61) if sys.platform == "win32" else count  # Windows waits for no more at once
     with ProcessPoolExecutor(count, context, _begin_work, (os.getpid(),)) as executor:
         others = multiprocessing.active_children()
         try:
@@ -111,9 +110,11 @@ def processor_count() -> int:
 
 
 def _begin_work(parent: int) -> None:
-    """Leave signals to the parent, and end when it has been killed."""
+    """Leave Ctrl-C to the parent, and end when it has been killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # a copied process has the parent's handler
+    for name in ("SIGTERM", "SIGHUP"):  # a copied process has the parent's handlers
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_DFL)
 
     def watch() -> None:
         while os.getppid() == parent:
