@@ -71,8 +71,8 @@ def best_circles(
 ) -> tuple[Floats, Integers]:
     """Circles through pixels (n,), n > 0, by `vote` and `peak`, without votes around a better one; best first.
 
-    Only circles with votes are looked at, and only their votes are set to zero again: where few pixels vote for a large
-    image 10 x faster.
+    Only circles with enough votes are looked at, and only votes that were given are set to zero again: on the few cells
+    of a large image that noise activates 5 x faster than new votes and `peak`.
 
     Parameters
     ----------
