@@ -239,8 +239,8 @@ CAMERAS = [
     ),
     Mutant(
         "pipeline/cameras/recorder.py",
-        "if clock != self._clock or (",
-        "if (",
+        "(clock != self._clock or is_full)",
+        "is_full",
         "tests/pipeline/cameras/test_recorder.py",
     ),
     Mutant(
