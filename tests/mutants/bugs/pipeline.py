@@ -28,7 +28,7 @@ CHAIN = [
         "pipeline/chain.py",
         "one.first + len(one.results) > last[shot] for",
         "len(one.results) > 0 for",
-        "tests/pipeline/test_chain.py",
+        "tests/pipeline/test_chain_balls.py",
     ),
     Mutant(
         "pipeline/chain.py",
@@ -40,7 +40,7 @@ CHAIN = [
         "pipeline/chain.py",
         "results.update(flying[0].results)",
         "results.update(flying[-1].results)",
-        "tests/pipeline/test_chain.py",
+        "tests/pipeline/test_chain_balls.py",
     ),
     Mutant(
         "pipeline/chain.py",
@@ -52,7 +52,7 @@ CHAIN = [
         "pipeline/chain.py",
         "chain, key = self._chain, (self._keys[stage.name], shot)",
         "chain, key = self._chain, (self._keys[stage.name], None)",
-        "tests/pipeline/test_chain.py",
+        "tests/pipeline/test_chain_balls.py",
     ),
     Mutant(
         "pipeline/registry.py",

@@ -71,7 +71,7 @@ RECORDINGS = [
         "pipeline/recordings/formats/hdf5/ecf.py",
         "(a & low) | ((b >> 2 * bits) << bits)",
         "(a & low) | (b >> 2 * bits)",
-        "tests/pipeline/recordings/test_recordings_columns.py tests/pipeline/recordings/test_recordings_encodings.py",
+        "tests/pipeline/recordings/test_recordings_ecf.py tests/pipeline/recordings/test_recordings_encodings.py",
     ),
     Mutant(
         "pipeline/recordings/growing_columns.py",
@@ -83,7 +83,7 @@ RECORDINGS = [
         "pipeline/recordings/order.py",
         "late = new.t_us < latest_us - MAX_DISORDER_US",
         "late = new.t_us < latest_us",
-        "tests/pipeline/recordings/test_recordings_columns.py",
+        "tests/pipeline/recordings/test_recordings_windows.py",
     ),
     Mutant(
         "pipeline/recordings/column_types.py",

@@ -10,9 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from spinscope.pipeline.errors import RecordingError
+from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.recordings import ReadingOptions, open_recording
 from spinscope.pipeline.recordings.formats.prophesee_dat.reader import DatReader
 from spinscope.pipeline.recordings.reader import ReadPass
+from tests.pipeline.recordings.column_files import assert_columns, some_columns
 from tests.reference.recordings import NaiveDecoded, naive_dat
 
 HEADER = b"% Data file\n% Height 720\n% Width 1280\n" + bytes((12, 8))
@@ -119,3 +122,44 @@ def test_nothing_confirms_the_time_of_the_last_event(tmp_path: Path, step_us: in
     words[-1, 0] += step_us
     write_dat(tmp_path / "a.dat", words)
     assert len(open_recording(tmp_path / "a.dat").read()) == N - (not believed)
+
+
+def test_dat_files_are_read_and_their_times_wrap(tmp_path: Path) -> None:
+    columns = some_columns()
+    t = columns["t"] + 2**32 - 500_000  # wraps in the middle
+    words = np.stack([t % 2**32, columns["x"] | columns["y"] << 14 | columns["p"] << 28], axis=1).astype("<u4")
+    header = b"% Data file containing CD events.\n% Version 2\n% Height 480\n% Width 640\n"
+    path = tmp_path / "a.dat"
+    path.write_bytes(header + b"\x0c\x08" + words.tobytes() + b"cut")
+    recording = open_recording(path)
+    assert_columns(recording.read(), {**columns, "t": t})
+    parts = EventBatch.concatenate(recording.chunks(max_events=333))
+    assert_columns(parts, {**columns, "t": t})
+    assert (recording.width_px, recording.height_px, recording.sensor_from) == (640, 480, "file")
+    assert recording.events == len(t) and recording.damage.lost_bytes == 3
+    path.write_bytes(header + b"\x0e\x08" + words.tobytes())
+    with pytest.raises(RecordingError, match="holds events of kind 14"):
+        open_recording(path)
+    path.write_bytes(header)
+    assert len(open_recording(path).read()) == 0
+
+
+@pytest.mark.parametrize(
+    ("lines", "kind", "size"),
+    [
+        (["Data file containing CD events."], 0x0C, None),
+        (["Data file containing Event2D events.", "Width 640"], 0x00, None),
+        (["Date 2020-1-1", "Height 480", "Width 640"], 0x0C, (640, 480)),  # told by the bytes behind the header
+        (["Height 0", "Width 640", "Data file"], 0x0C, None),
+    ],
+)
+def test_dat_files_are_told_by_first_line_or_kind(
+    tmp_path: Path, lines: list[str], kind: int, size: tuple[int, int] | None
+) -> None:
+    words = np.array([[7, 5 | 9 << 14 | 1 << 28], [9, 16383 & 303 | 239 << 14]], "<u4")
+    header = "".join(f"% {line}\n" for line in lines).encode()
+    (tmp_path / "a.bin").write_bytes(header + bytes((kind, 8)) + words.tobytes())
+    recording = open_recording(tmp_path / "a.bin")
+    assert recording.format == "DAT"
+    assert_columns(recording.read(), {"t": [7, 9], "x": [5, 303], "y": [9, 239], "p": [1, 0]})
+    assert (recording.width_px, recording.height_px) == (size or (304, 240))

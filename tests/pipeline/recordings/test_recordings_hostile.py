@@ -17,8 +17,8 @@ from spinscope.pipeline import isolation
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.recordings import open_recording, write_recording
 from spinscope.pipeline.simulated_recordings import DESCRIPTION, description_in
+from tests.pipeline.recordings.column_files import some_columns, write_columns
 from tests.pipeline.recordings.sound_files import HEIGHT_PX, WIDTH_PX, some_events
-from tests.pipeline.recordings.test_recordings_columns import some_columns, write_columns
 from tests.pipeline.recordings.test_recordings_fuzz import MOST_GROWTH_BYTES, peak_bytes
 
 HOSTILE = Path(__file__).parent / "hostile"
