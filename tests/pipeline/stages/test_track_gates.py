@@ -281,18 +281,20 @@ def test_the_stated_error_holds_what_no_filtering_takes_away() -> None:
 
 
 def test_a_ball_reaches_as_far_as_the_events_behind(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Less 0.1 px, on average over the outlines wholly in view; arcs, fitted to both halves, say nothing of it."""
+    """Less 0.1 px and what it moves in 40 us, on average over the outlines wholly in view; arcs say nothing of it."""
 
     def state(behind_px: float, **changes: object) -> BallTrack:
         _, ball, _ = updated(monkeypatch, sighting(behind_px=behind_px, **changes))
         return ball.track(20_000, 40.0, 0.5, ())
 
     usual, bright = state(-0.7), state(0.8)
-    rim_px = 0.8 - 0.1 + 0.5
+    seen_px = 0.8 - 0.1 + 0.5
+    rim_px = seen_px - 40e-6 * float(np.hypot(*bright.mean[2:4]))
+    assert 0.2 < rim_px < seen_px - 0.1
     np.testing.assert_allclose(bright.mean - usual.mean, [0.0, 0.0, 0.0, 0.0, rim_px], atol=1e-9)
     assert usual.measured is not None and bright.measured is not None
     assert bright.measured.radius_px - usual.measured.radius_px == pytest.approx(rim_px)
-    spread = np.diag([1.0, 1.0, 0.0, 0.0, 1.0]) * (0.5 * rim_px) ** 2
+    spread = np.diag([1.0, 1.0, 0.0, 0.0, 1.0]) * (0.5 * seen_px) ** 2
     np.testing.assert_allclose(bright.covariance - usual.covariance, spread, atol=1e-9)
     for other in (state(math.nan), state(0.8, part=OF_DARK), state(0.8, visible=0.9)):
         assert other.mean[4] == usual.mean[4]
