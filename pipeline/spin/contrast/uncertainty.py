@@ -62,7 +62,8 @@ def spin_covariance(
     covariance = _sandwich(objective, model, settings.repeats * len(events) / stretch.events)
     # Events' speed on the ball, in radii a second, for one rad/s more about the axis.
     x, y, z = spin / math.sqrt(squared)
-    lever = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]) @ events.normals
+    nx, ny, nz = events.normals
+    lever = np.stack([y * nz - z * ny, z * nx - x * nz, x * ny - y * nx])
     covariance += _drift(objective, events, ball, spin, lever, stretch.span_s)
     oblique = max(1.0, RIM_COSINE / max(float(view_cosine(events).mean()), RIM_COSINE / MOST_OBLIQUE))
     covariance += (AXIS_FLOOR * settings.sigma_rad * oblique) ** 2 * squared * (np.eye(3) - along)
@@ -108,7 +109,7 @@ def _drift(
     facing -= float(facing @ axis) * axis
     across = np.eye(3) - np.outer(axis, axis) - np.outer(facing, facing)
     squared_s2 = (events.t_s - events.t_s.mean()) ** 2
-    turns = np.tensordot(objective.slopes[:2], lever * squared_s2)
+    turns = np.einsum("kin,in->k", objective.slopes[:2], lever * squared_s2)
     about_axis = float(turns @ turns) / max(float(squared_s2 @ np.sum(lever**2, axis=0)), 1e-18) ** 2
     spread: Floats = rate_px_s**2 * (across / float(np.mean(events.radius_px)) ** 2 + about_axis * np.outer(axis, axis))
     return spread
