@@ -357,7 +357,9 @@ export class RunRequests extends EventTarget {
       width_px: String(width),
       height_px: String(height),
     });
-    await this.viewer.layout(await this.connection.bytes(`layout?${query}`));
+    const layout = await this.connection.bytes(`layout?${query}`);
+    if (document.body.classList.contains("coach")) return; // entered meanwhile
+    await this.viewer.layout(layout);
     this.#layoutOf = layoutOf;
   }
 

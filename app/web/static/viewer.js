@@ -7,6 +7,7 @@ const POLL_MS = 15;
 const PATIENCE_MS = 120_000; // without a graphics card a picture may take seconds
 const PICTURE_MS = 10_000;
 const LAYOUT_MS = 30_000;
+const TAKEN_MS = 2000; // the longest until a new layout is shown: one that the viewer does not take is not waited for
 const ANSWER_MS = 3000;
 const JPEG_QUALITY = 0.92;
 const APPLICATION = "spinscope";
@@ -120,8 +121,17 @@ export class Viewer extends EventTarget {
     return done;
   }
 
+  // Takes a layout; one for a recording that is shown is there at the end, not some frames later over another one.
   layout(/** @type {Uint8Array} */ bytes) {
-    return this.#next(() => this.#channel.send_rrd(bytes));
+    return this.#next(async () => {
+      const root = async () => (await this.#viewer.get_blueprint()).blueprint["/viewport"]?.ViewportBlueprint;
+      const before = this.#shown === null ? null : JSON.stringify(await root());
+      this.#channel.send_rrd(bytes);
+      const until = performance.now() + TAKEN_MS;
+      while (before !== null && JSON.stringify(await root()) === before && performance.now() < until) {
+        await pause(POLL_MS);
+      }
+    });
   }
 
   #follow() {
