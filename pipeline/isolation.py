@@ -12,9 +12,10 @@ import signal
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from io import FileIO
 from typing import Any, BinaryIO, TypeVar
 
-from .child_process import ChildProcess, IdleProcesses, pipes_to_parent, receive_value, send_value
+from .child_process import ChildProcess, IdleProcesses, SharedMemory, pipes_to_parent, receive_value, send_value
 from .errors import SpinscopeError
 
 try:
@@ -117,12 +118,17 @@ class _Process(ChildProcess):
 
     def __init__(self) -> None:
         self._silence_s = MAX_SILENCE_S
+        memory = SharedMemory.created()
+        number = None if memory is None else memory.file.fileno()
         try:
             super().__init__(
-                f"from {__name__} import serve; serve({MAX_CPU_S}, {MAX_SILENCE_S})",
+                f"from {__name__} import serve; serve({MAX_CPU_S}, {MAX_SILENCE_S}, {number})",
                 {"OPENBLAS_NUM_THREADS": "1"},  # threads take memory
+                memory,
             )
         except OSError as error:
+            if memory is not None:
+                memory.file.close()
             raise IsolationError(f"the process to read it in does not start ({error.strerror})") from error
         self.is_idle = True  # whether it waits for a call
 
@@ -163,17 +169,20 @@ _idle = IdleProcesses[_Process](MAX_IDLE)
 _limits: tuple[float, float] | None = None  # CPU time and time in seconds; None where this process has no limits
 
 
-def serve(cpu_s: float, silence_s: float) -> None:
+def serve(cpu_s: float, silence_s: float, memory_number: int | None) -> None:
     """Answer calls on standard input until it ends; the main program of the process.
 
     Parameters
     ----------
     cpu_s, silence_s : float
         CPU time and time in seconds without progress after which the process ends.
+    memory_number : int or None
+        File descriptor of the shared memory for the answers.
     """
     global _limits
     _limits = (cpu_s, silence_s)
     requests, answers = pipes_to_parent()
+    memory = None if memory_number is None else SharedMemory(FileIO(memory_number, "r+"))
     _limit_memory()
     try:
         while True:
@@ -181,16 +190,16 @@ def serve(cpu_s: float, silence_s: float) -> None:
             if folder is not None:
                 with suppress(OSError):
                     os.chdir(folder)
-            _answer(function(*arguments), requests, answers)
+            _answer(function(*arguments), requests, lambda value: send_value(answers, value, memory))
     except (EOFError, BrokenPipeError):  # the caller has gone
         os._exit(BROKEN_PIPE_EXIT)
 
 
-def _answer(values: Iterator[Any], requests: BinaryIO, answers: BinaryIO) -> None:
+def _answer(values: Iterator[Any], requests: BinaryIO, send: Callable[[tuple[int, Any]], None]) -> None:
     """Send the values, each when the caller asks for it, then the end or an error."""
     kind, value = _next(values)
     while True:
-        send_value(answers, (kind, value))
+        send((kind, value))
         if kind != VALUE:
             return
         kind, value = _next(values)  # while the caller works on the one before

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
 import sys
 import time
+from io import BytesIO, FileIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from spinscope.pipeline.child_process import ChildProcess, IdleProcesses
+from spinscope.pipeline.child_process import (
+    SHARED_BYTES,
+    ChildProcess,
+    IdleProcesses,
+    SharedMemory,
+    receive_value,
+    send_value,
+)
 from spinscope.pipeline.events import EventBatch
 
 ECHO = """
@@ -64,3 +73,35 @@ def test_a_killed_parent_leaves_no_child() -> None:
         time.sleep(0.01)
     parent.stdin.close()
     parent.stdout.close()
+
+
+@pytest.mark.skipif(not hasattr(os, "memfd_create"), reason="no memory without a name")
+@pytest.mark.parametrize("sizes", [(), (0, 10, 0), (7, SHARED_BYTES - 7), (SHARED_BYTES, 1)])
+def test_arrays_go_through_shared_memory_where_they_fit(sizes: tuple[int, ...]) -> None:
+    sender = SharedMemory.created()
+    assert sender is not None
+    receiver = SharedMemory(FileIO(os.dup(sender.file.fileno()), "r+"))
+    rng = np.random.default_rng(4)
+    arrays = [rng.integers(0, 256, size, np.uint8) for size in sizes]
+    received = []
+    for value in (arrays, [array[::-1].copy() for array in arrays]):  # the second one into the same memory
+        pipe = BytesIO()
+        send_value(pipe, value, sender)
+        assert (pipe.tell() > SHARED_BYTES) == (sum(sizes) > SHARED_BYTES)
+        pipe.seek(0)
+        received.append(receive_value(pipe, receiver))
+    for first, second, array in zip(*received, arrays, strict=True):
+        np.testing.assert_array_equal(first, array)
+        np.testing.assert_array_equal(second, array[::-1])
+    for memory in (sender, receiver):
+        memory.file.close()
+
+
+@pytest.mark.skipif(not hasattr(os, "memfd_create"), reason="no memory without a name")
+@pytest.mark.parametrize("call", ["memfd_create", "posix_fallocate"])
+def test_where_the_system_gives_no_shared_memory_there_is_none(monkeypatch: pytest.MonkeyPatch, call: str) -> None:
+    def refuse(*_: object) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, call, refuse)
+    assert SharedMemory.created() is None

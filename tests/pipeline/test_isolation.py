@@ -109,6 +109,24 @@ def test_values_arrive_as_they_were_sent() -> None:
     parts[0]["values"][:] = 5  # memory of one's own, as from any other call
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_shared_memory_is_given_back_however_the_process_ends() -> None:
+    def mapped() -> int:
+        return Path("/proc/self/maps").read_text().count("memfd:spinscope")
+
+    isolation._idle.end()
+    gc.collect()
+    before = mapped(), len(os.listdir("/proc/self/fd"))
+    parts = iterate(blocks, 2, 100_000)
+    assert next(parts)["values"].size == 100_000 and mapped() == before[0] + 1
+    parts.close()
+    with pytest.raises(IsolationError):
+        call(crash)
+    isolation._idle.end()
+    gc.collect()
+    assert (mapped(), len(os.listdir("/proc/self/fd"))) == before
+
+
 def test_the_process_is_kept_and_is_not_this_one() -> None:
     first = call(process_id)
     assert first not in (os.getpid(), os.getppid()) and call(process_id) == first
