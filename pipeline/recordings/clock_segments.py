@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .order import NO_TIME_US
-from .reader import MAX_DISORDER_US, ReadPass, UncheckedEvents
+from .reader import LAST_US, MAX_DISORDER_US, ReadPass, UncheckedEvents
 
 # So many events in a row that go on from a time before those so far are a clock that was set back, fewer are late or
 # damaged: a quiet scene has as many in some milliseconds, and random times do not stand in order.
@@ -82,12 +82,16 @@ class ClockSegments:
         return max(self._latest_us, int(t_us[:first].max()) if first else NO_TIME_US)
 
     def _is_set_back(self, t_us: NDArray[np.int64], first: int) -> bool:
-        """Whether SEGMENT_EVENTS events from `first` on are late and in order; not those of a file sorted backwards."""
+        """Whether SEGMENT_EVENTS events from `first` on are late and in order; not those of a file sorted backwards.
+
+        No clock is set back so far that times with the shift do not fit in 64 bits.
+        """
         run = t_us[first : first + SEGMENT_EVENTS]
         rises = np.count_nonzero(run[1:] < run[:-1]) <= SEGMENT_EVENTS // 2
         in_order = bool(rises and np.all(run >= np.maximum.accumulate(run) - MAX_DISORDER_US))
-        sure_us = self._latest_before(t_us, first) - MAX_DISORDER_US
-        return run.size == SEGMENT_EVENTS and in_order and bool(np.all(run < sure_us))
+        latest_us = self._latest_before(t_us, first)
+        fits = self.shift_us + latest_us - int(t_us[first]) < LAST_US
+        return run.size == SEGMENT_EVENTS and in_order and bool(np.all(run < latest_us - MAX_DISORDER_US)) and fits
 
     def _end_of_late(self, t_us: NDArray[np.int64], first: int) -> int:
         """Index of the first event after `first` that is not late."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError
 from ..events import EventBatch
-from .reader import Damage, ReadingOptions, UncheckedEvents
+from .reader import LAST_US, Damage, ReadingOptions, UncheckedEvents
 from .time_units import (
     UNITS_US,
     check_unit,
@@ -33,7 +33,6 @@ NAMES = {
 COLUMN_TYPES = {name: np.dtype(code) for name, code in zip("txyp", ("<i8", "<u2", "<u2", "u1"), strict=True)}
 EXPANSION_LIMIT = 500  # events pack 3 to 50 times; only constant columns come near deflate's 1032
 EXPANSION_FREE_BYTES = 1 << 28
-LAST_US = 1 << 62  # leaves room to add and subtract
 # So many broken rows cost only themselves; more are a sign that the columns are not what they are taken for.
 BROKEN_FREE, BROKEN_SHARE = 10, 0.01
 NONE = np.zeros(0, np.bool_)  # mask of a column without broken values

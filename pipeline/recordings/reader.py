@@ -25,6 +25,7 @@ from .sensor import Resolution
 Progress = Callable[[float], None]  # called with the share done, 0 to 1
 
 CHUNK_EVENTS = 1 << 17  # events handed on at once: 1.7 MB, which the processor's caches hold
+LAST_US = 1 << 62  # times beyond it, or before its negative, are broken: leaves room to add and subtract
 MAX_DISORDER_US = 10_000  # events up to this far behind an earlier one are put in order; see `order.py`
 
 # Whatever the libraries below throw at damaged files; none of it may reach the user as a traceback.
@@ -84,7 +85,7 @@ class Triggers(ColumnBatch):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UncheckedEvents(ColumnBatch):
-    """Events (n,) as they are in a file: not yet in order of time, perhaps outside the sensor."""
+    """Events (n,) as they are in a file: not yet in order of time (within LAST_US), perhaps outside the sensor."""
 
     KINDS: ClassVar = ("i8", "i8", "i8", "?")
     t_us: NDArray[np.int64]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...errors import RecordingError
 from ..optional_packages import optional_module
 from ..packets import foreign_errors, joined, undamaged
-from ..reader import CameraFrame, FormatReader, ReadingOptions, ReadPass, Triggers, UncheckedEvents
+from ..reader import LAST_US, CameraFrame, FormatReader, ReadingOptions, ReadPass, Triggers, UncheckedEvents
 from ..sensor import resolution_or_none
 from .registry import FORMATS, RecordingFormat
 
@@ -78,7 +78,10 @@ class AedatReader(FormatReader):
                 reading.triggers.append(_triggers(packet["triggers"]))
             elif "events" in packet and packet["stream_id"] == self._stream:
                 found = packet["events"]
-                yield UncheckedEvents(found["t"].astype(np.int64), found["x"], found["y"], found["on"])
+                events = UncheckedEvents(found["t"].astype(np.int64), found["x"], found["y"], found["on"])
+                good = (events.t_us > -LAST_US) & (events.t_us < LAST_US)
+                reading.damage.broken_events += int(np.count_nonzero(~good))
+                yield events[good]
 
     def _decoder(self) -> Any:
         aedat = optional_module("aedat", "aedat", "AEDAT4")

@@ -10,10 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.recordings import open_recording
 from spinscope.pipeline.recordings.clock_segments import SEGMENT_EVENTS, ClockSegments
 from spinscope.pipeline.recordings.reader import ReadPass, UncheckedEvents
-from tests.reference.recordings import naive_segments
+from tests.reference.recordings import naive_segments, write_aedat4
 
 RUN = SEGMENT_EVENTS
 # Lengths of runs of events and where their clocks begin, relative to the end of the one before.
@@ -79,3 +80,22 @@ def test_reading_goes_on_behind_a_reset(tmp_path: Path, monkeypatch: pytest.Monk
         part = type(whole).concatenate(batches)
         inside = whole.between(start_us, start_us + 5000)
         assert np.array_equal(part.t_us, inside.t_us) and np.array_equal(part.x_px, inside.x_px)
+
+
+def test_times_that_no_shift_can_join_are_refused(tmp_path: Path) -> None:
+    """Damaged numbers that go back and forth by more than 64 bits hold are no clock that was set back."""
+    t, zeros = np.repeat([4, -4, 4, -4], RUN) * 10**18, np.zeros(4 * RUN, np.uint16)
+    np.savez(tmp_path / "a.npz", t=t, x=zeros, y=zeros, p=zeros)
+    with pytest.raises(RecordingError, match=f"time goes backwards at event {RUN}"):
+        open_recording(tmp_path / "a.npz", sensor=(2, 2)).read()
+
+
+def test_times_that_no_camera_has_cost_their_events_alone(tmp_path: Path) -> None:
+    """AEDAT4's, of which the reader's package checks nothing."""
+    events = [(t, 1, 1, True) for t in range(1000, 1300)]
+    for at, t in ((3, -7 * 10**18), (250, 2**63 - 1)):
+        events[at] = (t, 1, 1, True)
+    write_aedat4(tmp_path / "a.aedat4", events, 2, 2)
+    recording = open_recording(tmp_path / "a.aedat4")
+    assert recording.read().t_us.tolist() == [t for t, *_ in events if 0 < t < 2000]
+    assert recording.damage.broken_events == 2
