@@ -19,8 +19,8 @@ class ClockSegments:
     """Joins segments into one: behind a clock that was set back, time goes on from the last event before.
 
     A software's reset or a pulse on the sync input sets the clock back, whatever came before; no event of a longer
-    segment is dropped. Fewer than SEGMENT_EVENTS at the start, before the clock is set back, are stale: what the
-    camera's buffers held of an earlier recording.
+    segment is dropped. Fewer than SEGMENT_EVENTS at the start, before the clock is set back, are stale unless one
+    of them is late: what the camera's buffers held of an earlier recording.
 
     Attributes
     ----------
@@ -75,6 +75,8 @@ class ClockSegments:
         """Index of the first event that is late; their number where none is."""
         if rises and t_us[0] >= self._latest_us:
             return t_us.size
+        if t_us[0] < self._latest_us - MAX_DISORDER_US:
+            return 0
         late = t_us < np.maximum(np.maximum.accumulate(t_us), self._latest_us) - MAX_DISORDER_US
         return int(np.argmax(late)) if late.any() else t_us.size
 
@@ -94,9 +96,13 @@ class ClockSegments:
         return run.size == SEGMENT_EVENTS and in_order and bool(np.all(run < latest_us - MAX_DISORDER_US)) and fits
 
     def _end_of_late(self, t_us: NDArray[np.int64], first: int) -> int:
-        """Index of the first event after `first` that is not late."""
-        behind = t_us[first:] >= self._latest_before(t_us, first) - MAX_DISORDER_US
-        return first + int(np.argmax(behind)) if behind.any() else t_us.size
+        """Index of the first event after `first` that is not late, or before which SEGMENT_EVENTS are.
+
+        What follows so many may be a clock that was set back all the same, after some disorder.
+        """
+        late = t_us[first : first + SEGMENT_EVENTS]
+        behind = late >= self._latest_before(t_us, first) - MAX_DISORDER_US
+        return first + (int(np.argmax(behind)) if behind.any() else late.size)
 
     def _set_back(self, before: UncheckedEvents, rises: bool, first_us: int) -> Iterator[tuple[UncheckedEvents, bool]]:
         """Hand on or drop the rest of a segment, and begin the next one."""

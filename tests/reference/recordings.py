@@ -340,6 +340,7 @@ def naive_segments(events: list[Event], run: int) -> tuple[list[Event], int, int
     out: list[Event] = []
     stale = resets = shift = count = at = 0
     latest = None  # of the segment, times as in the file
+    some_late = False  # of the segment
     while at < len(events):
         t = events[at][0]
         if latest is not None and t < latest - MAX_DISORDER_US:
@@ -347,13 +348,14 @@ def naive_segments(events: list[Event], run: int) -> tuple[list[Event], int, int
             in_order = all(b >= max(following[: k + 1]) - MAX_DISORDER_US for k, b in enumerate(following))
             in_order = in_order and sum(b < a for a, b in pairwise(following)) <= run // 2
             if len(following) == run and in_order and max(following) < latest - MAX_DISORDER_US:
-                if resets == 0 and count < run:
+                if resets == 0 and count < run and not some_late:
                     stale, out = stale + count, []
                 else:
                     resets, shift = resets + 1, shift + latest - t
-                latest, count = t, 0
-            else:  # late ones, all of which stay where they are
-                while at < len(events) and events[at][0] < latest - MAX_DISORDER_US:
+                latest, count, some_late = t, 0, False
+            else:  # late ones, which stay where they are; then the next are looked at
+                upto, some_late = min(at + run, len(events)), True
+                while at < upto and events[at][0] < latest - MAX_DISORDER_US:
                     out.append((events[at][0] + shift, *events[at][1:]))
                     count, at = count + 1, at + 1
                 continue

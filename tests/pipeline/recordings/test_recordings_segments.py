@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from spinscope.pipeline.errors import RecordingError
@@ -44,6 +44,7 @@ def unchecked(events: list[tuple[int, int, int, bool]]) -> UncheckedEvents:
 
 
 @settings(max_examples=150)
+@example([(1, 0), (1, -11_999), (1, -17_190), (198, 0)], 0, [101])  # set back with some disorder, cut behind it
 @given(RUNS, st.integers(0, 2**32 - 1), st.lists(st.integers(0, 800), max_size=6))
 def test_segments_are_joined_as_by_the_twin_however_they_come(
     parts: list[tuple[int, int]], seed: int, cuts: list[int]
