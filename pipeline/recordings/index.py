@@ -23,7 +23,7 @@ from .sensor import Resolution
 # Between two places: 5 to 10 ms of decoding, and seldom less than the 10 ms that are read beyond a piece.
 PLACE_EVENTS = 1 << 19
 SAMPLED_EVENTS = 1 << 12  # every so many events a time is kept: a hundredth of what a pixel of an overview shows
-INDEX_VERSION = 4  # to be raised whenever readers or the index change what they say of the same file
+INDEX_VERSION = 5  # to be raised whenever readers or the index change what they say of the same file
 ARRAYS = ("sampled_us", "offsets", "states", "shifts_us", "cut_us", "before")
 INDEXES_KEPT = 200  # of 1 MB for 100 million events
 
