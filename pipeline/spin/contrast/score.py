@@ -39,9 +39,8 @@ COINCIDENCE = 0.55 * 0.55
 SQRT2, LOG2 = math.sqrt(2.0), math.log(2.0)
 # Splatting and reading are each smeared by the spline (variance 1/4 cell^2): kernel of 1 sigma = cell / sqrt(2).
 CELLS_PER_SIGMA = math.sqrt(2.0)
-# Fused multiply-adds and sums in any order, 1.2 times as fast; the last bits may differ. Divisors are never zero
-# (`error_model`), which spares a look for it.
-FAST_MATH = {"contract", "reassoc", "nsz"}
+# Divisors are never zero: `error_model="numpy"` spares a look for it. No fast math: its last bits depend on what the
+# compiler has at hand in a process, and a running camera's spins have to be those of the recording.
 # The map's pole need not be exact: so many events are enough for the mean of the turned points.
 POLE_EVENTS = 64
 # Steps of the finite differences.
@@ -51,7 +50,7 @@ OFFSET_STEP_PX = 0.3
 BURST_S, BURST_SIGMA_RAD, BURST_FLOOR, BURST_LOG_RATIO, USUAL_EVENTS = 0.5e-3, 0.1, 0.3, 0.2, 600
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST_MATH)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def derotate(derotated: Floats, spin_rad_s: Floats, t_s: Floats, normals: Floats) -> None:
     """Write the normals (3, n), each turned by -spin t_s, into `derotated` (3, n).
 
@@ -99,7 +98,7 @@ class Splats(NamedTuple):
     weights: Floats
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST_MATH)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _set_splats(
     splats: Splats, points: Floats, polarity: Integers, pole: tuple[float, float, float], cell_rad: float, size: int
 ) -> None:
@@ -127,7 +126,7 @@ def _spline(offset: float) -> tuple[float, float, float]:
     return 0.5 * (0.5 - offset) ** 2, 0.75 - offset * offset, 0.5 * (0.5 + offset) ** 2
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST_MATH)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _add_splats(density: Floats, splats: Splats, first: int, last: int, size: int, weight: float) -> None:
     """Add splats [first, last) of this weight to the flat maps."""
     cells, weights = splats
@@ -141,7 +140,7 @@ def _add_splats(density: Floats, splats: Splats, first: int, last: int, size: in
             at += np.uint64(size)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST_MATH)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _set_ratios(
     ratios: Floats, splats: Splats, sharp: Floats, blurred: Floats, first: int, last: int, size: int, added: float
 ) -> None:
@@ -160,7 +159,7 @@ def _set_ratios(
         ratios[i] = (max(density, 0.0) + added) / (expected + added)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST_MATH)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def take_logarithms(values: Floats) -> float:
     """Replace positive numbers (n,) by their natural logarithms; return the sum of these.
 
@@ -182,7 +181,7 @@ def take_logarithms(values: Floats) -> float:
     return total
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST_MATH)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def score(log_ratios: Floats, spin_rad_s: Floats, window: ScoreWindow, cell_rad: float, floor: float) -> float:
     """Score of one spin; each event's log((I + floor) / (B + floor)) is written into `log_ratios` (n,).
 
