@@ -101,8 +101,7 @@ def expected_table() -> list[str]:
         f"| {thrown['n']} thrown balls | {errors(paper)}, {percent(paper['success'])} answered | {errors(thrown)}, "
         f"{percent(thrown['success'])} answered ({percent(thrown['of those with logo'])} of the flights with logo) |",
         f"| {people['n']} shots at people's speeds and spins | - | "
-        f"{errors(people).replace(' rps', f' rps (median {median})')}, {percent(people['success'])} answered, "
-        "one of them by the flight alone |",
+        f"{errors(people).replace(' rps', f' rps (median {median})')}, {percent(people['success'])} answered |",
         f"| frame camera, every third thrown ball | {errors(paper_frame)}, {percent(paper_frame['success'])} answered "
         f"(all) | frame method {errors(frame)}, {percent(frame['success'])}; `best` {errors(event)}, "
         f"{percent(event['success'])} |",
