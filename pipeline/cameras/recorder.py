@@ -106,7 +106,7 @@ class Recorder:
     def mark(self, text: str, seconds_ago: float = 0.0) -> None:
         """Note a text beside the recording with the date, the file and its time so far; raises RecordingError.
 
-        Both are those of so many seconds ago, but not before the file's first event.
+        Both are those of so many seconds ago; the time is not before the file's first event.
         """
         t_us = max(self._last_us - round(seconds_ago * 1e6), self._start_us or 0)
         date = datetime.now(UTC) - timedelta(seconds=seconds_ago)
