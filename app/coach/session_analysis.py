@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import multiprocessing
 import os
 import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor
+from concurrent.futures import BrokenExecutor, CancelledError, Future, wait
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -77,7 +77,7 @@ class SessionAnalysis:
         self._sources, self._jobs, self._on_change = list(sources), jobs, on_change
         self._settings_hash = settings_hash(choices)
         self._version = program_version()
-        self._ended = threading.Event()
+        self._ended: Future[None] = Future()
         self._seen: dict[Path, tuple[int, int]] = {}
         self._thread = threading.Thread(target=self._follow, name="session analysis", daemon=True)
 
@@ -87,9 +87,8 @@ class SessionAnalysis:
 
     def close(self) -> None:
         """End the work; what is under way in other processes is left undone."""
-        self._ended.set()
-        for process in multiprocessing.active_children():
-            process.kill()
+        if not self._ended.done():
+            self._ended.set_result(None)
         if self._thread.is_alive():
             self._thread.join(5.0)
 
@@ -99,20 +98,19 @@ class SessionAnalysis:
         if not pending:
             return
         self._tell(AnalysisProgress(len(pending), 0, True))
-        for number, (path, known, found) in enumerate(self._results(pending), start=1):
-            self.session.add(str(path), known, found)
-            self._tell(AnalysisProgress(len(pending), number, True))
-            if self._ended.is_set():
-                break
+        with suppress(CancelledError):
+            for number, (path, known, found) in enumerate(self._results(pending), start=1):
+                self.session.add(str(path), known, found)
+                self._tell(AnalysisProgress(len(pending), number, True))
         self._tell(AnalysisProgress(len(pending), self.progress.done, False))
 
     def _follow(self) -> None:
         if sys.platform == "linux":
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
         waited_s = 0.0
-        while not self._ended.is_set():
+        while not self._ended.done():
             if self._is_playing() and waited_s < MOST_WAIT_S:
-                self._ended.wait(POLL_S)
+                wait([self._ended], POLL_S)
                 waited_s += POLL_S
                 continue
             waited_s = 0.0
@@ -121,7 +119,7 @@ class SessionAnalysis:
                 load_stages()  # a single new recording is analyzed by this process
             except SpinscopeError as error:  # of the session itself, as a full disk
                 note(f"warning: {error}")
-            self._ended.wait(POLL_S)
+            wait([self._ended], POLL_S)
 
     def _tell(self, progress: AnalysisProgress) -> None:
         self.progress = progress
@@ -170,12 +168,10 @@ class SessionAnalysis:
         while left:
             try:
                 with task_workers(jobs) as workers:
-                    for number, rows in performed(dict(left), TaskContext(), workers):
+                    for number, rows in performed(dict(left), TaskContext(), workers, self._ended):
                         del left[number]
                         yield (pending[number][0], *_unpacked(pending[number][1], str(rows[0]["found"])))
             except BrokenExecutor:
-                if self._ended.is_set():
-                    return
                 if jobs == 1 or len(left) == 1:  # the one that ends its process
                     number = next(iter(left))
                     del left[number]

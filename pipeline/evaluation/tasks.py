@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache
@@ -105,15 +105,21 @@ def run(
 
 
 def performed(
-    tasks: Mapping[int, Task], context: TaskContext, workers: TaskWorkers | None = None
+    tasks: Mapping[int, Task],
+    context: TaskContext,
+    workers: TaskWorkers | None = None,
+    stop: Future[None] | None = None,
 ) -> Iterator[tuple[int, list[Row]]]:
     """Each task's number and rows as soon as they are known, in any order; `workers`: see `run`.
 
     An error in a task, or closing the iterator, leaves those that were not begun. Of a worker that has ended a
-    BrokenExecutor tells.
+    BrokenExecutor tells. Another thread stops the wait by setting the result of `stop`: a CancelledError.
     """
+    stop = stop or Future()
     if workers is None:
         for number, task in tasks.items():
+            if stop.done():
+                raise CancelledError
             yield _perform(context, task, number)
         return
     coming = iter(tasks.items())
@@ -125,8 +131,10 @@ def performed(
     under_way = begun(workers.count)
     try:
         while under_way:
-            done, under_way = wait(under_way, return_when=FIRST_COMPLETED)
-            under_way |= begun(len(done))
+            done, _ = wait([*under_way, stop], return_when=FIRST_COMPLETED)
+            if stop in done:
+                raise CancelledError
+            under_way = (under_way - done) | begun(len(done))
             for future in done:
                 yield future.result()
     finally:

@@ -73,13 +73,11 @@ def local_workers(count: int) -> Iterator[TaskWorkers]:
     context = multiprocessing.get_context("fork" if is_copied else "spawn")
     count = min(count, 61) if sys.platform == "win32" else count  # Windows waits for no more at once
     with ProcessPoolExecutor(count, context, _begin_work, (os.getpid(),)) as executor:
-        others = multiprocessing.active_children()
         try:
             yield TaskWorkers(executor, count)
         except BaseException:
-            for process in multiprocessing.active_children():
-                if process not in others:
-                    process.kill()
+            for process in list((executor._processes or {}).values()):  # Python 3.14 has `kill_workers` for this
+                process.kill()
             raise
 
 

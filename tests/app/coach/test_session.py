@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import os
 import shutil
 import signal
 import sqlite3
@@ -18,6 +20,7 @@ from spinscope.app.coach import session_analysis
 from spinscope.app.coach.session import NOT_FOUND, TABLE_FILE, ShotSession
 from spinscope.app.coach.session_analysis import SessionAnalysis
 from spinscope.pipeline.errors import ParameterError, RecordingError
+from spinscope.pipeline.evaluation.workers import local_workers
 from spinscope.pipeline.recordings import open_recording
 from spinscope.pipeline.session import Choices
 
@@ -175,7 +178,7 @@ def test_the_analysis_waits_while_a_shot_is_played_but_not_for_ever(
 
     def work() -> None:
         calls.append("work")
-        waiting._ended.set()
+        waiting._ended.set_result(None)
         worked.set()
 
     monkeypatch.setattr(waiting, "run_once", work)
@@ -183,3 +186,19 @@ def test_the_analysis_waits_while_a_shot_is_played_but_not_for_ever(
     assert worked.wait(30.0)
     waiting.close()
     assert calls[: calls.index("work")] == ["asked"] * asked
+
+
+@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")  # NumPy's threads end before a copy is made
+def test_closing_ends_the_processes_of_the_analysis_alone(session: ShotSession, samples: Path) -> None:
+    paths = [samples / "own/bounce.h5", samples / "flight_back.h5"]
+    with local_workers(1) as others:
+        other = others.executor.submit(os.getpid).result()
+        work = SessionAnalysis(session, paths, Choices(), jobs=2)
+        work.start()
+        while len(multiprocessing.active_children()) < 3:
+            work._thread.join(0.01)
+            assert work._thread.is_alive()
+        work.close()
+        assert not work._thread.is_alive()
+        assert [process.pid for process in multiprocessing.active_children()] == [other]
+        assert others.executor.submit(os.getpid).result() == other

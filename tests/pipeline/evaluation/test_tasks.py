@@ -11,7 +11,7 @@ import threading
 import time
 import types
 from collections.abc import Iterator
-from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, CancelledError, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -19,7 +19,7 @@ import pytest
 
 from spinscope.pipeline.errors import ParameterError, RecordingError
 from spinscope.pipeline.evaluation.tables import Row
-from spinscope.pipeline.evaluation.tasks import Task, TaskContext, _limit_cache, run, write_whole
+from spinscope.pipeline.evaluation.tasks import Task, TaskContext, _limit_cache, performed, run, write_whole
 from spinscope.pipeline.evaluation.workers import TaskWorkers, local_workers, task_workers
 from spinscope.pipeline.registry import Parameters
 
@@ -29,6 +29,11 @@ CALLS: list[int] = []
 def square(context: TaskContext, number: int) -> list[Row]:
     CALLS.append(number)
     return [{"number": number, "square": number * number}]
+
+
+def sleeping(context: TaskContext, number: int) -> list[Row]:
+    time.sleep(600.0)
+    return []
 
 
 def failing(context: TaskContext) -> list[Row]:
@@ -123,6 +128,25 @@ def test_an_error_ends_the_processes_at_once() -> None:
         raise KeyboardInterrupt
     with pytest.raises(BrokenExecutor):
         working.result()
+
+
+def test_an_error_leaves_the_processes_of_others() -> None:
+    with local_workers(1) as others:
+        with pytest.raises(KeyboardInterrupt), local_workers(1):
+            other = others.executor.submit(os.getpid).result()
+            raise KeyboardInterrupt
+        assert others.executor.submit(os.getpid).result() == other
+
+
+@pytest.mark.parametrize("process_count", [1, 2])
+def test_another_thread_stops_the_work(process_count: int) -> None:
+    """At once, with processes at work; after the task under way, without."""
+    stop: Future[None] = Future()
+    tasks = {0: Task(square, {"number": 0}), 1: Task(sleeping if process_count > 1 else square, {"number": 1})}
+    with pytest.raises(CancelledError), task_workers(process_count) as workers:
+        for number, _ in performed(tasks, TaskContext(), workers, stop):
+            assert number == 0
+            stop.set_result(None)
 
 
 @pytest.mark.slow  # tests/app/test_batch.py kills a command with its workers
