@@ -13,8 +13,9 @@ from .events import EventBatch
 from .flight_calibration import FlightCalibration, estimate_with_measured_up, flight_calibration
 from .recordings import ReadingOptions
 from .recordings.in_memory import RecordingInMemory
+from .recordings.source import AnyRecording
 from .registry import Parameters
-from .session import AnyRecording, Choices, Progress, Result, Session, check_method
+from .session import Choices, Progress, Result, Session, check_method
 from .simulated_recordings import in_memory
 from .simulator import SimulatedRecording
 

@@ -4,63 +4,34 @@ recording | camera | simulator -> packets of one tick
     -> per recording: filter -> surface -> track
     -> per ball in flight: logo -> rate -> flow -> triplet, normal_flow -> contrast, trajectory -> combined
 
-A column is one stage's results so far plus the state to go on. Its key is the source's identity and the chain of
-(stage, parameter values) up to it, compared by value: a changed parameter re-runs its stage and those that read
-it, nothing else, and going back to earlier values finds their columns still there. Stages of one ball have a column
-for each shot. A shot whose start is known late, at a contact or where a ball must be seen more than once, gets its
-results of the earlier ticks in the tick in which it is announced.
+A column (`column_cache.py`) is one stage's results so far plus the state to go on. Its key is the source's identity and
+the chain of (stage, parameter values) up to it, compared by value: a changed parameter re-runs its stage and those that
+read it, nothing else, and going back to earlier values finds their columns still there. Stages of one ball have a
+column for each shot. A shot whose start is known late, at a contact or where a ball must be seen more than once, gets
+its results of the earlier ticks in the tick in which it is announced.
 """
 
 from __future__ import annotations
 
-import threading
 from collections import deque
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
 from .camera import Camera
+from .column_cache import CACHE_BYTES, MAX_COLUMNS, Column, ColumnCache
 from .errors import ParameterError
 from .event_source import EventSource
 from .registry import STAGES, Parameters, default_stages, needed_stages
-from .results import Packet, nbytes
+from .results import Packet
 from .stage import Context, Stage
 from .tick import BallTick, Tick
 from .track_evidence import NO_EVIDENCE, TrackEvidence
 
-CACHE_BYTES = 2 << 30
-MAX_COLUMNS = 10_000
 MAX_TICKS = 4_000_000  # 5.5 hours at 200 Hz; more is a damaged clock, not a recording
 # How long packets are kept for shots that are announced late: five times what a contact takes to be seen at 200 Hz.
 EARLIER_US = 100_000
-
-
-@dataclass(slots=True, eq=False)
-class _Column:
-    """One stage's results, of the whole recording or of one shot, from tick number `first` on.
-
-    Attributes
-    ----------
-    results : list
-        Results in order; lacks what a run was told to forget.
-    making : Lock
-        Held while the next result is made: another thread that wants it waits for it.
-    is_kept : bool
-        Whether all results so far are there.
-    fault : BaseException, optional
-        Raised by a step; the state may be half way into its tick, so that no other run may go on from it.
-    """
-
-    key: Hashable
-    state: Any
-    first: int
-    making: threading.Lock = field(default_factory=threading.Lock)
-    results: list[Any] = field(default_factory=list)
-    is_kept: bool = True
-    fault: BaseException | None = None
-    bytes: int = 0
-    last_use: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,11 +75,8 @@ class Chain:
         self.rivals = tuple(rivals)
         self.stages = default_stages(rivals)
         self.seconds = dict.fromkeys(STAGES.names, 0.0)
-        self._budget_bytes, self._max_columns = budget_bytes, max_columns
+        self._columns = ColumnCache(budget_bytes, max_columns)
         self._clock = clock
-        self._columns: dict[Hashable, _Column] = {}
-        self._uses = 0
-        self._lock = threading.Lock()  # for the columns as a whole
 
     def tick_count(self, parameters: Parameters) -> int:
         """Number of ticks that the source holds so far, the last one perhaps cut short by the source's end."""
@@ -273,26 +241,12 @@ class Chain:
     def knows(self, parameters: Parameters, name: str) -> bool:
         """Whether a stage's results of every tick so far are kept."""
         keys, count = self.keys(parameters), self.tick_count(parameters)
-        with self._lock:
-            column = self._columns.get((keys["track" if STAGES[name].scope == "ball" else name], None))
-            if column is None or len(column.results) < count:
-                return False
-            if STAGES[name].scope == "recording":
-                return True
-            last = {ball.shot: index for index, track in enumerate(column.results[:count]) for ball in track.balls}
-            kept = {shot: self._columns.get((keys[name], shot)) for shot in last}
-        return all(one is not None and one.first + len(one.results) > last[shot] for shot, one in kept.items())
-
-    def _keep_budget(self, run: _Run) -> None:
-        """Drop columns that the run does not use until the others are within the budget."""
-        with self._lock:
-            total = sum(column.bytes for column in self._columns.values())
-            if total <= self._budget_bytes and len(self._columns) <= self._max_columns:
-                return  # comparing the keys of all columns would take longer than a quick tick
-            for key in sorted(self._columns.keys() - run.columns_in_use, key=lambda k: self._columns[k].last_use):
-                if total <= self._budget_bytes and len(self._columns) <= self._max_columns:
-                    break
-                total -= self._columns.pop(key).bytes
+        of_recording = keys["track" if STAGES[name].scope == "ball" else name]
+        tracks = self._columns.results((of_recording, None), count)
+        if tracks is None or STAGES[name].scope == "recording":
+            return tracks is not None
+        last = {ball.shot: index for index, track in enumerate(tracks) for ball in track.balls}
+        return all(self._columns.reaches((keys[name], shot), index) for shot, index in last.items())
 
 
 class _Run:
@@ -308,50 +262,28 @@ class _Run:
     ) -> None:
         self._chain, self._parameters, self._keys = chain, parameters, keys
         self._forget, self._seconds = forget, seconds
-        self._columns: dict[tuple[str, int | None], _Column] = {}
+        self._columns: dict[tuple[str, int | None], Column] = {}
         self._inputs_of_ball = {name for stage in STAGES if stage.scope == "ball" for name in ("packet", *stage.inputs)}
         self._recent: deque[dict[str, Any]] = deque()  # those of the recent ticks that no ball has to itself
         self._evidence: dict[int, TrackEvidence] = {}  # of the shots in flight
 
-    @property
-    def columns_in_use(self) -> set[Hashable]:
-        return {column.key for column in self._columns.values()}
-
-    def column(self, stage: Stage, shot: int | None = None, first: int = 0) -> _Column:
+    def column(self, stage: Stage, shot: int | None = None, first: int = 0) -> Column:
         """The stage's column, of a shot for stages of one ball; begun at tick number `first` when there is none."""
         column = self._columns.get((stage.name, shot))
-        if column is not None:
-            return column
-        chain, key = self._chain, (self._keys[stage.name], shot)
-        with chain._lock:
-            column = chain._columns.get(key)
-            if column is None or not column.is_kept:
-                column = chain._columns[key] = _Column(key, chain.start(self._parameters, stage), first)
-            chain._uses += 1
-            column.last_use = chain._uses
-        self._columns[stage.name, shot] = column
+        if column is None:
+            key = (self._keys[stage.name], shot)
+            column = self._chain._columns.begun(key, first, lambda: self._chain.start(self._parameters, stage))
+            self._columns[stage.name, shot] = column
         return column
 
-    def result(self, stage: Stage, column: _Column, index: int, inputs: Mapping[str, Any]) -> Any:
+    def result(self, stage: Stage, column: Column, index: int, inputs: Mapping[str, Any]) -> Any:
         """The stage's result of tick number `index`, made from its inputs unless it is known."""
-        with column.making:
-            if index - column.first < len(column.results):
-                return column.results[index - column.first]
-            if column.fault is not None:
-                raise column.fault
-            try:
-                result = self._step(stage, column.state, inputs)
-            except BaseException as error:
-                column.fault = error
-                with self._chain._lock:
-                    self._chain._columns.pop(column.key, None)
-                raise
-            if stage.name in self._forget:
-                column.is_kept = False
-            else:
-                column.bytes += nbytes(result)
-                column.results.append(result)
-        return result
+        return self._chain._columns.result(
+            column,
+            index,
+            lambda: self._step(stage, column.state, inputs),
+            is_kept=stage.name not in self._forget,
+        )
 
     def _step(self, stage: Stage, state: Any, inputs: Mapping[str, Any]) -> Any:
         clock = self._chain._clock
@@ -404,7 +336,7 @@ class _Run:
         for (_, results), flying in zip(rows, balls, strict=True):
             yield self.tick(of_ball, results, flying)
         self.let_go_of_ended_shots()
-        self._chain._keep_budget(self)
+        self._chain._columns.keep_budget({column.key for column in self._columns.values()})
 
     def let_go_of_ended_shots(self) -> None:
         """Let the budget have the columns of shots that are over, and drop those whose results are not kept."""
@@ -412,8 +344,7 @@ class _Run:
         for name in ended:
             column = self._columns.pop(name)
             if not column.is_kept:
-                with self._chain._lock:
-                    self._chain._columns.pop(column.key, None)
+                self._chain._columns.drop(column)
 
     def tick(self, of_ball: list[Stage], results: dict[str, Any], balls: list[list[_BallInputs]]) -> Tick:
         """The tick with all results."""

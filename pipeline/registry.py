@@ -19,7 +19,7 @@ from .stage import SpinMethod, Stage
 from .stages import filter, flow, logo, rate, surface, track
 
 if TYPE_CHECKING:
-    from .spin.contrast.parameters import ContrastParameters
+    from .spin.contrast import ContrastParameters
     from .spin.parameters import SpinParameters
     from .spin.trajectory.stage import TrajectoryParameters
     from .stages.track_parameters import TrackParameters

@@ -12,13 +12,10 @@ from typing import Any
 
 from .camera import Camera, CameraParameters
 from .chain import Chain
-from .errors import ParameterError, RecordingError
-from .event_source import EventsInMemory
-from .events import EventBatch
+from .errors import ParameterError
 from .presets import preset
 from .recordings import ReadingOptions, Recording, open_recording
-from .recordings.in_memory import RecordingInMemory
-from .recordings.streamed import RecordingPieces, StreamedEvents, events_of
+from .recordings.source import AnyRecording, RecordedEvents, recorded_events
 from .registry import STAGES, Parameters, default_stages, methods
 from .results import Truth
 from .shots import Shot, ShotLog
@@ -35,8 +32,6 @@ TICKS_TOGETHER = 4  # ticks that a stage works through at a time: tracking costs
 FIXED_BALL_US = 10_000_000  # a ball on a spinner is looked for in the first 10 s: hundreds of turns
 MARGIN_US = 50_000  # shown before and after a shot of a long recording
 
-AnyRecording = Recording | RecordingInMemory
-RecordedEvents = EventsInMemory | StreamedEvents
 Progress = Callable[[float, str], None]  # share done (0..1) and what is being done
 
 
@@ -114,7 +109,8 @@ class Session:
         begin = time.perf_counter()
         if isinstance(recording, (str, Path)):
             recording = open_recording(Path(recording), **dataclasses.asdict(choices.reading))
-        source = _source(recording, choices.window_us, on_progress)
+        report = (lambda share: on_progress(share, "reading")) if on_progress else None
+        source = recorded_events(recording, choices.window_us, report)
         read_seconds = time.perf_counter() - begin
         sidecar = Sidecar.beside(recording.path) if isinstance(recording, Recording) else Sidecar()
         parameters = _with_attributes(parameters, {**recording.attributes, **sidecar.parameters}, choices)
@@ -364,24 +360,6 @@ def check_method(method: str) -> str:
     return method
 
 
-def _source(recording: AnyRecording, window_us: tuple[int, int] | None, on_progress: Progress | None) -> RecordedEvents:
-    """The events of the window as a source; raises RecordingError where there are none."""
-    start_us, end_us = window_us or (None, None)
-    report = (lambda share: on_progress(share, "reading")) if on_progress else None
-    if isinstance(recording, RecordingInMemory):
-        events: EventBatch | RecordingPieces = recording.read(start_us, end_us)
-    else:
-        events = events_of(recording, start_us, end_us, report)
-    size_px = recording.width_px, recording.height_px
-    if isinstance(events, RecordingPieces):
-        window_us = window_us or (events.index.first_us, events.index.last_us + 1)
-        return StreamedEvents((recording.identity(), window_us), events, *size_px, *window_us)
-    if not len(events):
-        raise RecordingError(_no_events(window_us, recording.path))
-    window_us = window_us or (int(events.t_us[0]), int(events.t_us[-1]) + 1)
-    return EventsInMemory((recording.identity(), window_us), events, *size_px, *window_us)
-
-
 def _timed(source: RecordedEvents, **options: Any) -> Chain:
     return Chain(source, clock=time.perf_counter, **options)
 
@@ -405,12 +383,3 @@ def _with_attributes(parameters: Parameters, attributes: dict[str, Any], choices
 def _assigned(choices: Choices) -> set[str]:
     """The parameters (`group.field`) that the options set one by one."""
     return {text.partition("=")[0].strip() for text in choices.assignments}
-
-
-def _no_events(window_us: tuple[int, int] | None, path: Path) -> str:
-    if window_us:
-        return (
-            f"there are no events from {window_us[0]} to {window_us[1]} us: "
-            f"`spinscope info` shows the recording's own times: {path}"
-        )
-    return f"the recording holds no events: {path}"

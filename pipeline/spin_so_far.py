@@ -18,7 +18,7 @@ from .chain import Chain
 from .registry import Parameters
 from .results import SpinEstimate
 from .spin.contrast import stage as contrast
-from .spin.contrast.parameters import FLOW_METHOD
+from .spin.contrast.stage import FLOW_METHOD
 from .tick import BallTick
 
 # The methods by accuracy on the evaluation's flights, best first.

@@ -12,7 +12,7 @@ from .results import MethodResult, Packet, SpinEstimate
 from .track_evidence import TrackEvidence
 
 if TYPE_CHECKING:
-    from .spin.contrast.result import ContrastResult
+    from .spin.contrast import ContrastResult
     from .spin.trajectory.stage import TrajectoryResult
     from .stages.filter import FilterResult
     from .stages.flow import FlowResult

@@ -116,7 +116,8 @@ class SessionAnalysis:
             waited_s = 0.0
             try:
                 self.run_once()
-                load_stages()  # a single new recording is analyzed by this process
+                if not self._ended.done():
+                    load_stages()  # a single new recording is analyzed by this process
             except SpinscopeError as error:  # of the session itself, as a full disk
                 note(f"warning: {error}")
             wait([self._ended], POLL_S)

@@ -19,8 +19,9 @@ from spinscope.pipeline.biases import CURVES, BiasParameters
 from spinscope.pipeline.errors import ParameterError, RecordingError, SpinscopeError
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.recordings import is_recording, open_recording
+from spinscope.pipeline.recordings.source import AnyRecording
 from spinscope.pipeline.registry import Parameters
-from spinscope.pipeline.session import AnyRecording, Session
+from spinscope.pipeline.session import Session
 from spinscope.pipeline.sidecar import biases_beside
 from spinscope.pipeline.simulated_recordings import BIASES, description_in, simulate_again_to_file
 from spinscope.pipeline.simulator import simulate_again

@@ -15,7 +15,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from spinscope.pipeline.spin import contrast
-from spinscope.pipeline.spin.contrast.result import ContrastResult
+from spinscope.pipeline.spin.contrast import ContrastResult
 
 from . import entities as at
 from .png import png

@@ -131,7 +131,8 @@ def performed(
     under_way = begun(workers.count)
     try:
         while under_way:
-            done, _ = wait([*under_way, stop], return_when=FIRST_COMPLETED)
+            awaited: list[Future[Any]] = [*under_way, stop]
+            done, _ = wait(awaited, return_when=FIRST_COMPLETED)
             if stop in done:
                 raise CancelledError
             under_way = (under_way - done) | begun(len(done))

@@ -1,7 +1,8 @@
 """A physically reasoned event camera in front of spinning table tennis balls, with exact truth."""
 
-from .real_scenes import RealScene, real_scene
+from .real_scenes import real_scene
 from .scene import Air, Arm, Background, Ball, Fixed, Flight, Light, Net, Rolling, Scene, Shake
+from .scene_sampler import RealScene
 from .scenes import flight, rally, spinner
 from .segments import Segment
 from .sensor import Lens, SensorModel

@@ -13,9 +13,9 @@ import pytest
 
 from spinscope.pipeline.results import MethodResult, SpinEstimate
 from spinscope.pipeline.session import Choices, Session
+from spinscope.pipeline.spin.contrast import ContrastParameters
 from spinscope.pipeline.spin.contrast import stage as contrast
 from spinscope.pipeline.spin.contrast.events import whole_window
-from spinscope.pipeline.spin.contrast.parameters import ContrastParameters
 from spinscope.pipeline.spin.contrast.score import score
 from spinscope.pipeline.stage import Context
 from spinscope.pipeline.tick import Tick

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from spinscope.pipeline import chain as chain_module
+from spinscope.pipeline import column_cache
 from spinscope.pipeline.chain import Chain
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.event_source import EventsInMemory
@@ -190,7 +190,7 @@ COLUMNS = len(INPUTS) + len(BELOW_LOGO)  # of one whole run and one from logo on
 def test_the_budget_drops_what_was_not_used_for_longest(
     calls: dict[str, int], monkeypatch: pytest.MonkeyPatch, limit: dict[str, int]
 ) -> None:
-    monkeypatch.setattr(chain_module, "nbytes", lambda result: 1000)
+    monkeypatch.setattr(column_cache, "nbytes", lambda result: 1000)
     chain = Chain(source(), **limit)
     for pad in (1, 2, 3):
         list(chain.run(DEFAULT.with_assignments([f"logo.pad_px={pad}"])))

@@ -11,7 +11,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ...registry import Parameters
-from ...simulator.real_scenes import KINDS, RealScene, real_scene
+from ...simulator.real_scenes import KINDS, real_scene
+from ...simulator.scene_sampler import RealScene
 from ..estimation import BEST, estimated
 from ..plots import Figures, panels
 from ..rendering import render
@@ -59,7 +60,7 @@ def measure(context: TaskContext, kind: str, seed: int) -> list[Row]:
     made = real_scene(kind, seed)
     recording = render(context, made.scene, seed=seed, sensor=made.sensor, camera=made.camera, lens=made.lens)
     result = estimated(recording, parameters_of(made, context.parameters), rivals=context.choices.rivals)
-    return segment_rows(recording, result, {"group": made.group, "kind": kind, "seed": seed})
+    return segment_rows(recording, result, {"group": KINDS[kind].group, "kind": kind, "seed": seed})
 
 
 def parameters_of(made: RealScene, parameters: Parameters) -> Parameters:

@@ -9,8 +9,8 @@ import numpy as np
 
 from ...kernels.arrays import Floats
 from ...stages.rate import RateResult
-from ..contrast.estimate import LOG_ODDS_PER_SIGMA
-from ..contrast.result import ContrastResult
+from ..contrast import ContrastResult
+from ..contrast.events import LOG_ODDS_PER_SIGMA
 from ..trajectory.stage import TrajectoryResult
 from .likelihoods import rhythms_of
 

@@ -16,7 +16,7 @@ from ...stage import Context, SpinMethod
 from ...stages.logo import LogoResult
 from ...stages.rate import RateResult
 from ...stages.track_result import BallTrack
-from ..contrast.result import ContrastResult
+from ..contrast import ContrastResult
 from ..trajectory.stage import TRUSTED_AXIS_DEG, TRUSTED_SHARE, TrajectoryResult
 from .candidates import Candidate, flight_candidates, pattern_candidates, rhythm_candidates
 from .likelihoods import BLUNDER, by_flight, by_flow, by_rate, by_sightings, fallible, log_mean, rhythms_of

@@ -12,22 +12,23 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
 from ...kernels.arrays import Floats
+from ...parameters import ParameterGroup, switch, tunable
 from ...results import MethodResult, Packet, SpinEstimate
+from ...spin_terms import vector_words
 from ...stage import Context, SpinMethod
 from ...stages.logo import LogoResult
 from ...stages.rate import RateResult
+from ...stages.rate_period import FEWEST_SIGMAS
 from ...stages.track_result import BallTrack
-from .change import PARTS, estimates_of_ends
-from .estimate import ScoreMap, estimate_spin, follow_spin, score_map
-from .events import BallUncertainty, ContrastEstimate, ContrastSettings, SphereEvents
-from .parameters import FLOW_METHOD, METHOD, ContrastParameters
-from .result import ContrastResult
-from .trust import RETURNED_TURNS, change_doubt, doubt, judged, misses_rhythm, sigmas_apart
+from .estimate import PARTS, estimate_spin, estimates_of_ends, follow_spin, score_map
+from .events import BallUncertainty, ContrastEstimate, ContrastResult, ContrastSettings, ScoreMap, SphereEvents
 
+METHOD, FLOW_METHOD = "contrast", "normal_flow"
 # Full estimates when the shot is so old, then each time it is half as old again; in between the last answer is
 # followed, which costs a tenth.
 STAGES_US = (5000, 10_000, 20_000, 50_000)
@@ -45,6 +46,59 @@ LOST = 0.85
 # ON and OFF, bright and dark pixels report 25 us sooner or later than the mean latency: what the ball flies meanwhile
 # is an error of its place that the tracker, which sees the outline, does not know of.
 LATENCY_SPREAD_S = 25e-6
+# Before the logo has come back for the first time the magnitude rests on how far it moved.
+RETURNED_TURNS = 1.2
+# Edges that come and go give both polarities; what pixels of a slow sensor still report of the ball's outline when it
+# is far ahead has one. Of 134 right answers on simulated shots none has less than a tenth of the rarer polarity.
+LEAST_OF_POLARITY = 0.05
+# The rhythm of the logo's visits follows the spin to this share, and the line of sight's own turn while the ball passes
+# (0.7 rps at 9 m/s and 2 m); farther off than so many of these is another spin.
+RHYTHM_SHARE, SIGHT_RPS, RHYTHM_SIGMAS = 0.015, 0.7, 3.0
+RHYTHM_EXCLUDED = -8.0  # log likelihood below which, four sigma, a magnitude is no rhythm's
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContrastParameters(ParameterGroup):
+    """Kernel, window, and what is trusted."""
+
+    renamed: ClassVar[dict[str, str]] = {"weakest": "min_gain"}
+
+    kernel_rad: float = tunable(
+        0.04, 0.01, 0.3, 0.005, "rad", "how near on the ball events must come to count as one (1 sigma)"
+    )
+    floor_events: float = tunable(1.5, 0.1, 100.0, 0.1, "events", "density below which differences mean little")
+    window_us: int = tunable(500_000, 5000, 10_000_000, 5000, "us", "how far back in time events may lie")
+    fewest_events: int = tunable(40, 10, 10_000, 10, "events", "logo events needed for an answer")
+    min_gain: float = tunable(
+        0.25, 0.0, 5.0, 0.05, "", "contrast that an event must gain over permuted times (natural log), on average"
+    )
+    rival_sigmas: float = tunable(1.2, 0.0, 20.0, 0.1, "sigma", "lead that the best spin must have over any other")
+    # On 110 simulated flights that contrast answers rightly one in a hundred is farther away than 5.7.
+    flow_sigmas: float = tunable(
+        6.0,
+        0.0,
+        100.0,
+        0.5,
+        "sigma",
+        "distance from the normal flow's spin that puts it in doubt, unless it is settled",
+    )
+    # In 122 flights of our simulator without a contact they are 3.1 apart at most, right after a hit 5.4.
+    change_sigmas: float = tunable(
+        8.0,
+        0.0,
+        100.0,
+        0.5,
+        "sigma",
+        "distance between the spins of the flight's first and last third that shows a missed contact",
+    )
+    smallest_patch_rad: float = tunable(
+        0.18, 0.0, 1.5, 0.01, "rad", "spread of the logo's events over the ball (rms) below which it is not seen"
+    )
+    axis_std_deg: float = tunable(12.0, 0.1, 180.0, 0.5, "deg", "largest stated error of the axis (1 sigma)")
+    magnitude_std_rps: float = tunable(
+        3.0, 0.01, 1000.0, 0.1, "rps", "largest stated error of the magnitude (1 sigma); a tenth of it if that is more"
+    )
+    curves: bool = switch(True, "score over magnitude and over axis directions, for the viewer")
 
 
 @dataclass(slots=True)
@@ -243,10 +297,114 @@ def _convinces(parameters: ContrastParameters, answer: ContrastEstimate, normal_
     return doubt(parameters, answer) is None and sigmas_apart(estimate, normal_flow) <= parameters.flow_sigmas
 
 
+def doubt(parameters: ContrastParameters, answer: ContrastEstimate) -> str | None:
+    """Reason why an answer is not to be trusted, in words; None if it is."""
+    if answer.spin_rps is None:
+        return f"the logo was not seen: {answer.events} logo events, {parameters.fewest_events} are needed"
+    if answer.contrast < parameters.min_gain:
+        return (
+            f"no pattern turns with the ball: the best spin gains {answer.contrast:.2f} an event over chance, "
+            f"{parameters.min_gain:g} are needed"
+        )
+    if answer.patch_rad < parameters.smallest_patch_rad:
+        return (
+            f"the logo is hardly seen: its events spread over {math.degrees(answer.patch_rad):.0f} degrees, "
+            f"{math.degrees(parameters.smallest_patch_rad):.0f} are needed"
+        )
+    estimate = SpinEstimate(METHOD, answer.spin_rps, answer.covariance_rps2, None)
+    magnitude, std, axis_std = estimate.magnitude_rps, estimate.magnitude_std_rps, estimate.axis_std_deg
+    if magnitude is None or std is None or axis_std is None:
+        return "the ball does not turn"
+    if answer.margins.size and answer.margins.min() < parameters.rival_sigmas:
+        rival = answer.rivals_rps[int(np.argmin(answer.margins))]
+        return f"another spin explains the logo about as well: {vector_words(answer.spin_rps)} or {vector_words(rival)}"
+    if std > max(parameters.magnitude_std_rps, 0.1 * magnitude):
+        return f"the magnitude is too uncertain: {magnitude:.1f} +- {std:.1f} rps"
+    if axis_std > parameters.axis_std_deg:
+        return f"the axis is too uncertain: +- {axis_std:.0f} degrees"
+    return None
+
+
+def change_doubt(parameters: ContrastParameters, early: ContrastEstimate, late: ContrastEstimate) -> str | None:
+    """Reason for doubt where a flight's ends have two spins, in words; None where one spin may explain both.
+
+    Ends that give no answer to be trusted show nothing.
+    """
+    if doubt(parameters, early) is not None or doubt(parameters, late) is not None:
+        return None
+    before, after = (SpinEstimate(METHOD, one.spin_rps, one.covariance_rps2, None) for one in (early, late))
+    if sigmas_apart(before, after) <= parameters.change_sigmas:
+        return None
+    words = f"from {vector_words(before.vector_rps)} to {vector_words(after.vector_rps)}"
+    return f"the spin changes within the flight, {words}: a contact may have been missed"
+
+
+def sigmas_apart(one: SpinEstimate, other: SpinEstimate) -> float:
+    """By how many standard deviations two estimates differ; 0 where one says nothing."""
+    if one.vector_rps is None or one.covariance_rps2 is None:
+        return 0.0
+    if other.vector_rps is None or other.covariance_rps2 is None:
+        return 0.0
+    off = one.vector_rps - other.vector_rps
+    return math.sqrt(max(float(off @ np.linalg.solve(one.covariance_rps2 + other.covariance_rps2, off)), 0.0))
+
+
+def misses_rhythm(rate: RateResult, answer: ContrastEstimate) -> bool:
+    """Whether the logo's pattern comes back, but by none of its possible magnitudes with this answer's.
+
+    A magnitude too slow to come back is not one of them: none of 134 right answers on simulated shots is refused for
+    that, but one with half of the true spin about a wrong axis.
+    """
+    estimate = SpinEstimate(METHOD, answer.spin_rps, answer.covariance_rps2, None)
+    magnitude, std = estimate.magnitude_rps, estimate.magnitude_std_rps
+    if magnitude is None or std is None or rate.period_sigmas < FEWEST_SIGMAS:
+        return False
+    off_rps = np.abs(rate.period_spins_rps[rate.period_log_likelihoods > RHYTHM_EXCLUDED] - magnitude)
+    return bool(np.all(off_rps > RHYTHM_SIGMAS * math.hypot(std, RHYTHM_SHARE * magnitude, SIGHT_RPS)))
+
+
 def _rarer_polarity(state: ContrastState) -> float:
     """Share of the polarity that fewer of the events have."""
     share = float(np.mean(np.concatenate([part.polarity for _, part in state.parts])))
     return min(share, 1.0 - share)
+
+
+def _judged(
+    parameters: ContrastParameters,
+    state: ContrastState,
+    answer: ContrastEstimate,
+    count: int,
+    rate: RateResult,
+    normal_flow: SpinEstimate,
+) -> tuple[SpinEstimate, bool]:
+    """Estimate of an answer from `count` events or its refusal, and whether a pattern is seen to turn.
+
+    An answer is settled where the logo says so much that neither its rhythm nor its normal flow can put it in doubt.
+    """
+    assert answer.spin_rps is not None and answer.covariance_rps2 is not None
+    settled = is_settled(parameters, state)
+    may_be_outline = answer.turns < RETURNED_TURNS and _rarer_polarity(state) < LEAST_OF_POLARITY
+    off_rhythm = not settled and misses_rhythm(rate, answer)
+    turns_seen = answer.contrast >= parameters.min_gain and not may_be_outline and not off_rhythm
+    estimate = SpinEstimate(METHOD, answer.spin_rps.copy(), answer.covariance_rps2.copy(), None, count)
+    reason, against = state.reason, None
+    if reason is not None:
+        # Where nothing turns, the normal flow has seen no pattern either, but noise; of two spins it is a mixture.
+        against = None if turns_seen and not state.changes else FLOW_METHOD
+    elif may_be_outline:
+        reason = (
+            "nearly all logo events have one polarity and have not come back: a slow sensor's outline does that too"
+        )
+    elif not settled and (sigmas := sigmas_apart(estimate, normal_flow)) > parameters.flow_sigmas:
+        best, other = vector_words(answer.spin_rps), vector_words(normal_flow.vector_rps)
+        reason, against = f"the normal flow says {other}, {sigmas:.0f} sigma from {best}", FLOW_METHOD
+    elif off_rhythm:
+        reason = (
+            f"the logo comes back with {rate.period_spins_rps[0]:.1f} rps, not with {vector_words(answer.spin_rps)}"
+        )
+    if reason is not None:
+        return SpinEstimate.refused(METHOD, reason, count, against=against), turns_seen
+    return estimate, turns_seen
 
 
 def _result(
@@ -255,17 +413,7 @@ def _result(
     answer = state.answer
     if answer is None or answer.spin_rps is None or answer.covariance_rps2 is None:
         return ContrastResult.nothing(SpinEstimate.refused(METHOD, state.reason or "no estimate yet", count))
-    estimate, turns_seen = judged(
-        parameters,
-        answer,
-        state.reason,
-        state.changes,
-        is_settled(parameters, state),
-        _rarer_polarity(state),
-        rate,
-        flow,
-        count,
-    )
+    estimate, turns_seen = _judged(parameters, state, answer, count, rate, flow)
     middle_us, half_us = answer.reference_s * 1e6, 0.5e6 * answer.span_s
     return ContrastResult(
         estimate=estimate.up_to(state.context["spin.max_spin_rps"]),

@@ -23,15 +23,15 @@ CHAIN = [
         "(number + 1) * tick_us",
         "tests/pipeline/test_chain.py",
     ),
-    Mutant("pipeline/chain.py", "column.fault = error", "pass", "tests/pipeline/test_chain.py"),
+    Mutant("pipeline/column_cache.py", "column.fault = error", "pass", "tests/pipeline/test_chain.py"),
     Mutant(
-        "pipeline/chain.py",
-        "one.first + len(one.results) > last[shot] for",
-        "len(one.results) > 0 for",
+        "pipeline/column_cache.py",
+        "column.first + len(column.results) > index",
+        "len(column.results) > 0",
         "tests/pipeline/test_chain_balls.py",
     ),
     Mutant(
-        "pipeline/chain.py",
+        "pipeline/column_cache.py",
         "key=lambda k: self._columns[k].last_use",
         "key=lambda k: -self._columns[k].last_use",
         "tests/pipeline/test_chain.py",
@@ -50,8 +50,8 @@ CHAIN = [
     ),
     Mutant(
         "pipeline/chain.py",
-        "chain, key = self._chain, (self._keys[stage.name], shot)",
-        "chain, key = self._chain, (self._keys[stage.name], None)",
+        "key = (self._keys[stage.name], shot)",
+        "key = (self._keys[stage.name], None)",
         "tests/pipeline/test_chain_balls.py",
     ),
     Mutant(
@@ -206,13 +206,13 @@ VALUES = [
         "tests/pipeline/test_shots.py tests/pipeline/test_results.py",
     ),
     Mutant(
-        "pipeline/session.py",
+        "pipeline/recordings/source.py",
         "(int(events.t_us[0]), int(events.t_us[-1]) + 1)",
         "(int(events.t_us[0]), int(events.t_us[-1]))",
         "tests/pipeline/test_session.py -k every_event",
     ),
     Mutant(
-        "pipeline/session.py",
+        "pipeline/recordings/source.py",
         "EventsInMemory((recording.identity(), window_us), events",
         "EventsInMemory((recording.identity(),), events",
         "tests/pipeline/test_session.py -k different_sources",

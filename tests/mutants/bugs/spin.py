@@ -57,13 +57,13 @@ CONTRAST = [
         "tests/pipeline/stages/test_contrast_memory.py -k flies_on",
     ),
     Mutant(
-        "pipeline/spin/contrast/trust.py",
-        "None if turns_seen and not changes else FLOW_METHOD",
+        "pipeline/spin/contrast/stage.py",
+        "None if turns_seen and not state.changes else FLOW_METHOD",
         "FLOW_METHOD",
         "tests/pipeline/stages/test_contrast_memory.py -k nothing_turns",
     ),
     Mutant(
-        "pipeline/spin/contrast/trust.py",
+        "pipeline/spin/contrast/stage.py",
         "np.linalg.solve(one.covariance_rps2 + other.covariance_rps2, off)",
         "np.linalg.solve(one.covariance_rps2, off)",
         "tests/pipeline/stages/test_contrast_memory.py -k heard_from",

@@ -14,7 +14,7 @@ from spinscope.pipeline.registry import Parameters, trusted_method
 from spinscope.pipeline.results import MethodResult, Packet, SpinEstimate
 from spinscope.pipeline.spin.combined import stage as combined
 from spinscope.pipeline.spin.combined.result import CombinedResult
-from spinscope.pipeline.spin.contrast.result import ContrastResult
+from spinscope.pipeline.spin.contrast import ContrastResult
 from spinscope.pipeline.spin.trajectory.stage import TrajectoryResult
 from spinscope.pipeline.stages import logo, rate
 from spinscope.pipeline.stages.logo import TurningEvents

@@ -10,10 +10,10 @@ import pytest
 
 import spinscope
 from spinscope.pipeline.kernels.arrays import Floats
-from spinscope.pipeline.spin.contrast.change import estimates_of_ends
+from spinscope.pipeline.spin.contrast import ContrastParameters
+from spinscope.pipeline.spin.contrast.estimate import estimates_of_ends
 from spinscope.pipeline.spin.contrast.events import BallUncertainty, ContrastEstimate, ContrastSettings, SphereEvents
-from spinscope.pipeline.spin.contrast.parameters import ContrastParameters
-from spinscope.pipeline.spin.contrast.trust import change_doubt
+from spinscope.pipeline.spin.contrast.stage import change_doubt
 from spinscope.pipeline.stages import track
 from tests.reference.contrast import dotted_ball
 

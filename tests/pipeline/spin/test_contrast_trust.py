@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinscope.pipeline.spin.contrast import stage, trust
+from spinscope.pipeline.spin.contrast import ContrastParameters, stage
 from spinscope.pipeline.spin.contrast.events import ContrastEstimate
-from spinscope.pipeline.spin.contrast.parameters import ContrastParameters
 from spinscope.pipeline.stages import rate
 from spinscope.pipeline.stages.rate import RateResult
 from tests.reference.contrast import dotted_ball
@@ -55,17 +54,17 @@ RIVALS = {"rivals_rps": np.array([[0.0, 30.0, 0.0], [0.0, 0.0, 9.0]])}
 def test_each_threshold_is_where_its_parameter_says(
     trusted: ContrastEstimate, doubted: ContrastEstimate, reason: str
 ) -> None:
-    assert trust.doubt(PARAMETERS, trusted) is None
-    assert re.search(reason, trust.doubt(PARAMETERS, doubted) or "")
+    assert stage.doubt(PARAMETERS, trusted) is None
+    assert re.search(reason, stage.doubt(PARAMETERS, doubted) or "")
 
 
 @pytest.mark.parametrize(("off_rps", "changes"), [(0.69, False), (0.72, True)])
 def test_a_change_of_spin_is_seen_beyond_its_sigmas(off_rps: float, changes: bool) -> None:
     """5 sigma of two ends of 0.1 rps each: 0.71 rps. An end that is not to be trusted by itself shows nothing."""
     late = uncertain(0.1, 2.0, SPIN * (1.0 + off_rps / 20.0))
-    reason = trust.change_doubt(replace(PARAMETERS, change_sigmas=5.0), SURE, late)
+    reason = stage.change_doubt(replace(PARAMETERS, change_sigmas=5.0), SURE, late)
     assert (reason is not None) == changes
-    assert trust.change_doubt(replace(PARAMETERS, change_sigmas=5.0), SURE, replace(late, contrast=0.2)) is None
+    assert stage.change_doubt(replace(PARAMETERS, change_sigmas=5.0), SURE, replace(late, contrast=0.2)) is None
 
 
 def rhythm(*spins_rps: float, sigmas: float = 9.0) -> RateResult:
@@ -91,7 +90,7 @@ def rhythm(*spins_rps: float, sigmas: float = 9.0) -> RateResult:
     ],
 )
 def test_an_answer_has_one_of_the_rhythms_magnitudes(told: RateResult, misses: bool) -> None:
-    assert trust.misses_rhythm(told, SURE) == misses
+    assert stage.misses_rhythm(told, SURE) == misses
 
 
 @pytest.mark.parametrize(("off", "share"), [(0, 0.0), (3, 0.03), (50, 0.5), (98, 0.02)])

@@ -10,10 +10,15 @@ import pytest
 
 from spinscope.pipeline.results import SpinEstimate
 from spinscope.pipeline.spin.contrast import estimate as contrast
-from spinscope.pipeline.spin.contrast import uncertainty
-from spinscope.pipeline.spin.contrast.estimate import LOG_ODDS_PER_SIGMA, estimate_spin, follow_spin
-from spinscope.pipeline.spin.contrast.events import BallUncertainty, ContrastSettings
-from spinscope.pipeline.spin.contrast.result import UNEXPLAINED, ContrastResult
+from spinscope.pipeline.spin.contrast import search
+from spinscope.pipeline.spin.contrast.estimate import estimate_spin, follow_spin
+from spinscope.pipeline.spin.contrast.events import (
+    LOG_ODDS_PER_SIGMA,
+    UNEXPLAINED,
+    BallUncertainty,
+    ContrastResult,
+    ContrastSettings,
+)
 from tests.reference.contrast import dotted_ball
 
 BALL = BallUncertainty(centre_std_px=0.2, radius_std_px=0.2)
@@ -24,7 +29,7 @@ def twist(speed_px_s: float, turns: float) -> np.ndarray:
     spin = 2 * math.pi * SPIN
     events = dotted_ball(SPIN)
     ball = replace(BALL, speed_px_s=speed_px_s)
-    return uncertainty._twist(events, ball, spin, turns / float(np.linalg.norm(SPIN)))
+    return search._twist(events, ball, spin, turns / float(np.linalg.norm(SPIN)))
 
 
 def test_a_fast_flight_leaves_the_turn_about_the_logos_middle_open() -> None:

@@ -13,9 +13,8 @@ from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.registry import trusted_method
 from spinscope.pipeline.results import MethodResult, SpinEstimate
 from spinscope.pipeline.session import Choices, Session
+from spinscope.pipeline.spin.contrast import ContrastParameters, ContrastResult
 from spinscope.pipeline.spin.contrast import stage as contrast
-from spinscope.pipeline.spin.contrast.parameters import ContrastParameters
-from spinscope.pipeline.spin.contrast.result import ContrastResult
 from spinscope.pipeline.stages.logo import LogoResult
 from tests.spinning_ball import CONTEXT, after_track, known_track, packets
 

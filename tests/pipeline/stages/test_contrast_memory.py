@@ -11,10 +11,10 @@ import pytest
 
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.results import MethodResult, Packet, SpinEstimate
+from spinscope.pipeline.spin.contrast import ContrastParameters
 from spinscope.pipeline.spin.contrast import stage as contrast
 from spinscope.pipeline.spin.contrast.events import ContrastEstimate
-from spinscope.pipeline.spin.contrast.parameters import ContrastParameters
-from spinscope.pipeline.spin.contrast.trust import doubt
+from spinscope.pipeline.spin.contrast.stage import doubt
 from spinscope.pipeline.stages import logo, rate
 from spinscope.pipeline.stages.filter import FilterResult
 from tests.reference.contrast import dotted_ball
