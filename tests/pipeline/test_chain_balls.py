@@ -100,6 +100,11 @@ def test_late_shots_are_the_same_in_batch_tick_by_tick_and_resumed(toys: Toys, t
     assert flown(list(chain.run(DEFAULT, together=together))) == whole
     assert toys.counts == counted, "nothing twice"
     assert all(chain.knows(DEFAULT, name) for name in INPUTS)
+
+
+def test_late_shots_are_the_same_while_the_source_grows(toys: Toys) -> None:
+    toys.flying = late_shots
+    whole = flown(list(Chain(source()).run(DEFAULT)))
     growing = Chain(dataclasses.replace(source(), growing=True, end_us=0))
     for end_us in range(0, source().end_us, 3700):
         growing.source = dataclasses.replace(source(), growing=True, end_us=end_us)

@@ -21,6 +21,7 @@ from spinscope.pipeline.session import Choices
 from .browser_tab import CHROMIUM, FLAGS, SIZE, Tab, bare_tab
 
 PATIENCE_S = 120.0  # the first run on a machine compiles the kernels
+PLAIN: dict[str, Any] = {"verify": False}  # reading the certificates takes a client longer than a test's requests
 
 
 @dataclass
@@ -34,7 +35,7 @@ class Served:
 
     def open(self, recording: str | None = None) -> Client:
         """A new page that listens; closed with the server at the latest."""
-        http = httpx.Client(timeout=60.0)
+        http = httpx.Client(timeout=60.0, **PLAIN)
         answer = http.post(f"{self.address}api/sessions", json={"recording": recording})
         assert answer.status_code == 200, answer.text
         client = Client(self.address, answer.json(), http)
@@ -106,7 +107,7 @@ class Client:
 
     def listen(self) -> None:
         """Gather the messages until the server ends them."""
-        with httpx.stream("GET", self.path("messages"), timeout=None) as stream:
+        with httpx.stream("GET", self.path("messages"), timeout=None, **PLAIN) as stream:
             for line in stream.iter_lines():
                 if line.startswith("data: "):
                     with self._arrived:

@@ -238,8 +238,9 @@ def test_nothing_outside_the_folder_is_opened(tuner: Served, name: str) -> None:
     assert answer.status_code == 400 and "in the opened folder" in answer.json()["error"]
 
 
-def test_the_page_fetches_nothing_from_elsewhere(tuner: Served) -> None:
-    index = httpx.get(tuner.address)
+def test_the_page_fetches_nothing_from_elsewhere(client: Client, tuner: Served) -> None:
+    http = client.http
+    index = http.get(tuner.address)
     assert index.status_code == 200
     policy = index.headers["content-security-policy"]
     assert "default-src 'self'" in policy and "http" not in policy
@@ -247,7 +248,7 @@ def test_the_page_fetches_nothing_from_elsewhere(tuner: Served) -> None:
     for path in (path for path in static.rglob("*") if path.is_file()):
         text = path.read_text(encoding="utf-8").replace("http://www.w3.org/", "")
         assert "http://" not in text and "https://" not in text, path
-        assert httpx.get(f"{tuner.address}static/{path.relative_to(static).as_posix()}").status_code == 200
+        assert http.get(f"{tuner.address}static/{path.relative_to(static).as_posix()}").status_code == 200
 
 
 def test_the_viewer_is_served_with_its_class_and_its_program(tuner: Served) -> None:
