@@ -1,9 +1,10 @@
 """Fixtures, options and workers of all tests.
 
-A run of everything has three workers on two cores, for browsers and limits of time leave a core idle. Numba keeps
+A run of everything has four workers on two cores, for browsers and limits of time leave a core idle. Numba keeps
 machine code beside the sources, so what one of them compiles the others load; a lock for each function has them wait
 for it instead of compiling the same. So that they need not wait, one begins with the file that compiles most and the
-others with files that need hardly any kernel.
+others with files that need hardly any kernel. Files with a browser, which waits more than it computes, come one by one
+among the others, and no file that takes long comes near the end, where the other workers would wait for it.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ settings.register_profile("spinscope", deadline=None, max_examples=50, derandomi
 settings.load_profile("spinscope")
 
 SAMPLES = Path(__file__).parents[1] / "sample_recordings"
-WORKERS = 3
+WORKERS = 4
+OTHERS_BETWEEN = 4  # files between two with a browser
 FIRST = (
     "pipeline/stages/test_contract.py",  # compiles all kernels of the stages
     "pipeline/recordings/test_recordings_fuzz.py",
@@ -60,11 +62,16 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the files named in FIRST first, then those with most tests."""
+    """Put the files named in FIRST first, then those with most tests; spread those with a browser among them."""
     folder = Path(__file__).parent
     rank = {folder / name: number for number, name in enumerate(FIRST)}
     count = Counter(item.path for item in items)
-    items.sort(key=lambda item: (rank.get(item.path, len(rank)), -count[item.path]))
+    files = sorted(count, key=lambda path: (rank.get(path, len(rank)), -count[path]))
+    browsers = {item.path for item in items if item.get_closest_marker("browser")} - rank.keys()
+    place: dict[Path, float] = {path: at for at, path in enumerate(path for path in files if path not in browsers)}
+    for number, path in enumerate((path for path in files if path in browsers), start=1):
+        place[path] = len(rank) + number * OTHERS_BETWEEN - 0.5
+    items.sort(key=lambda item: place[item.path])
 
 
 def pytest_configure(config: pytest.Config) -> None:
