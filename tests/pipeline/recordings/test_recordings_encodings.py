@@ -72,6 +72,8 @@ def check_room(kinds: list[str], room: int, trigger_room: int, encoding: str) ->
         halves = [0, *(masks[kind] for kind in kinds)]
         twin = naive_evt2(heads, halves)
         arrays = [np.array(heads, np.uint32), np.array(halves, np.uint32)]
+    for array in arrays:
+        array.flags.writeable = False  # as those of the reader: one compilation serves both
     state = initial_state()
     found, edges, at = [], [], 0
     for _ in range(3 * len(arrays[0]) + 1):

@@ -111,11 +111,16 @@ class RawDecoder:
             damage.lost_bytes = len(self._rest)
 
     def _words(self, data: bytes) -> tuple[NDArray[Any], NDArray[np.uint32]]:
-        """All whole words, the masks of EVT2.1 apart; no masks in other encodings."""
+        """All whole words, the masks of EVT2.1 apart; no masks in other encodings.
+
+        All are read-only: for others the decoder would be compiled once more.
+        """
         count = len(data) // self._word_bytes
         if self._encoding != "EVT2.1":
-            return np.frombuffer(data, f"<u{self._word_bytes}", count), np.empty(0, np.uint32)
-        first, second = np.ascontiguousarray(np.frombuffer(data, "<u4", 2 * count).reshape(-1, 2).T)
+            return np.frombuffer(data, f"<u{self._word_bytes}", count), np.frombuffer(b"", np.uint32)
+        halves = np.ascontiguousarray(np.frombuffer(data, "<u4", 2 * count).reshape(-1, 2).T)
+        halves.flags.writeable = False
+        first, second = halves
         return (first, second) if self._legacy else (second, first)
 
     def _decode(self, heads: NDArray[Any], masks: NDArray[np.uint32], final: bool) -> tuple[int, UncheckedEvents]:
