@@ -75,7 +75,7 @@ class Chain:
         self.rivals = tuple(rivals)
         self.stages = default_stages(rivals)
         self.seconds = dict.fromkeys(STAGES.names, 0.0)
-        self._columns = ColumnCache(budget_bytes, max_columns)
+        self._cache = ColumnCache(budget_bytes, max_columns)
         self._clock = clock
 
     def tick_count(self, parameters: Parameters) -> int:
@@ -242,11 +242,11 @@ class Chain:
         """Whether a stage's results of every tick so far are kept."""
         keys, count = self.keys(parameters), self.tick_count(parameters)
         of_recording = keys["track" if STAGES[name].scope == "ball" else name]
-        tracks = self._columns.results((of_recording, None), count)
+        tracks = self._cache.results((of_recording, None), count)
         if tracks is None or STAGES[name].scope == "recording":
             return tracks is not None
         last = {ball.shot: index for index, track in enumerate(tracks) for ball in track.balls}
-        return all(self._columns.reaches((keys[name], shot), index) for shot, index in last.items())
+        return all(self._cache.reaches((keys[name], shot), index) for shot, index in last.items())
 
 
 class _Run:
@@ -272,13 +272,13 @@ class _Run:
         column = self._columns.get((stage.name, shot))
         if column is None:
             key = (self._keys[stage.name], shot)
-            column = self._chain._columns.begun(key, first, lambda: self._chain.start(self._parameters, stage))
+            column = self._chain._cache.begun(key, first, lambda: self._chain.start(self._parameters, stage))
             self._columns[stage.name, shot] = column
         return column
 
     def result(self, stage: Stage, column: Column, index: int, inputs: Mapping[str, Any]) -> Any:
         """The stage's result of tick number `index`, made from its inputs unless it is known."""
-        return self._chain._columns.result(
+        return self._chain._cache.result(
             column,
             index,
             lambda: self._step(stage, column.state, inputs),
@@ -336,7 +336,7 @@ class _Run:
         for (_, results), flying in zip(rows, balls, strict=True):
             yield self.tick(of_ball, results, flying)
         self.let_go_of_ended_shots()
-        self._chain._columns.keep_budget({column.key for column in self._columns.values()})
+        self._chain._cache.keep_budget({column.key for column in self._columns.values()})
 
     def let_go_of_ended_shots(self) -> None:
         """Let the budget have the columns of shots that are over, and drop those whose results are not kept."""
@@ -344,7 +344,7 @@ class _Run:
         for name in ended:
             column = self._columns.pop(name)
             if not column.is_kept:
-                self._chain._columns.drop(column)
+                self._chain._cache.drop(column)
 
     def tick(self, of_ball: list[Stage], results: dict[str, Any], balls: list[list[_BallInputs]]) -> Tick:
         """The tick with all results."""

@@ -44,6 +44,8 @@ FIRST = (
     "app/coach/test_page.py",
     "app/coach/test_page_access.py",
     "pipeline/test_isolation.py",
+    "pipeline/evaluation/test_suites.py",  # the longest of all, though of few tests
+    "app/test_batch.py",
 )
 
 

@@ -233,5 +233,5 @@ def test_an_estimate_keeps_no_columns_of_shots_that_are_over(samples: Path) -> N
     )
     session = Session.open(RecordingInMemory(rally, **SIZE))
     assert len(session.estimate("triplet").shots) == 3
-    assert len({shot for _, shot in session.chain._columns if shot is not None}) <= 1
-    assert not any(column.results for column in session.chain._columns.values())
+    assert len({shot for _, shot in session.chain._cache._columns if shot is not None}) <= 1
+    assert not any(column.results for column in session.chain._cache._columns.values())
