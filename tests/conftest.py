@@ -44,8 +44,12 @@ FIRST = (
     "app/coach/test_page.py",
     "app/coach/test_page_access.py",
     "pipeline/test_isolation.py",
-    "pipeline/evaluation/test_suites.py",  # the longest of all, though of few tests
+    "pipeline/evaluation/test_suites.py",  # this one and those below take long, though of few tests
     "app/test_batch.py",
+    "docs/test_build.py",
+    "docs/test_examples.py",
+    "pipeline/calibration/test_camera_calibration.py",
+    "pipeline/calibration/test_stereo_calibration.py",
 )
 
 
