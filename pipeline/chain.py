@@ -336,7 +336,7 @@ class _Run:
         for (_, results), flying in zip(rows, balls, strict=True):
             yield self.tick(of_ball, results, flying)
         self.let_go_of_ended_shots()
-        self._chain._cache.keep_budget({column.key for column in self._columns.values()})
+        self._chain._cache.keep_budget(self._columns.values())
 
     def let_go_of_ended_shots(self) -> None:
         """Let the budget have the columns of shots that are over, and drop those whose results are not kept."""

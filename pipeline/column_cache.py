@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Collection, Hashable
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -102,13 +102,14 @@ class ColumnCache:
         with self._lock:
             self._columns.pop(column.key, None)
 
-    def keep_budget(self, in_use: Collection[Hashable]) -> None:
+    def keep_budget(self, in_use: Iterable[Column]) -> None:
         """Drop columns, none of those in use, until the others are within the budget."""
         with self._lock:
             total = sum(column.bytes for column in self._columns.values())
             if total <= self._budget_bytes and len(self._columns) <= self._max_columns:
                 return  # comparing the keys of all columns would take longer than a quick tick
-            for key in sorted(self._columns.keys() - in_use, key=lambda k: self._columns[k].last_use):
+            others = self._columns.keys() - {column.key for column in in_use}
+            for key in sorted(others, key=lambda k: self._columns[k].last_use):
                 if total <= self._budget_bytes and len(self._columns) <= self._max_columns:
                     break
                 total -= self._columns.pop(key).bytes
