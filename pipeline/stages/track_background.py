@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ..camera import Camera
 from ..events import EventBatch
+from ..kernels.tiles import events_by_tile
 from .track_search import supported_events
 
 # Tiles of the image along each axis, and events within the last milliseconds that show an edge moving in one.
@@ -30,6 +31,5 @@ def background_moves(events: EventBatch, last_us: NDArray[np.uint16], camera: Ca
 
 
 def _busy_tiles(events: EventBatch, camera: Camera) -> int:
-    columns = events.x_px.astype(np.int64) * TILES // camera.width_px
-    rows = events.y_px.astype(np.int64) * TILES // camera.height_px
-    return int(np.count_nonzero(np.bincount(rows * TILES + columns, minlength=TILES**2) >= LEAST_EVENTS))
+    counts = events_by_tile(events.x_px, events.y_px, camera.width_px, camera.height_px, TILES)
+    return int(np.count_nonzero(counts >= LEAST_EVENTS))

@@ -1,0 +1,24 @@
+"""Counts of events by tiles of the image."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from .arrays import Integers, Pixels
+
+
+@njit(cache=True, nogil=True)
+def events_by_tile(x_px: Pixels, y_px: Pixels, width_px: int, height_px: int, tiles: int) -> Integers:
+    """Number (tiles, tiles) int64 of events in each tile of an image of this size, by row and column.
+
+    Tiles are looked up by row and column, for a division an event would take most of the time: with NumPy's functions
+    4 x as slow.
+    """
+    tile_of_column = np.arange(width_px) * tiles // width_px
+    tile_of_row = np.arange(height_px) * tiles // height_px
+    counts = np.zeros((tiles, tiles), np.int64)
+    for n in range(x_px.size):
+        i = np.uint64(n)
+        counts[tile_of_row[y_px[i]], tile_of_column[x_px[i]]] += 1
+    return counts
