@@ -7,6 +7,7 @@ of a shot so far is told while the ball flies and as soon as its end is known; t
 
 from __future__ import annotations
 
+import gc
 import queue
 import sys
 import threading
@@ -161,6 +162,7 @@ class LiveRun:
         self._spins.start()
         switch_s = sys.getswitchinterval()
         sys.setswitchinterval(SWITCH_S)
+        gc.freeze()  # nobody looks for garbage among what is there already: 0.1 s in which no thread works
         self.stream.start()
         tracker.start()
         next_status_s = now_s() + STATUS_S
@@ -186,6 +188,7 @@ class LiveRun:
             tracker.join()
             self._spins.join()
             self.stream.join()
+            gc.unfreeze()
             sys.setswitchinterval(switch_s)
         yield self._status(STATUS_S - max(next_status_s - now_s(), 0.0))
 

@@ -6,6 +6,7 @@ it can, and one answers the whole shots as `analyze` does, when no ball is in fl
 
 from __future__ import annotations
 
+import gc
 import os
 import queue
 import sys
@@ -365,6 +366,7 @@ def serve() -> None:
             run: SpinRun | None = receive_value(requests)
             if run is None:
                 load_stages()
+                gc.freeze()  # as in `LiveRun.outputs`
             else:
                 LiveSpins(run, send).work(lambda: receive_value(requests))
             send(None)
