@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from .events import ColumnBatch, EventBatch
 
 Vector = NDArray[np.float64]
+PLAIN = frozenset({bool, int, float, str, type(None)})  # types of values that hold no array
 
 
 class ReadOnlyArrays:
@@ -180,11 +182,18 @@ def nbytes(result: Any) -> int:
     """Bytes of all arrays held by a (nested) result; views count as what they show."""
     if isinstance(result, np.ndarray):
         return result.nbytes
+    items: Iterable[Any]
     if isinstance(result, (tuple, list)):
-        return sum(nbytes(item) for item in result)
-    if isinstance(result, dict):
-        return sum(nbytes(item) for item in result.values())
-    return sum(nbytes(getattr(result, name)) for name in _field_names(result.__class__))
+        items = result
+    elif isinstance(result, dict):
+        items = result.values()
+    else:
+        items = [getattr(result, name) for name in _field_names(result.__class__)]
+    total = 0
+    for item in items:
+        if item.__class__ not in PLAIN:  # nearly all are
+            total += nbytes(item)
+    return total
 
 
 @cache

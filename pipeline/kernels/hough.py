@@ -97,10 +97,10 @@ def best_circles(
     perimeter = np.empty(radii)
     for k in range(radii):
         perimeter[k] = 2.0 * math.pi * max(radius0_px + k, 1)
-    near = _pixels_with_others(x_px, y_px, 2 * reach, math.ceil(math.sqrt(least_support * perimeter[0])))
-    if near.size == 0:
+    voters = _pixels_with_others(x_px, y_px, 2 * reach, math.ceil(math.sqrt(least_support * perimeter[0])))
+    if voters.size == 0:
         return np.empty(0), np.empty((0, 3), np.int64)
-    x_px, y_px = x_px[near], y_px[near]
+    x_px, y_px = x_px[voters], y_px[voters]
     left, top = x_px.min() - reach, y_px.min() - reach
     width, height = x_px.max() + reach + 1 - left, y_px.max() + reach + 1 - top
     offsets = _offsets(radius0_px, radii, width)

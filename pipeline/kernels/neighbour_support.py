@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .arrays import Events, Integers, Pixels
+from .arrays import Bytes, Events, Integers, Pixels
 
 # Events that span more are all taken for simultaneous at the end.
 MOST_US = 65_535
@@ -78,6 +78,6 @@ def _events_in_company(width_px: int, height_px: int, x_px: Pixels, y_px: Pixels
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _two_bytes(numbers: Pixels, at: np.uint64) -> np.uint64:
+def _two_bytes(numbers: Bytes, at: np.uint64) -> np.uint64:
     """Two bytes as one number, the lower one first."""
     return np.uint64(numbers[at]) | np.uint64(numbers[at + ONE]) << np.uint64(8)

@@ -227,15 +227,15 @@ class TrackedBall:
 
     def own_events(self, events: EventBatch, others: list[TrackedBall], end_us: int) -> EventBatch:
         """Events without those that are nearer to the outline of another ball which this one's touches."""
-        mean = self.filter.mean
-        near = [
-            other.filter.mean
-            for other in others
-            if np.hypot(*(other.filter.mean - mean)[:2]) < other.filter.mean[4] + mean[4] + APART_PX
-        ]
+        x, y, _, _, radius = self.filter.mean.tolist()
+        near = []
+        for other in others:
+            other_x, other_y, _, _, other_radius = other.filter.mean.tolist()
+            if math.hypot(other_x - x, other_y - y) < other_radius + radius + APART_PX:
+                near.append(other.filter.mean)
         if not near:
             return events
-        rows = crossing.nearest_outline(mean, np.array(near), events.columns, end_us)
+        rows = crossing.nearest_outline(self.filter.mean, np.array(near), events.columns, end_us)
         return EventBatch(*take_events(rows, events.columns))
 
     def measure(self, measuring: Measuring, events: EventBatch, start_us: int, end_us: int) -> Sighting | None:
@@ -301,12 +301,13 @@ class TrackedBall:
 
     def shares_outline(self, other: TrackedBall) -> bool:
         """Whether both are measured at the same place and fly the same way: crossing balls differ in velocity."""
-        off = np.abs(self.filter.mean - other.filter.mean)
-        both = self.measured is not None and other.measured is not None
-        return both and bool(
-            np.hypot(*off[:2]) < 0.5 * self.filter.mean[4]
-            and np.hypot(*off[2:4]) < SAME_VELOCITY * np.hypot(*self.filter.mean[2:4])
-        )
+        if self.measured is None or other.measured is None:
+            return False
+        x, y, vx, vy, radius = self.filter.mean.tolist()
+        other_x, other_y, other_vx, other_vy, _ = other.filter.mean.tolist()
+        return math.hypot(other_x - x, other_y - y) < 0.5 * radius and math.hypot(
+            other_vx - vx, other_vy - vy
+        ) < SAME_VELOCITY * math.hypot(vx, vy)
 
     def was_near(self, mean: Floats, end_us: int) -> bool:
         """Whether its circle of the tick with this end touched, or nearly, the outline of a ball of this state (5,)."""
