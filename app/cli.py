@@ -24,7 +24,15 @@ from .commands.simulate import simulate
 from .commands.split import split
 from .commands.tune import tune
 from .commands.view import view
-from .terminal import FULL_DISK, announce_compilation, drop_output, exit_on_signals, note, prepare_streams
+from .terminal import (
+    FULL_DISK,
+    announce_compilation,
+    drop_output,
+    exit_on_signals,
+    ignore_signals_at_exit,
+    note,
+    prepare_streams,
+)
 
 
 @click.group(
@@ -59,7 +67,11 @@ def main() -> None:
     prepare_streams()
     exit_on_signals()
     announce_compilation()
-    sys.exit(run(sys.argv[1:]))
+    try:
+        status = run(sys.argv[1:])
+    finally:
+        ignore_signals_at_exit()
+    sys.exit(status)
 
 
 def run(arguments: list[str]) -> int:

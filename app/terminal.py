@@ -5,8 +5,11 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 import time
 import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from errno import EDQUOT, EFBIG, EIO, ENOSPC
 from types import TracebackType
 
@@ -16,6 +19,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 UNFOLDED_COLUMNS = 1000  # wider than any table
 PATIENCE_S = 1.0  # work that ends sooner shows no bar
 LOGGED_S = 30.0  # from line to line of a log: 120 lines an hour
+_ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 FULL_DISK = (ENOSPC, EDQUOT, EFBIG, EIO)  # errors of writing that are the disk's
 
 
@@ -33,19 +37,59 @@ def prepare_streams() -> None:
 
 
 def exit_on_signals() -> None:
-    """End as on an error when the system asks the program to: half-written files are removed.
+    """End as on an error when the user or the system asks the program to: half-written files are removed.
 
-    A signal that comes while it ends, as from a shell that sends it to the whole group, would disturb that.
+    A signal that comes while it ends, as from a shell that sends it to the whole group, would disturb that: it is
+    ignored. A program started to outlive its terminal (`nohup`) does.
     """
-    signals = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
     def end(number: int, _: object) -> None:
-        for one in signals:
-            signal.signal(one, signal.SIG_IGN)
+        _ignore_signals()
+        if number == signal.SIGINT:
+            raise KeyboardInterrupt
         sys.exit(128 + number)
 
-    for one in signals:
-        signal.signal(one, end)
+    for one in _ENDING:
+        if one == signal.SIGINT or signal.getsignal(one) is not signal.SIG_IGN:
+            signal.signal(one, end)
+
+
+@contextmanager
+def ends_on_signals(stop: Callable[[], None]) -> Iterator[None]:
+    """Have the first signal that asks for the end call `stop` in the main thread, and ignore those after it.
+
+    Also after this block, where the rest of the program ends. In another thread nothing is done.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    has_stopped = False
+
+    def end(number: int, _: object) -> None:
+        nonlocal has_stopped
+        has_stopped = True
+        _ignore_signals()
+        stop()
+
+    before = {one: signal.signal(one, end) for one in _ENDING if signal.getsignal(one) is not signal.SIG_IGN}
+    try:
+        yield
+    finally:
+        if not has_stopped:
+            for one, handler in before.items():
+                signal.signal(one, handler)
+
+
+def _ignore_signals() -> None:
+    # By a handler: Python complains of a signal that came together with the first one and is ignored without.
+    for one in _ENDING:
+        signal.signal(one, lambda *_: None)
+
+
+def ignore_signals_at_exit() -> None:
+    """Ignore signals from here on, also when Python has taken its handlers away at its end."""
+    for one in _ENDING:
+        signal.signal(one, signal.SIG_IGN)
 
 
 def drop_output() -> None:

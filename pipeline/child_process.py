@@ -221,9 +221,11 @@ class IdleProcesses(Generic[Kept]):
 def pipes_to_parent() -> tuple[BinaryIO, BinaryIO]:
     """Pipe of the parent's requests and pipe of the answers, in a child process; prints then go nowhere.
 
-    Ctrl-C is the parent's, who then ends the process.
+    Signals that a terminal or system sends to all processes at once are the parent's, who then ends this one.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
     requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     with open(os.devnull, "r+b") as nothing:  # a library that prints must not disturb the answers
         os.dup2(nothing.fileno(), 0)

@@ -132,6 +132,8 @@ class CameraView(CameraObserver):
                 announced_ms=latencies_ms.get("announced"),
                 final_ms=latencies_ms.get("final"),
                 dropped=status.dropped,
+                outside=status.outside,
+                late=status.late,
                 skipped=status.skipped,
                 backlog_ms=status.backlog_ms,
                 spin_backlog_ms=status.spin_backlog_ms,
@@ -243,7 +245,7 @@ class CameraView(CameraObserver):
         camera = self.opened.camera
         check_biases(biases, camera.bias_limits, camera.name)
         self._biases |= biases
-        self.opened.run.stream.set_biases(biases)
+        self.opened.set_biases(biases)
 
     def sweep_bias(
         self, name: str, points: int, report: Callable[[BiasSweep], None], check: Callable[[], None]
@@ -251,7 +253,7 @@ class CameraView(CameraObserver):
         """Step the camera through the range of a bias, and give it its former value again."""
         live = self.opened
         sweep = CameraSweep(
-            name, live.camera.bias_limits, self._biases, live.run.stream.set_biases, points=points, on_point=report
+            name, live.camera.bias_limits, self._biases, live.set_biases, points=points, on_point=report
         )
         report(sweep.sweep)
         self._sweep = sweep

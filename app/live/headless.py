@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 import gc
-import signal
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, nullcontext
+from collections.abc import Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
 from spinscope.pipeline.cameras import ArrivedTick, EventCamera, EventStream, Notice, RecentEvents
 from spinscope.pipeline.cameras.event_stream import Sink
+from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.live import LiveRun, load_kernels
 from spinscope.pipeline.live_outputs import LiveBall, LiveNotice, LiveOutput, LiveShot, LiveSpin
 from spinscope.pipeline.result_rows import ResultRow
 from spinscope.pipeline.session import Choices, Session
 from spinscope.pipeline.tick import Tick
 
-from ..terminal import note
+from ..table_files import check_table_name
+from ..terminal import ends_on_signals, note
 from ..tuning.bias_sweep import BiasSweep
 from .camera_sweep import MEASURED_S, CameraSweep, proposal_words, proposed_value
 from .json_lines import JsonLines, JsonServer
-from .opening import CameraChoice, open_live
+from .opening import CameraChoice, open_live, opened_anew
 from .recording import CameraRecording, RecordChoice, take_markers
 from .shot_table import ShotTable
 from .sweep_figure import write_sweep_figure
@@ -81,19 +82,33 @@ class OpenLive:
 
     Attributes
     ----------
-    camera, session, run
-        Camera, parameters and run.
+    session, run
+        Parameters and run.
     recent : RecentEvents
         Its last events.
     recording : CameraRecording
         Its recording, which can begin and end.
     """
 
-    camera: EventCamera
     session: Session
     run: LiveRun
     recent: RecentEvents
     recording: CameraRecording
+
+    @property
+    def camera(self) -> EventCamera:
+        """The camera that is there."""
+        return self.run.stream.camera
+
+    def set_biases(self, biases: Mapping[str, int]) -> int:
+        """Change biases as `EventStream.set_biases` does, noted beside a recording under way."""
+        upto_us = self.run.stream.set_biases(biases)
+        if self.recording.present is not None:
+            try:
+                self.recording.mark("biases: " + ", ".join(f"{name} = {value}" for name, value in biases.items()))
+            except RecordingError as error:
+                note(str(error))
+        return upto_us
 
 
 class LiveObserver(Protocol):
@@ -126,8 +141,14 @@ def run_headless(
     SpinscopeError
         For what cannot be opened or written.
     """
-    table = None if to.table is None else ShotTable(to.table, method)
-    camera, session, reopen = open_live(chosen, choices)
+    if to.table is not None:
+        check_table_name(to.table)
+    camera, session = open_live(chosen, choices)
+    try:
+        table = None if to.table is None else ShotTable(to.table, method)
+    except BaseException:
+        camera.close()
+        raise
     warm_up()
     with ExitStack() as at_end:
         lines = None if to.lines is None else at_end.enter_context(JsonLines(to.lines))
@@ -138,17 +159,14 @@ def run_headless(
 
         recording: CameraRecording
         sweep: CameraSweep | None = None
+        run: LiveRun
 
         def stream(tick_us: int, on_notice: Notice) -> EventStream:
             nonlocal recording
             folder = Path.cwd() if to.record is None else to.record.path.parent
-            recording = CameraRecording(camera, session, folder, on_notice)
-            at_end.callback(recording.end)
-            if to.record is not None:
-                recording.begin(to.record)
-                take_markers(recording)
+            recording = CameraRecording(lambda: run.stream.camera, session, folder, on_notice)
             sinks: list[Sink] = [recording] if table is None else [recent, recording]
-            return EventStream(camera, tick_us, reopen=reopen, sinks=tuple(sinks), on_notice=on_notice)
+            return EventStream(camera, tick_us, reopen=opened_anew, sinks=tuple(sinks), on_notice=on_notice)
 
         def on_tick(arrived: ArrivedTick, tick: Tick, latency_ms: float) -> None:
             if sweep is not None:
@@ -157,21 +175,26 @@ def run_headless(
                 observer.add_tick(arrived, tick)
 
         run = LiveRun(stream, session.parameters, method, with_balls=server is not None, on_tick=on_tick)
+        live = OpenLive(session, run, recent, recording)
+        at_end.callback(recording.end)
+        if to.record is not None:
+            recording.begin(to.record)
+            take_markers(recording)
         if to.sweep is not None:
             sweep = CameraSweep(
                 to.sweep.name,
                 camera.bias_limits,
                 camera.biases,
-                run.stream.set_biases,
+                live.set_biases,
                 points=to.sweep.points,
                 measured_s=to.sweep.measured_s,
             )
         note(f"live: {camera.name} {camera.serial}, {camera.width_px} x {camera.height_px} px; Ctrl-C ends it")
         if observer is not None:
-            observer.begin(OpenLive(camera, session, run, recent, recording))
+            observer.begin(live)
         if table is not None:
             at_end.callback(table.close)
-        with ends_on_signals(run.stop) if observer is None else nullcontext():
+        with ends_on_signals(run.stop):
             for one in run.outputs():
                 of_shot = (session.camera, session.ball_radius_m) if isinstance(one, LiveShot) else ()
                 line = one.to_dict(*of_shot)
@@ -229,14 +252,3 @@ def warm_up() -> None:
     load_kernels()
     gc.collect()
     gc.freeze()
-
-
-@contextmanager
-def ends_on_signals(stop: Callable[[], None]) -> Iterator[None]:
-    """Let Ctrl-C and the end asked for by the system stop the run, which then writes what it has."""
-    before = {number: signal.signal(number, lambda *_: stop()) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

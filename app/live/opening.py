@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -41,8 +40,8 @@ class CameraChoice:
     fault: str | None = None
 
 
-def open_live(chosen: CameraChoice, choices: Choices) -> tuple[EventCamera, Session, Callable[[], EventCamera]]:
-    """The camera, a session with its parameters, and how to open the camera anew; raises SpinscopeError."""
+def open_live(chosen: CameraChoice, choices: Choices) -> tuple[EventCamera, Session]:
+    """The camera, and a session with its parameters; raises SpinscopeError."""
     biases = {} if chosen.biases is None else read_bias_values(chosen.biases)
     if choices.window_us is not None:
         raise ParameterError("a camera has no --window: `spinscope convert IN OUT --window` cuts a recording")
@@ -55,7 +54,7 @@ def open_live(chosen: CameraChoice, choices: Choices) -> tuple[EventCamera, Sess
         camera = replay_of(session, chosen)
         if biases:
             camera.set_biases(biases)
-        return camera, session, lambda: camera
+        return camera, session
     if chosen.loops or chosen.fault is not None:
         raise ParameterError("--loop and --fake are of a recording: give --replay FILE with them")
     opened = open_camera(chosen.serial, biases, chosen.options)
@@ -64,7 +63,14 @@ def open_live(chosen: CameraChoice, choices: Choices) -> tuple[EventCamera, Sess
     except BaseException:
         opened.close()
         raise
-    return opened, session, lambda: open_camera(opened.serial, opened.biases, chosen.options)
+    return opened, session
+
+
+def opened_anew(camera: EventCamera) -> EventCamera:
+    """A camera that was unplugged, as it was set last; raises CameraError while it is not back."""
+    if isinstance(camera, ReplayCamera):
+        return camera  # goes on where it was
+    return open_camera(camera.serial, camera.biases, camera.options)
 
 
 def replay_of(session: Session, chosen: CameraChoice) -> ReplayCamera:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 import threading
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import tomli_w
 
 from spinscope.pipeline.biases import BiasParameters
 from spinscope.pipeline.cameras import EventCamera, Notice, Recorder
+from spinscope.pipeline.cameras.recorder import EventFile
 from spinscope.pipeline.errors import ParameterError, RecordingError, SpinscopeError
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.live import raw_file
@@ -39,26 +41,34 @@ class RecordChoice:
     most_s: float | None = None
 
 
-def recorder(chosen: RecordChoice, camera: EventCamera, session: Session, on_notice: Notice) -> Recorder:
-    """A recorder of the camera; raises SpinscopeError when the first file cannot be created."""
+def recorder(chosen: RecordChoice, camera: Callable[[], EventCamera], session: Session, on_notice: Notice) -> Recorder:
+    """A recorder of the camera that is there when a file begins; raises SpinscopeError without a first file."""
     if chosen.path.suffix.lower() != ".raw":
         raise ParameterError(f"a camera is recorded as RAW: give a name that ends with .raw instead of {chosen.path}")
-    parameters, known = session.parameters, BiasParameters.tunables()
-    tables = sidecar_tables(parameters)
-    if known.keys() <= camera.biases.keys():
-        tables["biases"] = {name: camera.biases[name] for name in known}
-    device: dict[str, dict[str, Any]] = {
-        "device": {"name": camera.name, "serial": camera.serial},
-        "device_biases": dict(camera.biases),
-    }
+
+    def file(path: Path) -> EventFile:
+        return raw_file(path, camera().width_px, camera().height_px, {"serial_number": camera().serial})
+
     return Recorder(
         chosen.path,
-        lambda path: raw_file(path, camera.width_px, camera.height_px, {"serial_number": camera.serial}),
-        beside={".toml": toml_text(tables), ".settings.toml": toml_text({**device, **parameters.as_dict()})},
+        file,
+        beside=lambda: _texts_beside(camera(), session.parameters),
         most_bytes=None if chosen.most_mb is None else round(chosen.most_mb * 1e6),
         most_us=None if chosen.most_s is None else round(chosen.most_s * 1e6),
         on_notice=on_notice,
     )
+
+
+def _texts_beside(camera: EventCamera, parameters: Parameters) -> dict[str, str]:
+    """Sidecar of a recording that begins now, and the settings of camera and stages."""
+    tables, known = sidecar_tables(parameters), BiasParameters.tunables()
+    if known.keys() <= camera.biases.keys():
+        tables["biases"] = {name: camera.biases[name] for name in known}
+    device: dict[str, dict[str, Any]] = {
+        "device": {"name": camera.name, "serial": camera.serial, **asdict(camera.options)},
+        "device_biases": dict(camera.biases),
+    }
+    return {".toml": toml_text(tables), ".settings.toml": toml_text({**device, **parameters.as_dict()})}
 
 
 class CameraRecording:
@@ -66,15 +76,17 @@ class CameraRecording:
 
     Parameters
     ----------
-    camera, session
-        Camera, and session with the parameters to be kept beside the recording.
+    camera : callable
+        `camera() -> EventCamera`: the one that is there.
+    session : Session
+        Has the parameters to be kept beside the recording.
     folder : Path
         Where recordings go that nobody named.
     on_notice : callable
         Told why a recording ended early.
     """
 
-    def __init__(self, camera: EventCamera, session: Session, folder: Path, on_notice: Notice) -> None:
+    def __init__(self, camera: Callable[[], EventCamera], session: Session, folder: Path, on_notice: Notice) -> None:
         self._camera, self._session, self._folder, self._on_notice = camera, session, folder, on_notice
         self._recorder: Recorder | None = None
         self._lock = threading.Lock()  # of beginnings and ends

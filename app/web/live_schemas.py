@@ -43,8 +43,9 @@ class LiveSecond(Response):
         From a tick's first events to its track.
     announced_ms, final_ms : float or None
         From the last events of the second's last shot to its announced and to its final spin.
-    dropped, skipped : int
-        Packets that driver or ring lost and ticks left out of the work, since the start.
+    dropped, outside, late, skipped : int
+        Packets that driver or ring lost, events beyond the sensor and too late, and ticks left out of the work, all
+        since the start.
     backlog_ms, spin_backlog_ms : float
         Events that wait for the tracker, and for their final spins.
     noise_on_hz, noise_off_hz, ball_on_hz, ball_off_hz : float or None
@@ -58,6 +59,8 @@ class LiveSecond(Response):
     announced_ms: float | None
     final_ms: float | None
     dropped: int
+    outside: int
+    late: int
     skipped: int
     backlog_ms: float
     spin_backlog_ms: float

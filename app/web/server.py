@@ -10,13 +10,14 @@ import socket
 import sys
 import threading
 import webbrowser
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Generator
+from contextlib import contextmanager
 from pathlib import Path
 
 import uvicorn
 from fastapi import FastAPI
 
-from spinscope.app.terminal import ProgressBar, note
+from spinscope.app.terminal import ProgressBar, ends_on_signals, note
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.session import Choices
 
@@ -40,6 +41,15 @@ class _Server(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
         self._announce()
+
+    @contextmanager
+    def capture_signals(self) -> Generator[None, None, None]:
+        """End on the first signal; its own handlers raise it again at the end, and a second one as an error."""
+        with ends_on_signals(self._stop):
+            yield
+
+    def _stop(self) -> None:
+        self.should_exit = True
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         self._close()
@@ -140,12 +150,8 @@ def run_application(app: FastAPI, port: int | None, close: Callable[[], None], a
     config = uvicorn.Config(
         app, log_level="error", lifespan="on", access_log=False, server_header=False, timeout_graceful_shutdown=2
     )
-    try:
+    with listening:
         _Server(config, close, lambda: announce(listening.getsockname()[1])).run([listening])
-    except KeyboardInterrupt:  # Ctrl-C is how it is meant to end
-        return
-    finally:
-        listening.close()
 
 
 def _new_token() -> str:

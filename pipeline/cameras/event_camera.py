@@ -64,11 +64,14 @@ class EventCamera(ABC):
         Lowest and highest value of each bias, as the device states them.
     biases : Mapping of str to int
         Present values.
+    options : CameraOptions
+        What it leaves out by itself.
     can_wait : bool
         Whether it hands its events over whenever they are asked for, as no real camera does.
     """
 
     can_wait = False
+    options = CameraOptions()
     name: str
     serial: str
     width_px: int

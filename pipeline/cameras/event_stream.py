@@ -21,9 +21,12 @@ MOST_WAITING_US = 2_000_000
 RETRY_S = 0.5  # between two attempts to open a camera that was unplugged
 # A clock that runs so far ahead of its own last time was set anew: nothing moved for as long is no shot either.
 LARGEST_JUMP_US = 60_000_000
+# Nothing at all from a camera for so long is said. Before its first event it may be dark, or just have been opened.
+LONGEST_SILENCE_S, LONGEST_FIRST_SILENCE_S = 0.4, 2.0
+SAID_US = 10_000_000  # between two notices of a fault that goes on, by the camera's clock
 
 Sink = Callable[[int, EventBatch], None]  # number of the clock and events, from the reading thread
-NoticeKind = Literal["unplugged", "back", "clock", "behind", "biases", "recording", "spins"]
+NoticeKind = Literal["unplugged", "back", "clock", "behind", "biases", "recording", "spins", "stall", "size", "lost"]
 Notice = Callable[[NoticeKind, str], None]
 
 
@@ -84,11 +87,17 @@ class EventStream:
     tick_us : int
         Length of a tick.
     reopen : callable, optional
-        `reopen() -> EventCamera` after the camera was unplugged; without it the stream ends with the camera's error.
+        `reopen(camera) -> EventCamera` opens it anew, as it was, after it was unplugged; without it the stream ends
+        with the camera's error.
     sinks : sequence of callable
         `sink(clock, events)` gets all events as they come, in the reading thread: it must not wait.
     on_notice : callable
         Told what kind of thing happens to the camera, and in words.
+
+    Attributes
+    ----------
+    camera : EventCamera
+        The one that is read: another one after it was unplugged. Others may look at its name, biases and options.
     """
 
     def __init__(
@@ -96,13 +105,13 @@ class EventStream:
         camera: EventCamera,
         tick_us: int,
         *,
-        reopen: Callable[[], EventCamera] | None = None,
+        reopen: Callable[[EventCamera], EventCamera] | None = None,
         sinks: tuple[Sink, ...] = (),
         on_notice: Notice = lambda kind, text: None,
     ) -> None:
         self.width_px, self.height_px = camera.width_px, camera.height_px
         self.counts = StreamCounts()
-        self._camera, self._tick_us, self._reopen, self._sinks = camera, tick_us, reopen, sinks
+        self.camera, self._tick_us, self._reopen, self._sinks = camera, tick_us, reopen, sinks
         self._on_notice = on_notice
         self._most_waiting = max(MOST_WAITING_US // tick_us, 2)
         self._ticks: queue.Queue[ArrivedTick | None] = queue.Queue(self._most_waiting if camera.can_wait else 0)
@@ -111,6 +120,7 @@ class EventStream:
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._read_all, name="camera", daemon=True)
         self._segment, self._clock, self._skipping = 0, 0, False
+        self._said_us: dict[NoticeKind, int] = {}  # when a fault that goes on was said
         self._begin_segment()
 
     def start(self) -> None:
@@ -146,6 +156,7 @@ class EventStream:
         self._next_us: int | None = None  # start of the next tick; None before the first event
         self._end_us: int | None = None  # of the segment's last packet
         self._first_s: float | None = None  # when the first packet of the next tick came
+        self._silent_s, self._is_silence_said = 0.0, False
 
     def join(self) -> None:
         """Wait until the camera is closed."""
@@ -156,8 +167,9 @@ class EventStream:
         try:
             while not self._stop.is_set():
                 self._obey()
+                asked_s = now_s()
                 try:
-                    packet = self._camera.read()
+                    packet = self.camera.read()
                 except CameraError as error:
                     if self._reopen is None:
                         raise
@@ -165,18 +177,19 @@ class EventStream:
                     continue
                 if packet is None:
                     break
+                self._mind_silence(packet, now_s() - asked_s)
                 self._take(packet)
         except Exception as error:  # noqa: BLE001  handed to the thread that takes the ticks
             self._error = error
         finally:
             self._finish_segment()
             self._ticks.put(None)
-            self._camera.close()
+            self.camera.close()
 
     def _obey(self) -> None:
         while not self._commands.empty():
             try:
-                self._camera.set_biases(self._commands.get())
+                self.camera.set_biases(self._commands.get())
             except CameraError as error:
                 self._on_notice("biases", str(error))
 
@@ -185,14 +198,35 @@ class EventStream:
         assert self._reopen is not None
         self._on_notice("unplugged", f"{error}; waiting for it")
         self._next_clock()
-        self._camera.close()
+        self.camera.close()
         while not self._stop.wait(RETRY_S):
             try:
-                self._camera = self._reopen()
+                self.camera = self._reopen(self.camera)
             except CameraError:
                 continue
             self._on_notice("back", "the camera is back")
             return
+
+    def _mind_silence(self, packet: CameraPacket, seconds: float) -> None:
+        """Say it when nothing comes from the camera, not even the time, and when it sends again."""
+        self._silent_s += seconds
+        is_over = self._end_us is None or packet.end_us != self._end_us
+        most_s = LONGEST_FIRST_SILENCE_S if self._next_us is None else LONGEST_SILENCE_S
+        if self._is_silence_said and is_over:
+            self._on_notice("back", f"the camera sends again, after {self._silent_s:.1f} s")
+        elif self._silent_s > most_s and not self._is_silence_said:
+            why = "check its cable" if self._next_us is not None else "check its lens cap and its cable"
+            self._on_notice("stall", f"nothing came from the camera for {self._silent_s:.1f} s: {why}")
+            self._is_silence_said = True
+        if is_over:
+            self._silent_s, self._is_silence_said = 0.0, False
+
+    def _say_fault(self, kind: NoticeKind, end_us: int, text: str) -> None:
+        """Say a fault of the camera, not with every packet that has it."""
+        said_us = self._said_us.get(kind)
+        if said_us is None or not 0 <= end_us - said_us < SAID_US:
+            self._said_us[kind] = end_us
+            self._on_notice(kind, text)
 
     def _take(self, packet: CameraPacket) -> None:
         """Take a packet of the camera: hand it to the sinks, and cut it into ticks."""
@@ -206,6 +240,20 @@ class EventStream:
         counts.dropped += packet.dropped
         counts.outside += packet.outside
         counts.events += len(events)
+        if packet.dropped:
+            self._say_fault(
+                "lost",
+                packet.end_us,
+                f"packets that the driver lost: {counts.dropped} so far, gaps in track and recording: have fewer "
+                "events by biases, --roi or --most-mev-s",
+            )
+        if packet.outside:
+            self._say_fault(
+                "size",
+                packet.end_us,
+                f"events beyond the sensor of {self.width_px} x {self.height_px} px, left out: {counts.outside} so "
+                "far: the camera states a wrong size: unplug it and plug it in again",
+            )
         if len(events) and np.any(events.t_us[1:] < events.t_us[:-1]):
             events = events[np.argsort(events.t_us, kind="stable")]
         for sink in self._sinks:
@@ -233,7 +281,7 @@ class EventStream:
         first_s = came_s if self._first_s is None else self._first_s
         self._pending, self._first_s = ([rest], came_s) if len(rest) else ([], None)
         self._next_us = end_us
-        is_behind = not self._camera.can_wait and self.waiting > self._most_waiting
+        is_behind = not self.camera.can_wait and self.waiting > self._most_waiting
         if is_behind or (self._skipping and self.waiting):
             if not self._skipping:
                 self._on_notice("behind", "the work cannot keep up: events are left out of it until it has caught up")

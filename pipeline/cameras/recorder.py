@@ -48,8 +48,8 @@ class Recorder:
         First file; it must not exist.
     open_file : callable
         `open_file(path) -> EventFile` creates one; raises OSError or RecordingError.
-    beside : mapping of str to str
-        Texts to be written beside each file, by suffix (".toml").
+    beside : callable, optional
+        `beside() -> mapping of str to str`: texts to be written beside a file that begins now, by suffix (".toml").
     most_bytes, most_us : int, optional
         Largest file, and longest.
     on_notice : callable
@@ -73,13 +73,13 @@ class Recorder:
         path: Path,
         open_file: Callable[[Path], EventFile],
         *,
-        beside: Mapping[str, str] | None = None,
+        beside: Callable[[], Mapping[str, str]] = dict,
         most_bytes: int | None = None,
         most_us: int | None = None,
         on_notice: Notice = lambda kind, text: None,
     ) -> None:
         self.path, self.files, self.events, self.markers = path, list[Path](), 0, 0
-        self._open_file, self._beside, self._on_notice = open_file, dict(beside or {}), on_notice
+        self._open_file, self._beside, self._on_notice = open_file, beside, on_notice
         self._most_bytes, self._most_us = most_bytes, most_us
         self._coming: queue.SimpleQueue[tuple[int, EventBatch] | None] = queue.SimpleQueue()
         self._waiting_events = 0
@@ -166,7 +166,7 @@ class Recorder:
         path = self.path if number == 1 else self.path.with_name(f"{self.path.stem}-{number}{self.path.suffix}")
         try:
             file = self._open_file(path)
-            for suffix, text in self._beside.items():
+            for suffix, text in self._beside().items():
                 path.with_suffix(suffix).write_text(text, encoding="utf-8")
         except OSError as error:
             why = "it exists" if isinstance(error, FileExistsError) else error.strerror

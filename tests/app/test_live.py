@@ -8,6 +8,7 @@ import os
 import socket
 import threading
 import time
+import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -23,9 +24,10 @@ from spinscope.app.live import camera_view, headless, page
 from spinscope.app.live.camera_view import WINDOWS_KEPT, CameraView
 from spinscope.app.live.headless import OpenLive
 from spinscope.app.live.json_lines import JsonServer
-from spinscope.app.live.recording import CameraRecording
+from spinscope.app.live.recording import CameraRecording, RecordChoice
 from spinscope.app.live.shot_table import ShotTable
-from spinscope.pipeline.cameras import RecentEvents
+from spinscope.pipeline.biases import BiasParameters
+from spinscope.pipeline.cameras import CameraOptions, RecentEvents
 from spinscope.pipeline.errors import CameraError, RecordingError
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.live_outputs import LiveShot
@@ -166,9 +168,11 @@ def _check_view(live: CameraView, bounce: Session) -> None:
 
 def test_a_recording_begins_and_ends_while_the_camera_runs(bounce: Session, tmp_path: Path) -> None:
     """With another clock than the first, and markers of the moment in which they were thought of."""
-    camera: Any = SimpleNamespace(width_px=1280, height_px=720, name="stand-in", serial="7", biases={})
+    camera: Any = SimpleNamespace(
+        width_px=1280, height_px=720, name="stand-in", serial="7", biases={}, options=CameraOptions()
+    )
     recording, events = (
-        CameraRecording(camera, bounce, tmp_path, lambda kind, text: pytest.fail(text)),
+        CameraRecording(lambda: camera, bounce, tmp_path, lambda kind, text: pytest.fail(text)),
         bounce.source.between(0, 10**9),
     )
     with pytest.raises(RecordingError, match="nothing is recorded"):
@@ -191,10 +195,62 @@ def test_a_recording_begins_and_ends_while_the_camera_runs(bounce: Session, tmp_
     assert (line["text"], line["t_us"], present.markers) == ("serve", int(events.t_us[-1]) - 50_000, 1)
 
 
+def test_each_file_states_the_camera_that_is_there_when_it_begins(bounce: Session, tmp_path: Path) -> None:
+    """Unplugged, plugged in again and set otherwise: biases, region and parameters of that time."""
+    biases, events = BiasParameters().as_dict(), bounce.source.between(0, 10**9)
+    about: dict[str, Any] = {"width_px": 1280, "height_px": 720, "name": "stand-in", "serial": "7"}
+    cameras: list[Any] = [
+        SimpleNamespace(**about, biases={**biases, "diff_on": 40}, options=CameraOptions()),
+        SimpleNamespace(**about, biases={**biases, "diff_on": 25}, options=CameraOptions((10, 20, 300, 200), 5.0)),
+    ]
+    there = cameras[0]
+    recording = CameraRecording(lambda: there, bounce, tmp_path, lambda kind, text: pytest.fail(text))
+    recording.begin(RecordChoice(tmp_path / "a.raw"))
+    recording(0, events)
+    present = recording.present
+    assert present is not None
+    while present.events < len(events):
+        time.sleep(0.001)
+    there = cameras[1]
+    recording(1, events)
+    recording.end()
+    sidecars = [tomllib.loads(path.with_suffix(".toml").read_text()) for path in present.files]
+    settings = [tomllib.loads(path.with_suffix(".settings.toml").read_text()) for path in present.files]
+    assert [one["biases"]["diff_on"] for one in sidecars] == [40, 25]
+    assert [one["device_biases"]["diff_on"] for one in settings] == [40, 25]
+    assert settings[0]["device"] == {"name": "stand-in", "serial": "7"}
+    assert settings[1]["device"] == {**settings[0]["device"], "roi_px": [10, 20, 300, 200], "most_mev_s": 5.0}
+
+
+def test_biases_that_change_while_it_is_recorded_are_noted(bounce: Session, tmp_path: Path) -> None:
+    about: dict[str, Any] = {"width_px": 1280, "height_px": 720, "name": "stand-in", "serial": "7"}
+    camera: Any = SimpleNamespace(**about, biases={}, options=CameraOptions())
+    recording = CameraRecording(lambda: camera, bounce, tmp_path, lambda kind, text: pytest.fail(text))
+    asked: list[object] = []
+    run_: Any = SimpleNamespace(stream=SimpleNamespace(set_biases=lambda biases: asked.append(biases) or 7))
+    live = OpenLive(bounce, run_, RecentEvents(), recording)
+    assert live.set_biases({"fo": 3}) == 7
+    recording.begin(RecordChoice(tmp_path / "a.raw"))
+    live.set_biases({"diff_on": 10, "diff_off": 12})
+    recording.end()
+    (line,) = map(json.loads, (tmp_path / "a.markers.jsonl").read_text().splitlines())
+    assert line["text"] == "biases: diff_on = 10, diff_off = 12"
+    assert asked == [{"fo": 3}, {"diff_on": 10, "diff_off": 12}]
+
+
+def test_without_a_camera_no_table_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def open_live(*_: object) -> None:
+        raise CameraError("no camera is plugged in")
+
+    monkeypatch.setattr(headless, "open_live", open_live)
+    assert run("watch", tmp_path / "day.csv").exit_code != 0 and not list(tmp_path.iterdir())
+
+
 def test_old_recordings_of_the_last_seconds_are_removed(tmp_path: Path) -> None:
     recent, live = RecentEvents(), CameraView(tmp_path, 30.0)
     opened: Any = SimpleNamespace(width_px=4, height_px=4, biases={}, parameters=Parameters())
-    live.begin(OpenLive(opened, opened, opened, recent, opened))
+    opened.stream = SimpleNamespace(camera=opened)
+    live.begin(OpenLive(opened, opened, recent, opened))
     with pytest.raises(RecordingError, match="no event"):
         live.save_window(1.0)
     for number in range(WINDOWS_KEPT + 2):

@@ -32,7 +32,7 @@ def live(session: Session, method: str = QUICK, *, with_balls: bool = False, **r
     options = {"speed": float("inf"), **replay}
     camera = ReplayCamera(recording.chunks, recording.width_px, recording.height_px, **options)  # type: ignore[union-attr]
     run = LiveRun(
-        lambda tick_us, on_notice: EventStream(camera, tick_us, reopen=lambda: camera, on_notice=on_notice),
+        lambda tick_us, on_notice: EventStream(camera, tick_us, reopen=lambda _: camera, on_notice=on_notice),
         session.parameters,
         method,
         with_balls=with_balls,

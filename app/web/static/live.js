@@ -207,6 +207,8 @@ export class Live {
       }
       parts.push(`${milliseconds(now.backlog_ms)} behind, spins ${milliseconds(now.spin_backlog_ms)}`);
       if (now.dropped) parts.push(`${now.dropped} packets lost by the camera`);
+      if (now.outside) parts.push(`${now.outside} events beyond the sensor left out`);
+      if (now.late) parts.push(`${now.late} events too late`);
       if (now.skipped) parts.push(`${now.skipped} ticks left out`);
     }
     parts.push(`${kept_s.toFixed(0)} s kept`);

@@ -22,7 +22,7 @@ export type BiasValues = { biases: Record<string, number> };
 /** Progress of a re-simulation. */
 export type BiasesMessage = { kind: "biases"; state: "running" | "done" | "cancelled" | "failed"; error: string | null; content: Resimulation | null };
 /** Incident of a running camera: its kind, of which the page has the words (`camera_...`), and details. */
-export type CameraNotice = { kind: "unplugged" | "back" | "clock" | "behind" | "biases" | "recording" | "spins" | "ended"; text: string };
+export type CameraNotice = { kind: "unplugged" | "back" | "clock" | "behind" | "biases" | "recording" | "spins" | "stall" | "size" | "lost" | "ended"; text: string };
 /** Cancel the job of a kind. */
 export type CancelRequest = { kind: "sweep" | "optimization" | "biases" | "bias_sweep" };
 /** Anything that the page offers by name. */
@@ -68,7 +68,7 @@ export type LiveRecording = { file: string; events: number; markers: number };
 /** Begin a recording of the camera, or end the one under way. */
 export type LiveRecordingRequest = { is_on: boolean };
 /** State of one second, `t_s` after the start; latencies and rates are None where there is nothing to measure. */
-export type LiveSecond = { t_s: number; rate_mev_s: number; p50_ms: number | null; p99_ms: number | null; announced_ms: number | null; final_ms: number | null; dropped: number; skipped: number; backlog_ms: number; spin_backlog_ms: number; noise_on_hz: number | null; noise_off_hz: number | null; ball_on_hz: number | null; ball_off_hz: number | null };
+export type LiveSecond = { t_s: number; rate_mev_s: number; p50_ms: number | null; p99_ms: number | null; announced_ms: number | null; final_ms: number | null; dropped: number; outside: number; late: number; skipped: number; backlog_ms: number; spin_backlog_ms: number; noise_on_hz: number | null; noise_off_hz: number | null; ball_on_hz: number | null; ball_off_hz: number | null };
 /** A shot that has ended, in words; `recording` has its events as soon as its spin is final. */
 export type LiveShotRow = { text: string; is_final: boolean; recording: string | null };
 /** Running camera as the page shows it. */

@@ -115,7 +115,7 @@ class NeuromorphicCamera(EventCamera):
         own = self._configuration.biases
         self.biases = {name: int(getattr(own, name)) for name in self.bias_limits}
         check_biases(biases, self.bias_limits, self.name)
-        self._dropped, self._end_us = 0, 0
+        self.options, self._dropped, self._end_us = options, 0, 0
         self._apply_biases({**self.biases, **biases})
         self.biases = {**self.biases, **biases}
 

@@ -89,7 +89,7 @@ def test_an_unplugged_camera_is_waited_for() -> None:
     unplugged, notices = CameraError("toy 1: the camera was unplugged"), []
     first = ListedPackets([CameraPacket(at(100), 100), unplugged])
     second = ListedPackets([CameraPacket(at(50), 50)])
-    ticks, _ = ticks_of(first, reopen=lambda: second, on_notice=lambda kind, text: notices.append(text))
+    ticks, _ = ticks_of(first, reopen=lambda _: second, on_notice=lambda kind, text: notices.append(text))
     assert [(one.clock, one.packet.events.t_us.tolist()) for one in ticks] == [(0, [100]), (1, [50])]
     assert first.closed == second.closed == 1
     assert "unplugged; waiting" in notices[0] and "is back" in notices[1]
@@ -109,6 +109,49 @@ def test_late_and_unordered_events_are_counted_and_sorted() -> None:
     ticks, stream = ticks_of(ListedPackets(given))
     assert [one.packet.events.t_us.tolist() for one in ticks] == [[500], [1200, 1300]]
     assert (stream.counts.late, stream.counts.dropped, stream.counts.outside) == (1, 2, 5)
+
+
+def test_a_camera_that_sends_nothing_is_said_with_when_it_sends_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read after read without even the time, or one long read; a scene in which nothing moves is none of it."""
+    now_s, notices = [0.0], list[tuple[str, str]]()
+    monkeypatch.setattr("spinscope.pipeline.cameras.event_stream.now_s", lambda: now_s[0])
+
+    class Slow(ListedPackets):
+        def read(self) -> CameraPacket | None:
+            packet = super().read()
+            now_s[0] += 0.05 if packet is None or packet.end_us != 777_000 else 0.6
+            return packet
+
+    nothing = [CameraPacket(EventBatch.empty(), 500) for _ in range(19)]
+    still = [CameraPacket(EventBatch.empty(), 1_000 * n) for n in range(1, 40)]
+    late = [CameraPacket(at(776_000), 777_000), CameraPacket(at(777_500), 777_500)]
+    ticks_of(
+        Slow([CameraPacket(at(500), 500), *nothing, *still, *late]),
+        on_notice=lambda kind, text: notices.append((kind, text)),
+    )
+    assert [kind for kind, _ in notices] == ["stall", "back", "stall"]
+    assert "for 0.4 s: check its cable" in notices[0][1] and "after 1.0 s" in notices[1][1]
+    assert "for 0.6 s" in notices[2][1]
+
+
+def test_wrong_sizes_and_lost_packets_are_said_once_in_a_while() -> None:
+    notices: list[tuple[str, str]] = []
+    given = [CameraPacket(at(n * 100_000), n * 100_000, dropped=1, outside=7) for n in range(1, 151)]
+    ticks_of(ListedPackets(given), on_notice=lambda kind, text: notices.append((kind, text)))
+    assert [kind for kind, _ in notices] == ["lost", "size"] * 2
+    assert "64 x 48 px, left out: 7 so far" in notices[1][1] and f"left out: {7 * 101} so far" in notices[3][1]
+    assert "lost: 1 so far" in notices[0][1] and "lost: 101 so far" in notices[2][1]
+
+
+def test_the_camera_that_is_there_can_be_looked_at() -> None:
+    first = ListedPackets([CameraPacket(at(100), 100), CameraError("unplugged")])
+    second = ListedPackets([CameraPacket(at(50), 50)])
+    asked: list[EventCamera] = []
+    stream = EventStream(first, TICK_US, reopen=lambda camera: asked.append(camera) or second)  # type: ignore[func-returns-value]
+    stream.set_biases({"diff_on": 7})
+    stream.start()
+    stream.join()
+    assert asked == [first] and first.biases == {"diff_on": 7} and stream.camera is second
 
 
 def test_work_that_cannot_keep_up_misses_ticks_but_sinks_do_not() -> None:

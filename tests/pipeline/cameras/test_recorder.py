@@ -45,7 +45,7 @@ def equal(a: EventBatch, b: EventBatch) -> bool:
 @pytest.mark.parametrize(("limits", "files"), [({}, 1), ({"most_us": 20_000}, 5), ({"most_bytes": 5_000}, 20)])
 def test_all_events_are_in_files_of_the_size_asked_for(tmp_path: Path, limits: dict[str, int], files: int) -> None:
     batches = [some(start_us) for start_us in range(0, 100_000, 1000)]
-    writing = recorder(tmp_path / "a.raw", beside={".toml": "[camera]\nfocal_length_mm = 12.0\n"}, **limits)
+    writing = recorder(tmp_path / "a.raw", beside=lambda: {".toml": "[camera]\nfocal_length_mm = 12.0\n"}, **limits)
     for batch in batches:
         writing(0, batch)
     writing.close()

@@ -1,0 +1,98 @@
+"""Ends asked for by signals, one or many: everything is written, nothing is left running, no traceback."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pyarrow.parquet
+import pytest
+
+SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+PATIENCE_S = 300.0  # the first run on a machine compiles the kernels
+REPLAY = ("--replay", "sample_recordings/own/rally.h5", "--loop", "--method", "triplet")
+PAGES = {
+    "tune": ("tune", "sample_recordings/spinner_ball2_side.h5", "--no-browser", "--port", "0"),
+    "view": ("view", "sample_recordings/spinner_ball2_side.h5", "--no-browser", "--port", "0"),
+    "live": ("live", *REPLAY, "--no-browser", "--page-port", "0"),
+    "coach": ("coach", "live", *REPLAY, "--no-browser", "--port", "0", "--session", "{folder}/day"),
+}
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="a group of processes gets the signals of its terminal")
+
+
+@contextmanager
+def program(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], Iterator[str]]]:
+    """The program in a group of its own, as a terminal starts it, and the lines that it prints, of both streams."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "spinscope", *arguments],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        hanging = threading.Timer(PATIENCE_S, os.killpg, (process.pid, signal.SIGKILL))
+        hanging.start()
+        try:
+            assert process.stdout is not None
+            yield process, iter(process.stdout.readline, "")
+            assert hanging.is_alive(), "it had to be killed"
+        finally:
+            hanging.cancel()
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+
+
+def told_again_and_again(process: subprocess.Popen[str], chosen: list[signal.Signals]) -> None:
+    """Send signals to the whole group, one after the other, until the program has ended."""
+    while process.poll() is None:
+        for one in chosen:
+            os.killpg(process.pid, one)
+        time.sleep(0.005)
+
+
+def until_the_group_is_gone(group: int) -> None:
+    """Wait for the processes behind the program, which end when their pipes do; the timer kills what stays."""
+    with suppress(ProcessLookupError):
+        while True:
+            os.killpg(group, 0)
+            time.sleep(0.01)
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_ends_whatever_comes_how_often(name: str, tmp_path: Path) -> None:
+    with program(*(one.format(folder=tmp_path) for one in PAGES[name])) as (process, lines):
+        said = next(line for line in lines if "http://127.0.0.1" in line or "Traceback" in line)
+        told_again_and_again(process, SIGNALS)
+        said += "".join(lines)
+        assert process.returncode == 0 and "Traceback" not in said and "Exception" not in said, said
+        until_the_group_is_gone(process.pid)
+
+
+@pytest.mark.parametrize("one", SIGNALS)
+def test_a_watched_camera_s_table_is_whole(one: signal.Signals, tmp_path: Path) -> None:
+    table, raw = tmp_path / "day.parquet", tmp_path / "day.raw"
+    with program("watch", str(table), "--record", str(raw), *REPLAY) as (process, lines):
+        said = next(line for line in lines if line.startswith("shot 2") or "Traceback" in line)
+        told_again_and_again(process, [one])
+        rest = list(lines)
+    assert process.returncode == 0 and "Traceback" not in said, rest
+    rows = pyarrow.parquet.read_table(table).to_pylist()
+    assert len(rows) >= 2 and rest[-1].startswith(f"{len(rows)} shots in {table}")
+    assert all((tmp_path / row["events_file"]).is_file() for row in rows)
+
+
+def test_an_end_asked_for_while_it_starts_is_an_end(tmp_path: Path) -> None:
+    with program("watch", str(tmp_path / "day.csv"), *REPLAY) as (process, lines):
+        said = next(lines)
+        told_again_and_again(process, [signal.SIGINT])
+        said += "".join(lines)
+    assert process.returncode in (0, 130) and "Traceback" not in said, said
