@@ -145,8 +145,10 @@ def proposed_value(sweep: BiasSweep) -> int | None:
     return best
 
 
-def proposal_words(sweep: BiasSweep) -> str:
-    """The proposal for people, and what it rests on."""
+def proposal_words(sweep: BiasSweep, is_replay: bool) -> str:
+    """The proposal for people, and what it rests on: nothing where the events are a recording's."""
+    if is_replay:
+        return f"no value of {sweep.name} is proposed: the events of a recording do not change with biases"
     value, has_ball = proposed_value(sweep), any(point.ball_on_hz for point in sweep.points)
     if value is None:
         return (

@@ -266,7 +266,7 @@ class CameraView(CameraObserver):
             self._sweep = None
             sweep.end()
         made = sweep.sweep
-        return BiasSweep(made.name, made.total, made.points, proposal_words(made))
+        return BiasSweep(made.name, made.total, made.points, proposal_words(made, live.camera.is_replay))
 
 
 def _words(spin: LiveSpin) -> str:

@@ -213,12 +213,12 @@ def run_headless(
                 if sweep is not None and sweep.done.is_set():
                     run.stop()
         if sweep is not None and to.sweep is not None:
-            _write_sweep(sweep.sweep, lines, to.sweep.figure)
+            _write_sweep(sweep.sweep, camera.is_replay, lines, to.sweep.figure)
     if table is not None:
         note(f"{table.count} shots in {table.path}, {table.disk_bytes / 1e6:.1f} MB with their events")
 
 
-def _write_sweep(sweep: BiasSweep, lines: JsonLines | None, figure: Path | None) -> None:
+def _write_sweep(sweep: BiasSweep, is_replay: bool, lines: JsonLines | None, figure: Path | None) -> None:
     """Write the event rates at each value, the value that they propose, and their figure."""
     for point in sweep.points:
         rates = {name: getattr(point, name) for name in ("noise_on_hz", "noise_off_hz", "ball_on_hz", "ball_off_hz")}
@@ -226,11 +226,12 @@ def _write_sweep(sweep: BiasSweep, lines: JsonLines | None, figure: Path | None)
         note(f"{sweep.name} = {point.value}: {words}")
         if lines is not None:
             lines.write({"bias": {"name": sweep.name, "value": point.value, **rates}})
-    note(proposal_words(sweep))
+    words, value = proposal_words(sweep, is_replay), None if is_replay else proposed_value(sweep)
+    note(words)
     if lines is not None:
-        lines.write({"proposed": {"name": sweep.name, "value": proposed_value(sweep), "text": proposal_words(sweep)}})
+        lines.write({"proposed": {"name": sweep.name, "value": value, "text": words}})
     if figure is not None:
-        write_sweep_figure(sweep, figure)
+        write_sweep_figure(sweep, value, figure)
 
 
 def _is_of_every_tick(one: LiveOutput) -> bool:

@@ -68,8 +68,8 @@ def open_live(chosen: CameraChoice, choices: Choices) -> tuple[EventCamera, Sess
 
 def opened_anew(camera: EventCamera) -> EventCamera:
     """A camera that was unplugged, as it was set last; raises CameraError while it is not back."""
-    if isinstance(camera, ReplayCamera):
-        return camera  # goes on where it was
+    if camera.is_replay:  # it goes on where it was
+        return camera
     return open_camera(camera.serial, camera.biases, camera.options)
 
 

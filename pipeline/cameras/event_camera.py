@@ -66,10 +66,13 @@ class EventCamera(ABC):
         Present values.
     options : CameraOptions
         What it leaves out by itself.
+    is_replay : bool
+        Whether its events are a recording's, which its biases do not change.
     can_wait : bool
         Whether it hands its events over whenever they are asked for, as no real camera does.
     """
 
+    is_replay = False
     can_wait = False
     options = CameraOptions()
     name: str

@@ -215,8 +215,13 @@ class EventStream:
         if self._is_silence_said and is_over:
             self._on_notice("back", f"the camera sends again, after {self._silent_s:.1f} s")
         elif self._silent_s > most_s and not self._is_silence_said:
-            why = "check its cable" if self._next_us is not None else "check its lens cap and its cable"
-            self._on_notice("stall", f"nothing came from the camera for {self._silent_s:.1f} s: {why}")
+            where = "its cable" if self._next_us is not None else "its lens cap, its cable"
+            self._say_fault(
+                "stall",
+                self._end_us or 0,
+                f"nothing came from the camera for {self._silent_s:.1f} s: look at {where} and what else keeps this "
+                "computer busy",
+            )
             self._is_silence_said = True
         if is_over:
             self._silent_s, self._is_silence_said = 0.0, False

@@ -52,6 +52,8 @@ class ReplayCamera(EventCamera):
         Biases that it pretends to have.
     """
 
+    is_replay = True
+
     def __init__(
         self,
         batches: Callable[[], Iterable[EventBatch]],

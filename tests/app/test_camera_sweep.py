@@ -68,7 +68,8 @@ def point(value: int, noise: float, on: float | None = None, off: float | None =
 def test_the_supplement_s_trade_off(points: list[BiasSweepPoint], value: int | None) -> None:
     sweep = BiasSweep("diff_on", len(points), points)
     assert proposed_value(sweep) == value
-    assert (f"= {value}" if value is not None else "no value") in proposal_words(sweep)
+    assert (f"= {value}" if value is not None else "no value") in proposal_words(sweep, is_replay=False)
+    assert "do not change with biases" in proposal_words(sweep, is_replay=True)
 
 
 def test_the_sweep_waits_for_the_camera_and_begins_a_value_anew_with_another_clock() -> None:
@@ -121,9 +122,7 @@ def test_a_sweep_without_a_page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
     monkeypatch.setattr(headless, "warm_up", lambda: None)
     monkeypatch.setattr("spinscope.pipeline.cameras.event_stream.MOST_WAITING_US", 20_000)
     monkeypatch.setattr("spinscope.app.live.camera_sweep.SETTLE_US", 50_000)
-    monkeypatch.setattr(
-        headless, "open_live", lambda chosen, choices: (camera, session_of(camera, Choices()), lambda: camera)
-    )
+    monkeypatch.setattr(headless, "open_live", lambda chosen, choices: (camera, session_of(camera, Choices())))
     lines, figure = tmp_path / "out.jsonl", tmp_path / "rates.png"
     sweep = ["--sweep", "diff_on_off", "--sweep-points", "3", "--sweep-s", "0.05", "--sweep-figure", str(figure)]
     result = CliRunner().invoke(

@@ -57,7 +57,8 @@ export class Biases extends EventTarget {
   #row(/** @type {string} */ name, /** @type {BiasRange} */ { low, high, default: start, help }) {
     const slider = element("input", { type: "range", min: low, max: high, step: 1, "aria-label": `bias_${name}` });
     const box = element("input.number", { type: "text", "aria-label": `bias_${name}` });
-    const back = { title: "Back to the paper's value", onclick: () => this.#put(name, start) };
+    const origin = this.state.of_camera ? "When the page was opened" : "Paper";
+    const back = { title: `Back to ${start}`, onclick: () => this.#put(name, start) };
     const reset = element("button.reset", back, "↺");
     slider.addEventListener("input", () => (box.value = slider.value));
     slider.addEventListener("change", () => this.#put(name, Number(slider.value)));
@@ -69,7 +70,7 @@ export class Biases extends EventTarget {
         this.#refresh();
       }
     });
-    const title = `bias_${name}\n${help}.\nAllowed: ${low} to ${high}. Paper: ${start}.`;
+    const title = `bias_${name}\n${help}.\nAllowed: ${low} to ${high}. ${origin}: ${start}.`;
     const parts = [element("label", {}, name), slider, box, element("span.unit"), reset];
     const row = element("div.control", { title }, ...parts);
     row.dataset.bias = name;

@@ -154,7 +154,7 @@ function refusals(refused, at, range, { series }) {
  * @param {ChartSpec} spec
  * @param {(x: any) => any} at
  * @param {[number, number] | null} range
- * @param {{x: any}[]} points
+ * @param {{x: any, y?: number | null}[]} points
  */
 function layout(spec, at, range, points) {
   const { title, x, y, scale, categories, present } = spec;
@@ -182,10 +182,20 @@ function layout(spec, at, range, points) {
     yaxis: {
       ...axis,
       title: { text: y, standoff: 2 },
-      ...(spec.isLogarithmic ? { type: "log", dtick: 1 } : { range: range ?? undefined }),
+      ...(spec.isLogarithmic ? { type: "log", dtick: 1, range: decades(points) } : { range: range ?? undefined }),
     },
     shapes: isKnown ? [{ ...line, x0: at(present), x1: at(present) }] : [],
   };
+}
+
+/**
+ * Range of a logarithmic axis, in whole decades: each end has a number.
+ * @param {{y?: number | null}[]} points
+ */
+function decades(points) {
+  const logs = points.flatMap(({ y }) => y && y > 0 ? [Math.log10(y)] : []);
+  const low = Math.floor(Math.min(...logs));
+  return logs.length ? [low, Math.max(Math.ceil(Math.max(...logs)), low + 1)] : undefined;
 }
 
 /**

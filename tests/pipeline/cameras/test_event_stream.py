@@ -119,18 +119,18 @@ def test_a_camera_that_sends_nothing_is_said_with_when_it_sends_again(monkeypatc
     class Slow(ListedPackets):
         def read(self) -> CameraPacket | None:
             packet = super().read()
-            now_s[0] += 0.05 if packet is None or packet.end_us != 777_000 else 0.6
+            now_s[0] += 0.05 if packet is None or packet.end_us != 15_677_000 else 0.6
             return packet
 
     nothing = [CameraPacket(EventBatch.empty(), 500) for _ in range(19)]
-    still = [CameraPacket(EventBatch.empty(), 1_000 * n) for n in range(1, 40)]
-    late = [CameraPacket(at(776_000), 777_000), CameraPacket(at(777_500), 777_500)]
+    still = [CameraPacket(EventBatch.empty(), 400_000 * n) for n in range(1, 40)]
+    late = [CameraPacket(at(15_676_000), 15_677_000), CameraPacket(at(15_677_500), 15_677_500)]
     ticks_of(
         Slow([CameraPacket(at(500), 500), *nothing, *still, *late]),
         on_notice=lambda kind, text: notices.append((kind, text)),
     )
     assert [kind for kind, _ in notices] == ["stall", "back", "stall"]
-    assert "for 0.4 s: check its cable" in notices[0][1] and "after 1.0 s" in notices[1][1]
+    assert "for 0.4 s: look at its cable" in notices[0][1] and "after 1.0 s" in notices[1][1]
     assert "for 0.6 s" in notices[2][1]
 
 
