@@ -196,6 +196,11 @@ class LiveRun:
         """Have the run end after what has come so far."""
         self.stream.stop()
 
+    @property
+    def unanswered(self) -> TrackedTick | None:
+        """The oldest tracked tick whose spins are not final yet."""
+        return self._spins.unanswered
+
     def take_parameters(self, parameters: Parameters) -> None:
         """Have the run go on with other parameters from its next tick on; a shot in flight ends there.
 

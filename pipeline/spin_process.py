@@ -114,6 +114,13 @@ class SpinProcess:
         with self._changed:
             return self._kept[-1].number + 1 - self._done if self._kept else 0
 
+    @property
+    def unanswered(self) -> TrackedTick | None:
+        """The oldest tick without its final answers."""
+        with self._changed:
+            waiting = (one.message for one in self._kept if one.number >= self._done)
+            return next((message for message in waiting if isinstance(message, TrackedTick)), None)
+
     def abandon(self) -> None:
         """End the run without the answers that are still to come."""
         with self._changed:

@@ -149,7 +149,6 @@ def run_headless(
     except BaseException:
         camera.close()
         raise
-    warm_up()
     with ExitStack() as at_end:
         lines = None if to.lines is None else at_end.enter_context(JsonLines(to.lines))
         server = None if to.port is None else at_end.enter_context(JsonServer(to.port))
@@ -169,6 +168,8 @@ def run_headless(
             return EventStream(camera, tick_us, reopen=opened_anew, sinks=tuple(sinks), on_notice=on_notice)
 
         def on_tick(arrived: ArrivedTick, tick: Tick, latency_ms: float) -> None:
+            if (behind := run.unanswered) is not None:
+                recent.keep_from(behind.clock, behind.tick.packet.start_us)
             if sweep is not None:
                 sweep.add(arrived.packet, tick.track.balls)
             if observer is not None:
@@ -189,6 +190,7 @@ def run_headless(
                 points=to.sweep.points,
                 measured_s=to.sweep.measured_s,
             )
+        warm_up()
         note(f"live: {camera.name} {camera.serial}, {camera.width_px} x {camera.height_px} px; Ctrl-C ends it")
         if observer is not None:
             observer.begin(live)
@@ -208,6 +210,8 @@ def run_headless(
                 if table is not None and isinstance(one, LiveShot):
                     row = table.append(one, session, recent)
                     note(row_words(row))
+                    if row["events_file"] is None:
+                        note(f"the events of shot {row['number']} are no longer in memory: not saved")
                 if observer is not None:
                     observer.add_output(one, row)
                 if sweep is not None and sweep.done.is_set():

@@ -8,10 +8,13 @@ import sys
 import threading
 from collections.abc import Mapping
 from contextlib import suppress
+from pathlib import Path
 from types import TracebackType
-from typing import IO, Any, Self
+from typing import Any, BinaryIO, Self
 
 from spinscope.pipeline.errors import ParameterError, RecordingError
+
+from ..terminal import note
 
 HOST = "127.0.0.1"
 SEND_S = 0.05  # a client that takes no bytes for so long is let go of, for the others must not wait
@@ -20,13 +23,16 @@ SEND_S = 0.05  # a client that takes no bytes for so long is let go of, for the 
 class JsonLines:
     """File, pipe or standard output ("-") with one object a line, each written at once.
 
-    Raises RecordingError when it cannot be opened or written. A reader that went away raises BrokenPipeError.
+    Raises RecordingError when it cannot be opened or written. Standard output whose reader went away raises
+    BrokenPipeError; lines of a named pipe are left out until another one reads.
     """
 
     def __init__(self, output: str) -> None:
-        self._output = output
+        self._output, self._is_unread = output, False
+        if Path(output).is_fifo():
+            note(f"waiting for a program that reads the pipe {output}")
         try:
-            self._file: IO[str] = sys.stdout if output == "-" else open(output, "a", encoding="utf-8")  # noqa: SIM115
+            self._file: BinaryIO = sys.stdout.buffer if output == "-" else open(output, "ab", buffering=0)  # noqa: SIM115
         except OSError as error:
             raise self._error(error) from error
 
@@ -42,13 +48,21 @@ class JsonLines:
 
     def write(self, line: Mapping[str, Any]) -> None:
         """Append an object."""
+        left = memoryview(json.dumps(line, allow_nan=False).encode() + b"\n")
         try:
-            self._file.write(json.dumps(line, allow_nan=False) + "\n")
+            while len(left):
+                left = left[self._file.write(left) :]
             self._file.flush()
         except BrokenPipeError:
-            raise
+            if self._output == "-":
+                raise
+            if not self._is_unread:
+                note(f"nobody reads the pipe any more, lines are left out until somebody does: {self._output}")
+            self._is_unread = True
         except OSError as error:
             raise self._error(error) from error
+        else:
+            self._is_unread = False
 
     def _error(self, error: OSError) -> RecordingError:
         return RecordingError(

@@ -22,12 +22,12 @@ def write_sweep_figure(sweep: BiasSweep, proposed: int | None, path: Path) -> No
             rates_hz = [getattr(point, f"{kind}_{polarity}_hz") for point in sweep.points]
             known = [(value, hz) for value, hz in zip(values, rates_hz, strict=True) if hz is not None]
             if known:
-                panel.plot(
-                    *zip(*known, strict=True), "o-", color=colour, label=polarity.upper()
-                )
+                panel.plot(*zip(*known, strict=True), "o-", color=colour, label=polarity.upper())
         if proposed is not None:
             panel.axvline(proposed, color="green", linewidth=1, label="proposed")
         label_axes(panel, kind, f"bias {sweep.name}", "events [1/s]", log=kind == "noise")
+        if kind == "ball":  # on the page, too
+            panel.set_ylim(bottom=0.0)
         panel.legend()
     try:
         figure.savefig(path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
+from typing import NamedTuple
 
 from ..events import EventBatch
 
@@ -11,27 +12,50 @@ KEPT_US = 10_000_000  # longer than any shot until its spin is known
 KEPT_EVENTS = 1 << 25  # 436 MB
 
 
+class _Kept(NamedTuple):
+    clock: int
+    events: EventBatch
+    passed_us: int  # time of the last event, counted on over all clocks
+
+
 class RecentEvents:
-    """Sink of an `EventStream` that keeps what came last, up to `kept_us` and KEPT_EVENTS."""
+    """Sink of an `EventStream` that keeps what came last, up to KEPT_EVENTS.
+
+    Parameters
+    ----------
+    kept_us : int
+        Length of what is kept in any case, and of what is kept before the events that are needed.
+    """
 
     def __init__(self, kept_us: int = KEPT_US) -> None:
         self._kept_us = kept_us
         self._lock = threading.Lock()
-        self._kept: deque[tuple[int, EventBatch]] = deque()
+        self._kept: deque[_Kept] = deque()
         self._events = 0
+        self._clock, self._shift_us, self._passed_us = 0, 0, 0
+        self._needed: tuple[int, int] | None = None
 
     def __call__(self, clock: int, events: EventBatch) -> None:
         """Take events; called by the camera's thread."""
         if not len(events):
             return
         with self._lock:
-            self._kept.append((clock, events))
+            if clock != self._clock:
+                self._clock, self._shift_us = clock, self._passed_us - int(events.t_us[0])
+            self._passed_us = int(events.t_us[-1]) + self._shift_us
+            self._kept.append(_Kept(clock, events, self._passed_us))
             self._events += len(events)
-            oldest_us = int(events.t_us[-1]) - self._kept_us
-            while self._events > KEPT_EVENTS or (
-                self._kept[0][0] == clock and int(self._kept[0][1].t_us[-1]) < oldest_us
-            ):
-                self._events -= len(self._kept.popleft()[1])
+            while self._events > KEPT_EVENTS or self._is_past(self._kept[0]):
+                self._events -= len(self._kept.popleft().events)
+
+    def keep_from(self, clock: int, start_us: int) -> None:
+        """Keep events from a time on, which somebody needs who is behind; until the next call."""
+        self._needed = clock, start_us - self._kept_us
+
+    def _is_past(self, one: _Kept) -> bool:
+        if one.passed_us >= self._passed_us - self._kept_us:
+            return False
+        return self._needed is None or (one.clock, int(one.events.t_us[-1])) < self._needed
 
     @property
     def span_us(self) -> tuple[int, int, int] | None:
@@ -39,12 +63,12 @@ class RecentEvents:
         with self._lock:
             if not self._kept:
                 return None
-            clock, newest = self._kept[-1]
-            oldest = next(events for number, events in self._kept if number == clock)
+            clock, newest, _ = self._kept[-1]
+            oldest = next(one.events for one in self._kept if one.clock == clock)
         return clock, int(oldest.t_us[0]), int(newest.t_us[-1]) + 1
 
     def between(self, clock: int, start_us: int, end_us: int) -> EventBatch:
         """The events of [start_us, end_us) by a clock, as far as they are kept."""
         with self._lock:
-            kept = [events for number, events in self._kept if number == clock]
+            kept = [one.events for one in self._kept if one.clock == clock]
         return EventBatch.concatenate(part for events in kept if len(part := events.between(start_us, end_us)))

@@ -23,7 +23,7 @@ from spinscope.app.cli import cli
 from spinscope.app.live import camera_view, headless, page
 from spinscope.app.live.camera_view import WINDOWS_KEPT, CameraView
 from spinscope.app.live.headless import OpenLive
-from spinscope.app.live.json_lines import JsonServer
+from spinscope.app.live.json_lines import JsonLines, JsonServer
 from spinscope.app.live.recording import CameraRecording, RecordChoice
 from spinscope.app.live.shot_table import ShotTable
 from spinscope.pipeline.biases import BiasParameters
@@ -293,6 +293,28 @@ def test_clients_get_every_line_and_slow_ones_hold_nobody_up() -> None:
     slow.close()
 
 
+@pytest.mark.skipif(os.name != "posix", reason="needs named pipes")
+def test_a_pipe_goes_on_with_its_next_reader(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A robot's program that ends holds nothing up; the next one begins with a whole line."""
+    pipe = tmp_path / "shots"
+    os.mkfifo(pipe)
+    line = {"text": "x" * 50_000}  # more than a pipe takes at once
+    first, read = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK), list[bytes]()
+    with JsonLines(str(pipe)) as lines:
+        os.close(first)
+        for _ in range(3):
+            lines.write(line)
+        second = open(pipe, "rb")  # noqa: SIM115
+        reading = threading.Thread(target=lambda: read.append(second.readline()))
+        reading.start()
+        lines.write(line)
+        reading.join()
+        second.close()
+    assert json.loads(read[0]) == line
+    said = capsys.readouterr().err
+    assert said.count("nobody reads the pipe any more") == 1 and f"reads the pipe {pipe}" in said
+
+
 def test_recent_events_are_bounded() -> None:
     recent = RecentEvents()
     for start_us in range(0, 20_000_000, 100_000):
@@ -300,6 +322,37 @@ def test_recent_events_are_bounded() -> None:
     kept = recent.between(0, 0, 20_000_000)
     assert kept.t_us[0] == 9_900_000 and kept.t_us[-1] == 19_900_000
     assert not len(recent.between(1, 0, 20_000_000))
+
+
+def test_events_of_shots_without_their_spin_are_kept() -> None:
+    """As long as the spins are behind, also over another clock; and what nobody needs is not."""
+    recent = RecentEvents(1_000_000)
+
+    def pass_by(clock: int, start_us: int, end_us: int) -> None:
+        for t_us in range(start_us, end_us, 100_000):
+            recent(clock, EventBatch.checked([t_us], [1], [1], [True], width_px=4, height_px=4))
+
+    def kept(clock: int) -> tuple[int, int]:
+        times = recent.between(clock, 0, 10**9).t_us
+        return (int(times[0]), int(times[-1])) if len(times) else (-1, -1)
+
+    pass_by(0, 0, 3_000_000)
+    assert kept(0) == (1_900_000, 2_900_000)
+    recent.keep_from(0, 3_000_000)
+    pass_by(0, 3_000_000, 9_000_000)
+    pass_by(1, 500_000, 2_000_000)
+    assert kept(0) == (2_000_000, 8_900_000) and kept(1) == (500_000, 1_900_000)
+    recent.keep_from(1, 1_900_000)
+    pass_by(1, 2_000_000, 2_100_000)
+    assert kept(0) == (-1, -1) and kept(1) == (900_000, 2_000_000)
+
+
+def test_clocks_that_begin_anew_fill_no_memory() -> None:
+    recent = RecentEvents(1_000_000)
+    for clock in range(100):
+        for t_us in range(0, 500_000, 100_000):
+            recent(clock, EventBatch.checked([t_us], [1], [1], [True], width_px=4, height_px=4))
+    assert sum(len(recent.between(clock, 0, 10**9)) for clock in range(100)) < 20
 
 
 def test_recent_events_are_bounded_in_number(monkeypatch: pytest.MonkeyPatch) -> None:
