@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import click
 
-from spinscope.pipeline.cameras import DRIVERS
-from spinscope.pipeline.cameras.event_camera import udev_instructions
-from spinscope.pipeline.errors import CameraError
+from spinscope.pipeline.cameras.event_camera import listed_cameras, udev_instructions
 
 from ..terminal import note
 
@@ -18,21 +16,12 @@ def cameras(install_udev: bool) -> None:
     if install_udev:
         print(udev_instructions(), end="")
         return
-    count, problems = 0, []
-    for driver in DRIVERS:
-        try:
-            found = driver.cameras()
-        except CameraError as error:
-            problems.append(str(error))
-            continue
-        for one in found:
-            count += 1
-            size = "" if one.size_px is None else f", {one.size_px[0]} x {one.size_px[1]} px"
-            warm = "" if one.temperature_deg_c is None else f", {one.temperature_deg_c:.0f} degrees C"
-            print(f"{one.serial or '-'}  {one.name}, {one.connection}{size}{warm}")
-            if one.problem:
-                note(one.problem)
-    if problems and not count:
-        raise CameraError("; ".join(problems))
-    if not count:
+    found = listed_cameras()
+    for one in found:
+        size = "" if one.size_px is None else f", {one.size_px[0]} x {one.size_px[1]} px"
+        warm = "" if one.temperature_deg_c is None else f", {one.temperature_deg_c:.0f} degrees C"
+        print(f"{one.serial or '-'}  {one.name}, {one.connection}{size}{warm}")
+        if one.problem:
+            note(one.problem)
+    if not found:
         note("no camera is plugged in, or this user may not see it (`spinscope cameras --install-udev`)")

@@ -3,7 +3,8 @@
 A clock is read here, so that stages and chain need none.
 """
 
-from .drivers import neuromorphic as _neuromorphic  # noqa: F401  registers itself
+from .drivers import neuromorphic as _neuromorphic  # noqa: F401, I001  registers itself, before those beside it
+from .drivers import inivation as _inivation  # noqa: F401  registers itself
 from .event_camera import DRIVERS as DRIVERS
 from .event_camera import CameraDriver as CameraDriver
 from .event_camera import CameraOptions as CameraOptions

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ..errors import CameraError
@@ -49,6 +49,10 @@ class CameraOptions:
 
     roi_px: tuple[int, int, int, int] | None = None
     most_mev_s: float | None = None
+
+
+class DriverMissingError(CameraError):
+    """A driver's library is not installed; the message says for which cameras how it is."""
 
 
 class EventCamera(ABC):
@@ -104,6 +108,16 @@ class EventCamera(ABC):
         """Hand all values over to the device."""
 
 
+def check_region(roi_px: tuple[int, int, int, int], width_px: int, height_px: int) -> None:
+    """Raise CameraError for a region of interest beyond the sensor."""
+    x, y, width, height = roi_px
+    if not (0 <= x < x + width <= width_px and 0 <= y < y + height <= height_px):
+        raise CameraError(
+            f"region of interest {x} {y} {width} {height} lies outside the sensor of {width_px} x {height_px} px: give "
+            "X Y WIDTH HEIGHT in pixels"
+        )
+
+
 def check_biases(biases: Mapping[str, int], limits: Mapping[str, tuple[int, int]], name: str) -> None:
     """Raise CameraError for biases that the device does not have, and values beyond its limits."""
     for bias, value in biases.items():
@@ -148,12 +162,13 @@ class CameraDriver:
     name, label : str
         As users type it, and for people.
     cameras : callable
-        `cameras() -> list of ListedCamera`: what is plugged in; raises CameraError when the driver is not installed.
+        `cameras() -> list of ListedCamera`: what is plugged in; raises DriverMissingError when the driver is not
+        installed, and CameraError.
     open : callable
         `open(serial or None, biases, options) -> EventCamera`; raises CameraError, also for an option that the device
         does not have.
     udev_rules : tuple of str
-        Lines that let everybody use its cameras on Linux.
+        Lines that let everybody use its cameras on Linux, where no other driver's do.
     """
 
     name: str
@@ -172,13 +187,37 @@ def open_camera(
     options: CameraOptions = CameraOptions(),
 ) -> EventCamera:
     """Open the camera of this serial number, or the only one there is; raises CameraError with the remedy."""
-    problems: list[str] = []
+    problems, missing = list[str](), list[str]()
     for driver in DRIVERS:
         try:
             return driver.open(serial, biases or {}, options)
+        except DriverMissingError as error:
+            missing.append(str(error))
         except CameraError as error:
             problems.append(str(error))
-    raise CameraError("; ".join(problems))
+    raise CameraError("; ".join(problems) or f"{_without_driver(missing)}; `--replay FILE` needs no camera")
+
+
+def listed_cameras() -> list[ListedCamera]:
+    """The cameras that are plugged in, each by the first driver that knows it; raises CameraError without a driver."""
+    found, problems, missing = list[ListedCamera](), list[str](), list[str]()
+    for driver in DRIVERS:
+        known = {one.serial for one in found if one.serial}
+        try:
+            found += (one for one in driver.cameras() if one.serial not in known)
+        except DriverMissingError as error:
+            missing.append(str(error))
+        except CameraError as error:
+            problems.append(str(error))
+    if problems and not found:
+        raise CameraError("; ".join(problems))
+    if len(missing) == len(DRIVERS):
+        raise CameraError(_without_driver(missing))
+    return found
+
+
+def _without_driver(missing: Sequence[str]) -> str:
+    return f"no driver of a camera is installed: {', '.join(missing)}"
 
 
 def udev_instructions() -> str:

@@ -12,12 +12,22 @@ import numpy as np
 
 from ...errors import CameraError
 from ...events import EventBatch
-from ..event_camera import DRIVERS, CameraDriver, CameraOptions, CameraPacket, EventCamera, ListedCamera, check_biases
+from ..event_camera import (
+    DRIVERS,
+    CameraDriver,
+    CameraOptions,
+    CameraPacket,
+    DriverMissingError,
+    EventCamera,
+    ListedCamera,
+    check_biases,
+    check_region,
+)
 
 NAME = "neuromorphic"
 TIMEOUT_S = 0.05  # of a read, after which a camera that sees nothing is asked for commands and its end
 LIMITER_PERIOD_US = 200  # in which events are counted and dropped, as the maker's own software has it
-INSTALL = "install it with `uv sync --extra live` (or `pip install spinscope[live]`)"
+INSTALL = "`uv sync --extra live` (or `pip install spinscope[live]`)"
 # Vendor and product numbers of the devices that the library knows (its own rules, 0.18).
 UDEV_RULES = (
     'SUBSYSTEM=="usb", ATTRS{idVendor}=="152a", ATTRS{idProduct}=="84[0-1]?", MODE="0666"',
@@ -37,11 +47,11 @@ REMEDIES = {
 
 
 def library() -> Any:
-    """The library, loaded when it is needed; raises CameraError where it is not installed."""
+    """The library, loaded when it is needed; raises DriverMissingError where it is not installed."""
     try:
         return import_module("neuromorphic_drivers")
     except ImportError as error:
-        raise CameraError(f"the driver of the cameras is missing: {INSTALL}") from error
+        raise DriverMissingError(f"for EVK4, EVK3 HD, SilkyEvCam, DAVIS346, DVXplorer {INSTALL}") from error
 
 
 def camera_error(error: Exception, what: str) -> CameraError:
@@ -123,11 +133,7 @@ class NeuromorphicCamera(EventCamera):
         """The configuration with region of interest and limit of the event rate; raises CameraError."""
         if options.roi_px is not None:
             x, y, width, height = options.roi_px
-            if not (0 <= x < x + width <= self.width_px and 0 <= y < y + height <= self.height_px):
-                raise CameraError(
-                    f"region of interest {x} {y} {width} {height} lies outside the sensor of "
-                    f"{self.width_px} x {self.height_px} px: give X Y WIDTH HEIGHT in pixels"
-                )
+            check_region(options.roi_px, self.width_px, self.height_px)
             if hasattr(configuration, "region_of_interest"):
                 configuration = replace(configuration, region_of_interest=module.RegionOfInterest(x, y, width, height))
             elif hasattr(module, "RowColumnMask"):
