@@ -130,7 +130,7 @@ def run_camera(
         loops=loops,
         fault=fault,
     )
-    recording = None if record is None else RecordChoice(record, split_mb, split_s)
+    recording = None if record is None else RecordChoice(record, split_mb, split_s, goes_on=table is not None)
     swept = None if sweep is None else SweepChoice(**sweep)
     to = Outputs(lines=lines, port=socket_port, table=table, record=recording, sweep=swept)
     if page is not None:

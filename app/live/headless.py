@@ -180,6 +180,8 @@ def run_headless(
         at_end.callback(recording.end)
         if to.record is not None:
             recording.begin(to.record)
+            assert recording.present is not None
+            note(f"recording {recording.present.files[0]}")
             take_markers(recording)
         if to.sweep is not None:
             sweep = CameraSweep(

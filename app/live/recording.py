@@ -34,11 +34,14 @@ class RecordChoice:
         First file, NAME.raw.
     most_mb, most_s : float, optional
         Size and length at which another file begins.
+    goes_on : bool
+        Whether to go on behind files of these names that are there.
     """
 
     path: Path
     most_mb: float | None = None
     most_s: float | None = None
+    goes_on: bool = False
 
 
 def recorder(chosen: RecordChoice, camera: Callable[[], EventCamera], session: Session, on_notice: Notice) -> Recorder:
@@ -55,6 +58,7 @@ def recorder(chosen: RecordChoice, camera: Callable[[], EventCamera], session: S
         beside=lambda: _texts_beside(camera(), session.parameters),
         most_bytes=None if chosen.most_mb is None else round(chosen.most_mb * 1e6),
         most_us=None if chosen.most_s is None else round(chosen.most_s * 1e6),
+        goes_on=chosen.goes_on,
         on_notice=on_notice,
     )
 

@@ -45,13 +45,15 @@ class Recorder:
     Parameters
     ----------
     path : Path
-        First file; it must not exist.
+        First file; it must not exist, unless the recording goes on.
     open_file : callable
         `open_file(path) -> EventFile` creates one; raises OSError or RecordingError.
     beside : callable, optional
         `beside() -> mapping of str to str`: texts to be written beside a file that begins now, by suffix (".toml").
     most_bytes, most_us : int, optional
         Largest file, and longest.
+    goes_on : bool
+        Whether to go on behind files of these names that are there.
     on_notice : callable
         Told why the recording ended early, as when the disk is full (`EventStream`); live goes on.
 
@@ -76,11 +78,14 @@ class Recorder:
         beside: Callable[[], Mapping[str, str]] = dict,
         most_bytes: int | None = None,
         most_us: int | None = None,
+        goes_on: bool = False,
         on_notice: Notice = lambda kind, text: None,
     ) -> None:
         self.path, self.files, self.events, self.markers = path, list[Path](), 0, 0
         self._open_file, self._beside, self._on_notice = open_file, beside, on_notice
-        self._most_bytes, self._most_us = most_bytes, most_us
+        self._most_bytes, self._most_us, self._number = most_bytes, most_us, 0
+        while goes_on and self._path(self._number + 1).exists():
+            self._number += 1
         self._coming: queue.SimpleQueue[tuple[int, EventBatch] | None] = queue.SimpleQueue()
         self._waiting_events = 0
         self._clock: int | None = None  # of the present file, as soon as it has events
@@ -162,8 +167,8 @@ class Recorder:
         self.events += len(events)
 
     def _next_file(self) -> EventFile:
-        number = len(self.files) + 1
-        path = self.path if number == 1 else self.path.with_name(f"{self.path.stem}-{number}{self.path.suffix}")
+        self._number += 1
+        path = self._path(self._number)
         try:
             file = self._open_file(path)
             for suffix, text in self._beside().items():
@@ -173,6 +178,9 @@ class Recorder:
             raise RecordingError(f"recording cannot be written ({why}): give another name: {path}") from error
         self.files.append(path)
         return file
+
+    def _path(self, number: int) -> Path:
+        return self.path if number == 1 else self.path.with_name(f"{self.path.stem}-{number}{self.path.suffix}")
 
     def _fail(self, error: Exception) -> None:
         """End the recording with what is in its files."""

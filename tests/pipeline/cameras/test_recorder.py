@@ -71,6 +71,17 @@ def test_a_file_that_exists_is_kept(tmp_path: Path) -> None:
     assert (tmp_path / "a.raw").read_text() == "mine"
 
 
+def test_a_recording_goes_on_behind_the_files_that_are_there(tmp_path: Path) -> None:
+    for start_us in (0, 100_000):
+        writing = recorder(tmp_path / "a.raw", goes_on=True)
+        writing(0, some(start_us))
+        writing(1, some(start_us + 50_000))
+        writing.close()
+    assert [path.name for path in writing.files] == ["a-3.raw", "a-4.raw"]
+    paths = [tmp_path / name for name in ("a.raw", "a-2.raw", "a-3.raw", "a-4.raw")]
+    assert equal(read(paths), EventBatch.concatenate(some(start_us) for start_us in range(0, 200_000, 50_000)))
+
+
 def test_a_file_opens_from_the_moment_it_is_there(tmp_path: Path) -> None:
     writing = raw_file(tmp_path / "a.raw", 640, 480, {})
     assert open_recording(tmp_path / "a.raw").width_px == 640
