@@ -102,10 +102,12 @@ class OpenLive:
 
     def set_biases(self, biases: Mapping[str, int]) -> int:
         """Change biases as `EventStream.set_biases` does, noted beside a recording under way."""
+        before = self.camera.biases
+        changed = [f"{name} = {value}" for name, value in biases.items() if before.get(name) != value]
         upto_us = self.run.stream.set_biases(biases)
-        if self.recording.present is not None:
+        if changed and self.recording.present is not None:
             try:
-                self.recording.mark("biases: " + ", ".join(f"{name} = {value}" for name, value in biases.items()))
+                self.recording.mark(f"biases: {', '.join(changed)}")
             except RecordingError as error:
                 note(str(error))
         return upto_us
@@ -212,8 +214,6 @@ def run_headless(
                 if table is not None and isinstance(one, LiveShot):
                     row = table.append(one, session, recent)
                     note(row_words(row))
-                    if row["events_file"] is None:
-                        note(f"the events of shot {row['number']} are no longer in memory: not saved")
                 if observer is not None:
                     observer.add_output(one, row)
                 if sweep is not None and sweep.done.is_set():

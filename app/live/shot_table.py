@@ -19,6 +19,7 @@ from spinscope.pipeline.session import Result, Session
 
 from ..coach.shot_record import SHOT_END, SHOT_START
 from ..table_files import check_table_name, write_table
+from ..terminal import note
 
 MARGIN_US = 20_000  # of events before and after a shot: analysed anew it begins and ends as it did
 LIVE_COLUMNS: dict[str, type] = {"number": int, "date": str, "events_file": str, "latency_ms": float}
@@ -66,22 +67,32 @@ class ShotTable:
             raise self._error(error) from error
 
     def append(self, shot: LiveShot, session: Session, recent: RecentEvents) -> ResultRow:
-        """Add a shot and save its events; returns the row. Raises RecordingError."""
+        """Add a shot and save its events, or say why they are not; returns the row. Raises RecordingError."""
         (row,) = shot_rows(Result(session, (shot.shot,), None))
         number = self.count + 1
-        start_us, end_us = max(shot.shot.start_us - MARGIN_US, 0), shot.shot.end_us + MARGIN_US
-        events, saved = recent.between(shot.clock, start_us, end_us), self.folder / f"shot_{number:05d}.h5"
-        if len(events):
-            camera = {f"camera.{name}": value for name, value in session.parameters.camera.as_dict().items()}
-            attributes = {name: value for name, value in camera.items() if isinstance(value, str | float)}
-            attributes |= {SHOT_START: float(shot.shot.start_us), SHOT_END: float(shot.shot.end_us)}
-            width_px, height_px = session.source.width_px, session.source.height_px
-            write_recording(saved, events, width_px=width_px, height_px=height_px, attributes=attributes)
+        try:
+            saved = self._save_events(number, shot, session, recent)
+        except RecordingError as error:
+            note(f"the events of shot {number} are not saved: {error}")
+            saved = None
         row |= {"number": number, "date": datetime.now(UTC).isoformat(), "latency_ms": shot.latency_ms}
-        row["events_file"] = str(saved.relative_to(self.path.parent)) if len(events) else None
+        row["events_file"] = None if saved is None else str(saved.relative_to(self.path.parent))
         self._append({name: row.get(name) for name in self.columns})
         self.count = number
         return row
+
+    def _save_events(self, number: int, shot: LiveShot, session: Session, recent: RecentEvents) -> Path:
+        """Save a shot's events, as far as they are kept; raises RecordingError."""
+        start_us, end_us = max(shot.shot.start_us - MARGIN_US, 0), shot.shot.end_us + MARGIN_US
+        events, saved = recent.between(shot.clock, start_us, end_us), self.folder / f"shot_{number:05d}.h5"
+        if not len(events):
+            raise RecordingError("they are no longer in memory: the spins are too far behind")
+        camera = {f"camera.{name}": value for name, value in session.parameters.camera.as_dict().items()}
+        attributes = {name: value for name, value in camera.items() if isinstance(value, str | float)}
+        attributes |= {SHOT_START: float(shot.shot.start_us), SHOT_END: float(shot.shot.end_us)}
+        width_px, height_px = session.source.width_px, session.source.height_px
+        write_recording(saved, events, width_px=width_px, height_px=height_px, attributes=attributes)
+        return saved
 
     @property
     def disk_bytes(self) -> int:

@@ -115,6 +115,27 @@ def test_a_table_goes_on_after_a_crash(bounce: Session, tmp_path: Path, suffix: 
     assert (saved.width_px, saved.height_px) == (1280, 720)
 
 
+def test_a_shot_whose_events_cannot_be_saved_has_its_row(
+    bounce: Session, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The disk is nearly full, or the events are gone: said, and the spin is not lost."""
+
+    def full(path: Path, *_: object, **__: object) -> None:
+        raise RecordingError(f"recording cannot be written (No space left on device): {path}")
+
+    recent = RecentEvents()
+    shots = [LiveShot(shot, 0, 0, 12.5) for shot in bounce.estimate("triplet").shots]
+    table = ShotTable(tmp_path / "day.jsonl")
+    assert table.append(shots[0], bounce, recent)["events_file"] is None
+    recent(0, bounce.source.between(0, 10**9))
+    monkeypatch.setattr("spinscope.app.live.shot_table.write_recording", full)
+    assert table.append(shots[1], bounce, recent)["events_file"] is None
+    said = capsys.readouterr().err
+    assert "events of shot 1 are not saved: they are no longer in memory" in said
+    assert "events of shot 2 are not saved: recording cannot be written (No space" in said
+    assert [json.loads(line)["number"] for line in table.path.read_text().splitlines()] == [1, 2]
+
+
 def test_watch_writes_a_table(bounce: Session, tmp_path: Path) -> None:
     table = tmp_path / "day.csv"
     result = run("watch", table, "--replay", bounce.recording.path, *QUICK)
@@ -224,18 +245,20 @@ def test_each_file_states_the_camera_that_is_there_when_it_begins(bounce: Sessio
 
 def test_biases_that_change_while_it_is_recorded_are_noted(bounce: Session, tmp_path: Path) -> None:
     about: dict[str, Any] = {"width_px": 1280, "height_px": 720, "name": "stand-in", "serial": "7"}
-    camera: Any = SimpleNamespace(**about, biases={}, options=CameraOptions())
+    camera: Any = SimpleNamespace(**about, biases={"refr": 4}, options=CameraOptions())
     recording = CameraRecording(lambda: camera, bounce, tmp_path, lambda kind, text: pytest.fail(text))
     asked: list[object] = []
-    run_: Any = SimpleNamespace(stream=SimpleNamespace(set_biases=lambda biases: asked.append(biases) or 7))
+    stream = SimpleNamespace(set_biases=lambda biases: asked.append(biases) or 7, camera=camera)
+    run_: Any = SimpleNamespace(stream=stream)
     live = OpenLive(bounce, run_, RecentEvents(), recording)
     assert live.set_biases({"fo": 3}) == 7
     recording.begin(RecordChoice(tmp_path / "a.raw"))
-    live.set_biases({"diff_on": 10, "diff_off": 12})
+    live.set_biases({"refr": 4})
+    live.set_biases({"diff_on": 10, "diff_off": 12, "refr": 4})
     recording.end()
     (line,) = map(json.loads, (tmp_path / "a.markers.jsonl").read_text().splitlines())
     assert line["text"] == "biases: diff_on = 10, diff_off = 12"
-    assert asked == [{"fo": 3}, {"diff_on": 10, "diff_off": 12}]
+    assert asked == [{"fo": 3}, {"refr": 4}, {"diff_on": 10, "diff_off": 12, "refr": 4}]
 
 
 def test_without_a_camera_no_table_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

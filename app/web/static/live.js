@@ -238,7 +238,8 @@ const words = (/** @type {LiveRecording} */ { file, events, markers }) =>
  */
 function drawn({ title, unit, scale, lines }, seconds) {
   const values = lines.map(({ name }) => seconds.map((one) => one[name]));
-  const most = Math.max(1e-9, ...values.flat().filter((value) => value !== null));
+  const known = values.flat().filter((value) => value !== null);
+  const most = Math.max(1e-9, ...known);
   const x = (/** @type {number} */ index) => (index / Math.max(seconds.length - 1, 1)) * WIDTH;
   const curves = lines.map(({ colour }, line) => {
     // A single point between gaps is a line of no length with round ends.
@@ -254,7 +255,13 @@ function drawn({ title, unit, scale, lines }, seconds) {
     const words = `${label} ${value === undefined ? "–" : number(value * scale, 3)} `;
     return element("span", { style: `color: ${colour}` }, words);
   });
-  const head = element("div.plothead", {}, `${title}: `, ...last, unit);
+  const head = element(
+    "div.plothead",
+    {},
+    `${title}: `,
+    ...last,
+    known.length ? `${unit}, 0 to ${number(most * scale, 3)}` : unit,
+  );
   const box = { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "none", role: "img", "aria-label": title };
   return element("div.plot", {}, head, drawing("svg", box, ...curves));
 }
