@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from . import entities as at
 from .ball_projections import sphere
-from .rerun_api import Chunk, columns_at, once, styled
+from .rerun_api import Chunk, columns_at, once, strips, styled
 from .run import ViewedRun, shot_starts, shown_estimate, vector_of
 
 Floats = NDArray[np.float64]
@@ -126,13 +126,13 @@ def _ring(run: ViewedRun) -> list[Chunk]:
     spins = np.array([vector_of(shown_estimate(tick)[0]) for tick in run.ticks])
     magnitudes = np.linalg.norm(spins, axis=1)
     shown = run.has_ball & (magnitudes > 0)
-    strips = _around(spins[shown] / magnitudes[shown, None]) * run.ball_radius_m
+    rings = _around(spins[shown] / magnitudes[shown, None]) * run.ball_radius_m
     lengths = [0, *shown.astype(int)]
-    arrows = rr.Arrows3D.columns(origins=strips[:, -3], vectors=strips[:, -1] - strips[:, -3])
+    arrows = rr.Arrows3D.columns(origins=rings[:, -3], vectors=rings[:, -1] - rings[:, -3])
     radius = 0.025 * run.ball_radius_m
     return [
         styled(at.SPIN_RING, rr.LineStrips3D, colors=at.RING_COLOUR, radii=radius),
-        columns_at(at.SPIN_RING, run.times_us, rr.LineStrips3D.columns(strips=list(strips[:, :-2])), lengths),
+        columns_at(at.SPIN_RING, run.times_us, rr.LineStrips3D.columns(strips=strips(rings[:, :-2], 3)), lengths),
         styled(at.RING_TIP, rr.Arrows3D, colors=at.RING_COLOUR, radii=2.5 * radius),
         columns_at(at.RING_TIP, run.times_us, arrows, lengths),
     ]
@@ -160,7 +160,8 @@ def _path(run: ViewedRun) -> list[Chunk]:
     shots = [tick.track.shot for tick in run.ticks]
     goes_on = [run.has_ball[i] and i > 0 and shots[i] == shots[i - 1] for i in range(len(run.ticks))]
     pieces = [places[i - 1 : i + 1] for i, flies in enumerate(goes_on) if flies]
-    chunks.append(columns_at(at.PATH, run.times_us, rr.LineStrips3D.columns(strips=pieces), [0, *map(int, goes_on)]))
+    flown = rr.LineStrips3D.columns(strips=strips(pieces, 3))
+    chunks.append(columns_at(at.PATH, run.times_us, flown, [0, *map(int, goes_on)]))
     paths = [shot.positions_m(run.camera, run.ball_radius_m) for shot in run.shots]
     numbers = [str(number) for number in range(1, len(paths) + 1)]
     if paths:

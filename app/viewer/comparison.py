@@ -15,7 +15,7 @@ from . import panes
 from .ball_projections import sphere
 from .image import ball_places
 from .png import png
-from .rerun_api import Chunk, columns_at, once, styled
+from .rerun_api import Chunk, columns_at, once, strips, styled
 from .run import ViewedRun, shown_estimate, vector_of
 
 Floats = NDArray[np.float64]
@@ -26,6 +26,7 @@ PALE, PALENESS = (235, 235, 235), 0.55
 GRID_DEG, GRID_POINTS = 30, 49  # of the sphere on which the axes stand
 # Length and thickness of the axes on the unit sphere: where they agree, each still looks out of the next.
 AXES = {"A": (1.2, 0.06), "B": (1.35, 0.04), "truth": (1.5, 0.02)}
+HOW_TO_PIN = "Pin as A first (key a)"
 ARC_POINTS = 17  # of the arc between two axes
 
 
@@ -40,9 +41,15 @@ def compared(a: Sequence[Chunk]) -> list[Chunk]:
 
 
 def note_without_a(run: ViewedRun) -> list[Chunk]:
-    """Text of the comparison while nothing is pinned."""
+    """Text of the comparison while nothing is pinned, and a hint in each pane that has nothing to show without A."""
     text = "## Nothing to compare yet\n\nPress **Pin as A** above the viewer, then change parameters: that is B."
-    return _note(run, text)
+    look = {"labels": HOW_TO_PIN, "colors": at.OTHERS_COLOUR, "radii": -0.1, "show_labels": True}
+    flat = [A + at.SURFACE, at.SURFACE_DIFFERENCE, A + at.DEROTATED_LOGO]
+    return [
+        *_note(run, text),
+        *(once(entity, rr.Points2D([[0.0, 0.0]], **look)) for entity in flat),
+        once(f"{at.COMPARED_AXES}/angle", rr.Points3D([[0.0, 0.0, 0.0]], **look)),
+    ]
 
 
 def note_with_a(run: ViewedRun, text: str) -> list[Chunk]:
@@ -171,7 +178,7 @@ def _arc(a: ViewedRun, b: ViewedRun, spins_a: Floats, spins_b: Floats) -> list[C
     share = np.linspace(0, 1, ARC_POINTS)[:, None]
     chords = first[:, None] * (1 - share) + last[:, None] * share
     arcs = chords / np.maximum(np.linalg.norm(chords, axis=2, keepdims=True), 1e-9)
-    columns = rr.LineStrips3D.columns(strips=list(arcs), labels=[f"{angle:.1f}°" for angle in angles_deg])
+    columns = rr.LineStrips3D.columns(strips=strips(arcs, 3), labels=[f"{angle:.1f}°" for angle in angles_deg])
     entity = f"{at.COMPARED_AXES}/angle"
     style = styled(entity, rr.LineStrips3D, colors=at.OTHERS_COLOUR, radii=-1.5, show_labels=True)
     return [style, columns_at(entity, b.times_us, columns, [0, *known.astype(int)])]

@@ -19,8 +19,11 @@ TIME_PANEL_PX = 34
 MIN_WIDTH_PX, MIN_HEIGHT_PX, MIN_PLOT_HEIGHT_PX = 200, 120, 75
 # Two rows of a legend hide half of a plot that is lower: it is left without, and tells a curve's name at the mouse.
 MIN_LEGEND_HEIGHT_PX = 160
+# That of all methods has seven rows; beside a plot without it the witnesses bear their names in its colours.
+LEGEND_HEIGHTS_PX = {at.SPIN_MAGNITUDE: 330}
 PLOTS = (rrb.TimeSeriesView, rrb.StateTimelineView, rrb.BarChartView)
-LARGER_PX = {at.WITNESSES: (320, 250)}  # width and height by a pane's origin: it has words in many rows
+# Width and height by a pane's origin: the witnesses have words in many rows, the tracker two lanes with their names.
+LARGER_PX = {at.WITNESSES: (320, 250), at.TRACKER: (200, 128)}
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,9 @@ def fitted(part: Part, width_px: float, height_px: float) -> Part:
     width_px, height_px : float
         Its size.
     """
-    if isinstance(part, rrb.TimeSeriesView) and height_px < MIN_LEGEND_HEIGHT_PX:
+    if isinstance(part, rrb.TimeSeriesView) and height_px < LEGEND_HEIGHTS_PX.get(
+        str(part.origin), MIN_LEGEND_HEIGHT_PX
+    ):
         low = copy(part)
         low.properties = {**part.properties, "PlotLegend": rrb.PlotLegend(visible=False)}
         return low

@@ -20,7 +20,7 @@ from spinscope.pipeline.results import Circle
 from . import entities as at
 from .plots import true_state
 from .png import png
-from .rerun_api import Chunk, columns_at, once, states, styled
+from .rerun_api import Chunk, columns_at, once, states, strips, styled
 from .run import ViewedRun
 
 Floats = NDArray[np.float64]
@@ -199,14 +199,14 @@ def _balls(run: ViewedRun) -> list[Chunk]:
     """Circle of every ball with the number of its shot, and its track up to the tick."""
     so_far: dict[int, list[Floats]] = {}
     circles: list[tuple[Floats, str]] = []
-    strips: list[Floats] = []
+    lines: list[Floats] = []
     lengths = [0]
     for tick in run.ticks:
         for ball in tick.track.balls:
             so_far.setdefault(ball.shot, []).append(ball.mean[:2])
             number = run.shot_numbers.get(ball.shot)
             circles.append((ball.mean, "" if number is None else str(number)))
-            strips.append(np.array(so_far[ball.shot][-TRACK_TICKS:]))
+            lines.append(np.array(so_far[ball.shot][-TRACK_TICKS:]))
         lengths.append(len(tick.track.balls))
     places = np.array([mean for mean, _ in circles]).reshape(-1, 5).astype(np.float32)
     outlines = rr.Ellipses2D.columns(
@@ -216,7 +216,7 @@ def _balls(run: ViewedRun) -> list[Chunk]:
         styled(at.BALLS, rr.Ellipses2D, colors=at.OTHERS_COLOUR, line_radii=-0.6, show_labels=True),
         columns_at(at.BALLS, run.times_us, outlines, lengths),
         styled(at.TRACKS, rr.LineStrips2D, colors=at.OTHERS_COLOUR, radii=-0.6),
-        columns_at(at.TRACKS, run.times_us, rr.LineStrips2D.columns(strips=strips), lengths),
+        columns_at(at.TRACKS, run.times_us, rr.LineStrips2D.columns(strips=strips(lines)), lengths),
     ]
 
 
@@ -247,8 +247,8 @@ def _true_circle(run: ViewedRun) -> list[Chunk]:
     angles = np.linspace(0, 2 * np.pi, 4 * DASHES, endpoint=False).reshape(DASHES, 4)[:, :3]
     unit = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     known = np.isfinite(state[:, 0])
-    strips = [dash for row in state[known] for dash in row[:2] + row[4] * unit]
-    columns = rr.LineStrips2D.columns(strips=strips)
+    dashes = [dash for row in state[known] for dash in row[:2] + row[4] * unit]
+    columns = rr.LineStrips2D.columns(strips=strips(dashes))
     return [
         styled(at.TRUE_CIRCLE, rr.LineStrips2D, colors=at.TRUTH_COLOUR, radii=-0.8),
         columns_at(at.TRUE_CIRCLE, run.times_us, columns, [0, *(DASHES * known.astype(int))]),

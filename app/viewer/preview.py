@@ -13,7 +13,7 @@ from spinscope.pipeline.tick import Tick
 
 from . import entities as at
 from .png import png
-from .run import shown_estimate, vector_of
+from .run import sentence, shown_estimate, vector_of
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float64]
@@ -47,7 +47,7 @@ def preview(ticks: Sequence[Tick]) -> bytes:
 def preview_words(tick: Tick, *, is_whole: bool) -> str:
     """Answer of a tick in words: what is known so far; `is_whole` where the slow methods have run, too."""
     if not tick.track.has_ball:
-        return f"No ball: {tick.track.reason or tick.track.status}"
+        return sentence(tick.track.reason or tick.track.status)
     estimate, is_trusted = shown_estimate(tick)
     if estimate is None or estimate.magnitude_rps is None:
         return "Spin not known yet"

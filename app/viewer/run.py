@@ -140,8 +140,14 @@ class ViewedRun:
 
     @cached_property
     def opening_us(self) -> int:
-        """Time at which the viewer opens: a spin is first trusted, or the track starts where none is."""
-        return next((tick.packet.end_us for tick in self._flown if tick.best is not None), self.first_sight_us)
+        """Time at which the viewer opens.
+
+        A spin is first trusted and the logo in view, for its pictures are empty in other ticks; without such a tick a
+        spin is first trusted, and where none is the track starts.
+        """
+        trusted = [tick for tick in self._flown if tick.best is not None]
+        with_logo = [tick for tick in trusted if (logo := tick.get("logo")) is not None and len(logo.events)]
+        return next((tick.packet.end_us for tick in (with_logo or trusted)), self.first_sight_us)
 
     @cached_property
     def true_spins_rps(self) -> Floats | None:
@@ -240,6 +246,11 @@ def shown_estimate(tick: Tick) -> tuple[SpinEstimate | None, bool]:
     rivals = [method.name for method in rival_methods()]
     answers = [one for name, one in tick.estimates.items() if one.vector_rps is not None and name not in rivals]
     return (answers[-1] if answers else None), False
+
+
+def sentence(reason: str) -> str:
+    """A reason with a capital letter. It names its subject itself ("no ball: ..."): nothing is set before it."""
+    return reason[:1].upper() + reason[1:]
 
 
 def vector_of(estimate: SpinEstimate | None) -> Floats:

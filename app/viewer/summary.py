@@ -19,7 +19,7 @@ from spinscope.pipeline.tick import Tick
 from . import entities as at
 from .png import png
 from .rerun_api import Chunk, columns_at, once, styled
-from .run import ViewedRun, shown_estimate
+from .run import ViewedRun, sentence, shown_estimate
 
 Vector = NDArray[np.float64]
 Block = tuple[str, str]  # a line in big letters, one in small ones
@@ -34,7 +34,7 @@ MIN_SPEED_M_S = 0.2
 
 def summary_chunks(run: ViewedRun) -> list[Chunk]:
     """Summary and card at the start and at the end of every tick."""
-    texts, cards = [_opening(run)], [(("-", "spin"), ("-", "speed"), ("No ball yet", run.no_shot_reason or ""))]
+    texts, cards = [_opening(run)], [_first_card(run)]
     result: list[str] = []
     for row, (tick, true_rps) in enumerate(zip(run.ticks, _true_spins(run), strict=True)):
         velocity = _velocity_m_s(run, tick)
@@ -91,14 +91,14 @@ class _TickState:
         """Heading with the answer, or that there is none yet."""
         speed = speed_words(self.velocity_m_s)
         if self.answer is None:
-            return ["## Spin not known", "", f"{_sentence(speed)}; {span}.", ""]
+            return ["## Spin not known", "", f"{sentence(speed)}; {span}.", ""]
         estimate, kind, trusted = self.answer
         magnitude_rps = estimate.magnitude_rps or 0.0
         doubt = "" if trusted else " (no method is trusted)"
         return [
             f"## {magnitude_rps:.1f} rps · {kind.name}{doubt}",
             "",
-            f"{_sentence(kind.sentence)}. **{rpm(magnitude_rps):.0f} rpm**, {speed}; {span}.",
+            f"{sentence(kind.sentence)}. **{rpm(magnitude_rps):.0f} rpm**, {speed}; {span}.",
             "",
         ]
 
@@ -187,12 +187,17 @@ def _velocity_m_s(run: ViewedRun, tick: Tick) -> Vector | None:
     return velocity if np.linalg.norm(velocity) >= MIN_SPEED_M_S else None
 
 
+def _first_card(run: ViewedRun) -> Card:
+    """Card before anything is known."""
+    headline = "No ball yet" if run.no_shot_reason is None else "No shot"
+    return ("-", "spin"), ("-", "speed"), (headline, run.no_shot_reason or "")
+
+
 def _opening(run: ViewedRun) -> str:
     """Text before anything is known."""
     lines = ["## No ball yet", ""]
     if run.no_shot_reason:
-        reason = run.no_shot_reason.removeprefix("no ball: ")
-        lines = ["## No ball in this recording", "", f"Because: **{reason}**", ""]
+        lines = ["## No shot in this recording", "", f"**{sentence(run.no_shot_reason)}**", ""]
     return "\n".join([*lines, *_origin(run)])
 
 
@@ -209,12 +214,8 @@ def _origin(run: ViewedRun) -> list[str]:
 def _without_ball(run: ViewedRun, tick: Tick, result: list[str]) -> list[str]:
     """Lines of the last shot's result while no ball is there, or that there was none yet."""
     if result:
-        return [*result, "", "---", f"Now: {tick.track.reason or 'no ball'}"]
-    return [_opening(run), "", f"Tracker: {tick.track.status}, {tick.track.reason or 'no ball'}"]
-
-
-def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:]
+        return [*result, "", "---", f"Now {tick.track.reason}"]
+    return [_opening(run), "", f"Tracker {tick.track.status}; {tick.track.reason}"]
 
 
 def _magnitude(estimate: SpinEstimate) -> str:

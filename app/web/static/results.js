@@ -31,7 +31,7 @@ export class Results extends EventTarget {
     const parts = pinned_metrics ? [differing(differences)] : [];
     parts.push(this.#table(both, costs.map((cost) => Object.values(cost ?? {}).reduce((a, b) => a + b, 0))));
     for (const reason of new Set(both.map((one) => one.no_shot_reason).filter(Boolean))) {
-      parts.push(element("p.note", {}, `No shot: ${reason}`));
+      parts.push(element("p.note", {}, sentence(reason)));
     }
     for (const reason of new Set(both.map((one) => mainShot(one)?.best_reason).filter(Boolean))) {
       parts.push(element("p.note", {}, `No spin is trusted: ${reason}`));
@@ -183,5 +183,8 @@ function axis(/** @type {EstimateMetrics | undefined} */ estimate) {
   const parts = estimate.axis.map((value) => value.toFixed(2).replace("-", "−")).join(", ");
   return `${parts}${std === null ? "" : ` ± ${margin(std)}°`}`;
 }
+
+// A reason names its subject itself ("no ball: ..."): nothing is set before it.
+const sentence = (/** @type {string} */ reason) => reason.charAt(0).toUpperCase() + reason.slice(1);
 
 const margin = (/** @type {number} */ std) => std.toFixed(std < 0.05 ? 2 : 1);

@@ -8,10 +8,11 @@ from typing import Any
 
 import cv2
 import numpy as np
+import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from spinscope.app.viewer import entities
-from spinscope.app.viewer.comparison import compared, difference_chunks, note_with_a
+from spinscope.app.viewer.comparison import compared, comparison, difference_chunks, note_with_a, note_without_a
 from spinscope.app.viewer.drawers import run_chunks
 from spinscope.app.viewer.entities import COMPARED_AXES, OFF, ON, SURFACE_DIFFERENCE
 from spinscope.app.viewer.rrd import layout_bytes, rrd_bytes
@@ -39,6 +40,23 @@ def test_the_note_names_every_methods_colour(flight: ViewedRun) -> None:
     ((text,),) = column.to_pylist()
     for words in ("Triplet Matching orange", "Normal flow cyan", "Contrast maximisation pink", "truth violet"):
         assert words in text
+
+
+def test_panes_that_need_a_say_how_to_pin_it(flight: ViewedRun, tmp_path: Path) -> None:
+    path = tmp_path / "without.rrd"
+    path.write_bytes(rrd_bytes([*run_chunks(flight), *note_without_a(flight)], "without"))
+    found = read_back(path)
+    panes = [view for view in _views(comparison(flight)) if type(view).__name__.startswith("Spatial")]
+    for pane in panes:
+        contents = [pane.contents] if isinstance(pane.contents, str) else pane.contents
+        paths = {one.replace("$origin", str(pane.origin)).removesuffix("/**") for one in contents}
+        shown = [name for name in found if any(name == path or name.startswith(f"{path}/") for path in paths)]
+        assert shown, f"{pane.name} has no data"
+
+
+def _views(part: Any) -> list[Any]:
+    """All views of a layout."""
+    return [view for one in part.contents for view in _views(one)] if isinstance(part, rrb.Container) else [part]
 
 
 def test_the_page_has_a_tab_for_two_runs_only_where_there_can_be_two(flight: ViewedRun) -> None:

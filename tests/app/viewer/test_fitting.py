@@ -7,7 +7,16 @@ from typing import Any
 import pytest
 import rerun.blueprint as rrb
 
-from spinscope.app.viewer.fitting import MIN_LEGEND_HEIGHT_PX, MIN_PLOT_HEIGHT_PX, MIN_WIDTH_PX, ViewerSize, fitted
+from spinscope.app.viewer import entities as at
+from spinscope.app.viewer.fitting import (
+    LARGER_PX,
+    LEGEND_HEIGHTS_PX,
+    MIN_LEGEND_HEIGHT_PX,
+    MIN_PLOT_HEIGHT_PX,
+    MIN_WIDTH_PX,
+    ViewerSize,
+    fitted,
+)
 from spinscope.app.viewer.run import ViewedRun
 from spinscope.app.viewer.views import views
 
@@ -65,6 +74,18 @@ def test_a_low_plot_has_no_legend() -> None:
         [one.properties["PlotLegend"].visible.as_arrow_array().to_pylist() for one in of.contents] for of in (low, high)
     ]
     assert shown == [[[False]] * 2, [[True]] * 2]
+
+
+def test_a_legend_of_many_rows_and_the_trackers_lanes_need_more_room() -> None:
+    plot = rrb.TimeSeriesView(origin=at.SPIN_MAGNITUDE, plot_legend=rrb.PlotLegend(visible=True))
+    low, high = (fitted(plot, 400, height) for height in (LEGEND_HEIGHTS_PX[at.SPIN_MAGNITUDE] + d for d in (-1, 0)))
+    shown = [one.properties["PlotLegend"].visible.as_arrow_array().to_pylist() for one in (low, high)]
+    assert shown == [[False], [True]]
+    lanes = rrb.StateTimelineView(origin=at.TRACKER, name="lanes")
+    _, needed_px = LARGER_PX[at.TRACKER]
+    column = rrb.Vertical(lanes, rrb.TimeSeriesView(name="plot"))
+    assert kind(fitted(column, 400, needed_px + MIN_PLOT_HEIGHT_PX)) == "Vertical"
+    assert kind(fitted(column, 400, needed_px + MIN_PLOT_HEIGHT_PX - 1).contents[0]) == "Tabs"
 
 
 @pytest.mark.parametrize("size", [(600, 400), (800, 600), (950, 650), (1600, 900)])

@@ -38,10 +38,10 @@ def test_every_pane_shows_the_ball(flight: ViewedRun) -> None:
 
 def test_without_a_ball_it_is_black_and_says_why(flight: ViewedRun) -> None:
     seen = flight.ticks[0]
-    lost = dataclasses.replace(seen.track, status="lost", reason="no circle", balls=())
+    lost = dataclasses.replace(seen.track, status="lost", reason="no ball: no circle in the surface", balls=())
     before = Tick({**seen.results, "track": lost}, seen.packet, ())
     assert not np.concatenate(panes(preview([before]))).any()
-    assert preview_words(before, is_whole=True).startswith("No ball")
+    assert preview_words(before, is_whole=True) == "No ball: no circle in the surface"
 
 
 def test_a_quarter_of_a_turn_takes_x_to_y() -> None:

@@ -79,9 +79,13 @@ def test_a_ball_in_place_has_an_axis_and_no_speed(spinner: ViewedRun, tmp_path: 
 
 def test_no_ball_says_why(no_ball: ViewedRun, tmp_path: Path) -> None:
     assert no_ball.no_shot_reason
-    text = said(logged_by(no_ball, tmp_path), no_ball.start_us)
-    assert text.startswith("## No ball in this recording")
-    assert no_ball.no_shot_reason.removeprefix("no ball: ") in text
+    logged = logged_by(no_ball, tmp_path)
+    text = said(logged, no_ball.start_us)
+    assert text.startswith("## No shot in this recording")
+    assert no_ball.no_shot_reason in text.replace("**No ball", "no ball")
+    for tick in no_ball.ticks:
+        assert tick.track.reason in said(logged, tick.packet.end_us)
+        assert all(line.lower().count("no ball") <= 1 for line in said(logged, tick.packet.end_us).splitlines())
     assert "5,000,000 to" in text  # the file's own time
 
 
