@@ -47,6 +47,7 @@ def note_without_a(run: ViewedRun) -> list[Chunk]:
     flat = [A + at.SURFACE, at.SURFACE_DIFFERENCE, A + at.DEROTATED_LOGO]
     return [
         *_note(run, text),
+        once(A + at.BALL_PLACE, rr.Transform3D(translation=[0.0, 0.0, 0.0])),  # the close-up's origin
         *(once(entity, rr.Points2D([[0.0, 0.0]], **look)) for entity in flat),
         once(f"{at.COMPARED_AXES}/angle", rr.Points3D([[0.0, 0.0, 0.0]], **look)),
     ]

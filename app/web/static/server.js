@@ -11,6 +11,8 @@ const PATIENCE_MS = 5000; // as long as a picture takes to draw where there is n
 const SIZE_STEP_PX = 50; // the layout is made anew for a viewer that is larger or smaller by more
 const REST_MS = 500; // a slider that is held still for so long rests, one that is let go of at once
 const POLL_MS = 50;
+const LAYOUT_MS = 5000; // the longest until the first layout is shown
+const LAYOUT_TRIES = 10; // on a busy machine without a graphics card each takes its time
 const RESIZED_MS = 500; // a window that keeps its size for so long has it
 const NUMBERS_MS = 1000; // as long as numbers wait for their picture
 
@@ -326,7 +328,7 @@ export class RunRequests extends EventTarget {
       if (isWhole || !this.#hasLayout) await this.#fit();
       const opening_us = (!this.#hasLayout && this.start.time_us) || picture.opening_us;
       if (!(await this.viewer.show(content, picture.id, opening_us))) return false;
-      if (!this.#hasLayout) await this.viewer.tab(); // until the layout is there: before it, one of the viewer's own
+      if (!this.#hasLayout) await this.#laidOut();
       this.#hasLayout = true;
       return true;
     } catch (error) {
@@ -361,6 +363,15 @@ export class RunRequests extends EventTarget {
     if (document.body.classList.contains("coach")) return; // entered meanwhile
     await this.viewer.layout(layout);
     this.#layoutOf = layoutOf;
+  }
+
+  // Waits for the first layout: before it there is one of the viewer's own. One that comes while the viewer is starting
+  // can get lost, and is not taken a second time: then it gets another one of the same panes.
+  async #laidOut() {
+    for (let tries = 0; tries < LAYOUT_TRIES && await this.viewer.tab(LAYOUT_MS) === null; tries++) {
+      this.#layoutOf = null;
+      await this.#fit();
+    }
   }
 
   // The panes of a viewer of another size; a picture that is on its way brings them along.

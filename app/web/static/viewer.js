@@ -124,11 +124,17 @@ export class Viewer extends EventTarget {
   // Takes a layout; one for a recording that is shown is there at the end, not some frames later over another one.
   layout(/** @type {Uint8Array} */ bytes) {
     return this.#next(async () => {
-      const root = async () => (await this.#viewer.get_blueprint()).blueprint["/viewport"]?.ViewportBlueprint;
-      const before = this.#shown === null ? null : JSON.stringify(await root());
+      // Of a layout of the viewer's own making the root has numbers that JSON cannot tell.
+      const told = (/** @type {string} */ _, /** @type {any} */ value) =>
+        typeof value === "bigint" ? String(value) : value;
+      const root = async () => {
+        const { blueprint } = await this.#viewer.get_blueprint();
+        return JSON.stringify(blueprint["/viewport"]?.ViewportBlueprint, told);
+      };
+      const before = this.#shown === null ? null : await root();
       this.#channel.send_rrd(bytes);
       const until = performance.now() + TAKEN_MS;
-      while (before !== null && JSON.stringify(await root()) === before && performance.now() < until) {
+      while (before !== null && await root() === before && performance.now() < until) {
         await pause(POLL_MS);
       }
     });
@@ -302,8 +308,8 @@ export class Viewer extends EventTarget {
    * The layout; right after its recording the viewer may still show one of its own making, without our tabs.
    * @returns {Promise<Blueprint>}
    */
-  async #layout() {
-    const until = performance.now() + LAYOUT_MS;
+  async #layout(patience_ms = LAYOUT_MS) {
+    const until = performance.now() + patience_ms;
     for (;;) {
       const { blueprint } = await this.#viewer.get_blueprint();
       if (performance.now() > until || tabs(blueprint).some(({ title }) => title)) return blueprint;
@@ -311,9 +317,9 @@ export class Viewer extends EventTarget {
     }
   }
 
-  // The name of the tab in front.
-  async tab() {
-    const blueprint = await this.#layout();
+  // The name of the tab in front; null where none of ours has come so long.
+  async tab(patience_ms = LAYOUT_MS) {
+    const blueprint = await this.#layout(patience_ms);
     this.#turned(tabs(blueprint).find(({ front }) => front)?.title ?? null);
     return this.front;
   }

@@ -52,6 +52,7 @@ def test_panes_that_need_a_say_how_to_pin_it(flight: ViewedRun, tmp_path: Path) 
         paths = {one.replace("$origin", str(pane.origin)).removesuffix("/**") for one in contents}
         shown = [name for name in found if any(name == path or name.startswith(f"{path}/") for path in paths)]
         assert shown, f"{pane.name} has no data"
+        assert any(name.startswith(str(pane.origin)) for name in found), f"{pane.name} has no origin"
 
 
 def _views(part: Any) -> list[Any]:
