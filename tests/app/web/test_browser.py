@@ -227,6 +227,24 @@ def test_without_tools_the_viewer_fills_the_page_on_the_chosen_tab(browser: Any,
         own.stop()
 
 
+@pytest.mark.slow  # a viewer of its own
+def test_a_layout_that_is_lost_while_the_viewer_starts_is_made_again(browser: Any, tuner: Served) -> None:
+    context = browser.new_context(viewport=SIZE)
+    tab, lost = Tab(context.new_page()), list[str]()
+
+    def lose_first(route: Any) -> None:
+        if lost:
+            return route.continue_()
+        lost.append(route.request.url)
+        return route.fulfill(body=b"", content_type="application/octet-stream")
+
+    tab.page.route(re.compile(r"/layout\?"), lose_first)
+    tab.open(f"{tuner.address}#tab=Tracker")
+    tab.settled("shown")
+    assert lost and tab.page.evaluate("window.spinscope.viewer.front") == "Tracker"
+    context.close()
+
+
 def test_a_picture_that_a_newer_one_overtakes_is_not_shown(tab: Tab) -> None:
     """The first one is held in the viewer until two more wait behind it."""
     tab.page.evaluate(
