@@ -8,10 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import rerun.blueprint as rrb
+from numpy.typing import NDArray
 
 from . import entities as at
 
 Part = rrb.View | rrb.Container
+Floats = NDArray[np.float64]
 
 TITLE_PX = 28  # height of a pane's title, and of a row of tabs
 TIME_PANEL_PX = 34
@@ -64,8 +66,9 @@ def fitted(part: Part, width_px: float, height_px: float) -> Part:
     given, room = (part.column_shares, width_px) if is_row else (part.row_shares, height_px)
     needs = [_least(one)[0 if is_row else 1] for one in contents]
     shares = np.array([1.0] * len(contents) if given is None else given, float)
-    lengths = room * shares / shares.sum()
-    if (lengths < needs).any():
+    if sum(needs) <= room:
+        lengths = _lengths(shares, np.array(needs), room)
+    else:
         contents, needs = _grouped(contents, needs, room)
         lengths = room * np.array(needs) / sum(needs)
     inside = [
@@ -75,6 +78,18 @@ def fitted(part: Part, width_px: float, height_px: float) -> Part:
     if is_row:
         return rrb.Horizontal(*inside, column_shares=lengths, name=part.name)
     return rrb.Vertical(*inside, row_shares=lengths, name=part.name)
+
+
+def _lengths(shares: Floats, needs: Floats, room: float) -> Floats:
+    """Lengths by shares of the room, none less than it needs: together they need no more than there is."""
+    is_least = np.zeros(len(shares), np.bool_)
+    while True:
+        spare = room - needs[is_least].sum()
+        lengths = np.where(is_least, needs, spare * shares / max(float(shares[~is_least].sum()), 1e-9))
+        short = ~is_least & (lengths < needs)
+        if not short.any():
+            return lengths
+        is_least |= short
 
 
 def _grouped(contents: Sequence[Part], needs: Sequence[float], room: float) -> tuple[list[Part], list[float]]:

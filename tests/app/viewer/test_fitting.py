@@ -59,6 +59,8 @@ def test_what_has_room_stays_as_it_is() -> None:
 def test_shares_give_way_before_neighbours_become_tabs() -> None:
     found: Any = fitted(row("a", "b", "c"), 3 * MIN_WIDTH_PX, 400)
     assert list(found.column_shares) == pytest.approx([MIN_WIDTH_PX] * 3)
+    found = fitted(row("a", "b", "c"), 4.5 * MIN_WIDTH_PX, 400)  # those with room to spare give what others need
+    assert list(found.column_shares) == pytest.approx([2.5 * MIN_WIDTH_PX, MIN_WIDTH_PX, MIN_WIDTH_PX])
     found = fitted(row("a", "b", "c"), 2.9 * MIN_WIDTH_PX, 400)
     tabs, alone = found.contents
     assert kind(tabs) == "Tabs" and names(tabs) == ["a", "b"] and names(alone) == ["c"]
