@@ -20,6 +20,7 @@ from .track_kalman import OBSERVED, OBSERVED_BLOCK, BallFilter
 from .track_outline import FREE, LEAST_ARC, Edge, Sighting, measure
 from .track_path import PathPoint
 from .track_result import BallTrack, BeganBy
+from .track_rim import Rim
 from .track_rolling import JUDGED_US, ROLLING_M_S, SLOWEST_FLIGHT_M_S, rolls
 
 Floats = NDArray[np.float64]
@@ -41,16 +42,6 @@ ARCS_COVARIANCE = 0.5**2 * np.eye(3)
 LATENCY_STD_US = 12.0
 PLACE_STD_PX, RADIUS_STD_PX = 0.06, 0.3
 COMMON_COVARIANCE = np.diag([PLACE_STD_PX**2, PLACE_STD_PX**2, 0.0, 0.0, RADIUS_STD_PX**2])
-# Before ground about as bright as the ball's shaded rim, the events ahead are those of its shading further in. Those
-# behind still come at the rim, RIM_PX outside it: the ball reaches as far as they say. By radii on our simulator
-# (bright floors of seeds 96000-96002 and 97000; grounds of albedo 0.1 to 0.55 under blur of 0.3 to 0.9 px, thresholds
-# of 0.18 to 0.5 and slow pixels of seeds 98000-98027), the outline lacks 0.5 to 2.7 px, and 0.0 to 1.1 px with these.
-# It may lack nothing where thresholds of OFF are twice those of ON: hence RIM_ERROR of it as 1 sigma. So much off is
-# the centre as well, by 0.3 to 0.9 px: the shading is not in the ball's middle, and moves on it with the view.
-RIM_PX, RIM_ERROR = 0.1, 0.5
-# Slow pixels with high thresholds tell of falling light so much later than of rising light, on weak sensors of our
-# simulator (seeds 76010-76017: 25 to 93 us): the events behind then lie outside the ball by what it moves meanwhile.
-LATE_BEHIND_US = 40.0
 # A velocity from one outline is wrong by what the ball accelerates within its window; the paper: high enough to
 # converge fast.
 FIRST_SPEED_STD_M_S = 0.2
@@ -133,10 +124,8 @@ class TrackedBall:
         What speaks against one free flight so far, in words for people.
     contrast : float
         Of its outline when it was last measured (see `Sighting`).
-    behind_px : float
-        How far outside its outline the events behind lie, on average over the outlines wholly in view.
-    outlines : int
-        Number of these.
+    rim : Rim
+        What the events behind tell of its rim.
     part : int
         Part of the outline that it is measured by.
     """
@@ -151,8 +140,7 @@ class TrackedBall:
     is_shot: bool = True
     doubt: str | None = None
     contrast: float = 0.0
-    behind_px: float = -math.inf
-    outlines: int = 0
+    rim: Rim = Rim()
     part: int = HALF_AHEAD
 
     @classmethod
@@ -176,8 +164,7 @@ class TrackedBall:
             first_us,
             state,
             contrast=self.contrast,
-            behind_px=self.behind_px,
-            outlines=self.outlines,
+            rim=self.rim,
             part=self.part,
         )
 
@@ -336,12 +323,11 @@ class TrackedBall:
             covariance[4, 4] += ARCS_RADIUS_STD_PX**2
         return covariance
 
-    def track(self, end_us: int, latency_us: float, outline_px: float, earlier: tuple[BallTrack, ...]) -> BallTrack:
-        """Its present state, that of the whole ball where the outline is one of its shading."""
-        seen_px = max(self.behind_px - RIM_PX + outline_px, 0.0)
-        rim_px = max(seen_px - math.hypot(*self.filter.mean[2:4]) * LATE_BEHIND_US * 1e-6, 0.0)
+    def track(self, end_us: int, latency_us: float, earlier: tuple[BallTrack, ...]) -> BallTrack:
+        """Its present state, that of the whole ball as far as its rim."""
+        rim_px = self.rim.outside_px(math.hypot(*self.filter.mean[2:4]))
         covariance, circle = self.total_covariance(), self.measured
-        covariance[OBSERVED, OBSERVED] += (RIM_ERROR * seen_px) ** 2
+        covariance[OBSERVED, OBSERVED] += self.rim.std_px(self.filter.mean[4]) ** 2
         return BallTrack(
             self.shot,
             end_us - latency_us,
@@ -367,10 +353,8 @@ class TrackedBall:
         self.seen_us, self.seen = end_us, self.filter.mean
         self.contrast, self.part = sighting.contrast, sighting.part
         whole = sighting.part == HALF_AHEAD and sighting.visible == 1.0
-        if whole and not math.isnan(sighting.behind_px):
-            before_px = self.behind_px if self.outlines else sighting.behind_px
-            self.outlines += 1
-            self.behind_px = before_px + (sighting.behind_px - before_px) / self.outlines
+        if whole:
+            self.rim = self.rim.with_outline(sighting)
         hidden = HIDDEN_ERROR * (1.0 - sighting.visible) * sighting.ring[4]
         self._add(PathPoint(end_us, measuring.circle(sighting), noise + hidden**2 * np.eye(3)))
 

@@ -17,6 +17,7 @@ from spinscope.pipeline.stages.track_kalman import BallFilter
 from spinscope.pipeline.stages.track_outline import Sighting
 from spinscope.pipeline.stages.track_parameters import TrackParameters
 from spinscope.pipeline.stages.track_result import BallTrack
+from spinscope.pipeline.stages.track_rim import USUAL_BEHIND_PX, Rim
 from spinscope.pipeline.stages.track_search import agree
 from tests.track_runs import PAPER_CONTEXT
 
@@ -280,29 +281,26 @@ def test_the_stated_error_holds_what_no_filtering_takes_away() -> None:
     np.testing.assert_array_equal(ball.filter.covariance, SPREAD)
 
 
-def test_a_ball_reaches_as_far_as_the_events_behind(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Less 0.1 px and what it moves in 40 us, on average over the outlines wholly in view; arcs say nothing of it."""
+def test_a_ball_reaches_as_far_as_its_rim(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As the outlines wholly in view tell; arcs say nothing of it."""
 
-    def state(behind_px: float, **changes: object) -> BallTrack:
-        _, ball, _ = updated(monkeypatch, sighting(behind_px=behind_px, **changes))
-        return ball.track(20_000, 40.0, 0.5, ())
+    def state(**changes: object) -> tuple[TrackedBall, BallTrack]:
+        _, ball, _ = updated(monkeypatch, sighting(**changes))
+        return ball, ball.track(20_000, 40.0, ())
 
-    usual, bright = state(-0.7), state(0.8)
-    seen_px = 0.8 - 0.1 + 0.5
-    rim_px = seen_px - 40e-6 * float(np.hypot(*bright.mean[2:4]))
-    assert 0.2 < rim_px < seen_px - 0.1
+    first = tracked_ball().rim
+    (_, usual), (ball, bright) = state(behind_px=USUAL_BEHIND_PX), state(behind_px=0.8, behind=0.4)
+    assert first == Rim().with_outline(sighting()) and ball.rim == first.with_outline(
+        sighting(behind_px=0.8, behind=0.4)
+    )
+    rim_px = ball.rim.outside_px(float(np.hypot(*bright.mean[2:4])))
     np.testing.assert_allclose(bright.mean - usual.mean, [0.0, 0.0, 0.0, 0.0, rim_px], atol=1e-9)
     assert usual.measured is not None and bright.measured is not None
     assert bright.measured.radius_px - usual.measured.radius_px == pytest.approx(rim_px)
-    spread = np.diag([1.0, 1.0, 0.0, 0.0, 1.0]) * (0.5 * seen_px) ** 2
-    np.testing.assert_allclose(bright.covariance - usual.covariance, spread, atol=1e-9)
-    for other in (state(math.nan), state(0.8, part=OF_DARK), state(0.8, visible=0.9)):
-        assert other.mean[4] == usual.mean[4]
-    ball = tracked_ball()
-    for behind_px in (0.2, math.nan, 0.6):
-        monkeypatch.setattr(track_ball, "measure", lambda *_, behind_px=behind_px: sighting(behind_px=behind_px))
-        ball.measure(MEASURING, EventBatch.empty(), 15_000, 20_000)
-    assert ball.behind_px == pytest.approx(0.4)
+    spread = np.diag([1.0, 1.0, 0.0, 0.0, 1.0]) * ball.rim.std_px(float(usual.mean[4])) ** 2
+    np.testing.assert_allclose(bright.covariance - ball.total_covariance(), spread, atol=1e-9)
+    for changes in ({"part": OF_DARK}, {"visible": 0.9}):
+        assert state(behind_px=0.8, behind=0.4, **changes)[0].rim == first
 
 
 @pytest.mark.parametrize("axis", [0, 1])
