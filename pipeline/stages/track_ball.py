@@ -323,9 +323,9 @@ class TrackedBall:
             covariance[4, 4] += ARCS_RADIUS_STD_PX**2
         return covariance
 
-    def track(self, end_us: int, latency_us: float, earlier: tuple[BallTrack, ...]) -> BallTrack:
-        """Its present state, that of the whole ball as far as its rim."""
-        rim_px = self.rim.outside_px(math.hypot(*self.filter.mean[2:4]))
+    def track(self, end_us: int, latency_us: float, outline_px: float, earlier: tuple[BallTrack, ...]) -> BallTrack:
+        """Its present state, to the ball's rim; with `outline_px` = 0 to where the events ahead lie."""
+        rim_px = self.rim.outside_px(math.hypot(*self.filter.mean[2:4])) if outline_px > 0.0 else 0.0
         covariance, circle = self.total_covariance(), self.measured
         covariance[OBSERVED, OBSERVED] += self.rim.std_px(self.filter.mean[4]) ** 2
         return BallTrack(

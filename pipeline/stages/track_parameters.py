@@ -23,7 +23,9 @@ class TrackParameters(ParameterGroup):
     speed_max_m_s: float = tunable(25.0, 1.0, 200.0, 1.0, "m/s", "fastest ball looked for")
     latency_us: float = tunable(40.0, 0.0, 10_000.0, 5.0, "us", "how late the pixels report an edge")
     lag_px: float = tunable(0.1, -2.0, 5.0, 0.05, "px", "how far the outline seems behind, at any speed")
-    outline_px: float = tunable(0.5, 0.0, 5.0, 0.05, "px", "how far outside the ball the pixels see its edge")
+    outline_px: float = tunable(
+        0.5, 0.0, 5.0, 0.05, "px", "how far outside the ball the pixels see its edge; 0 = circle of the events ahead"
+    )
     contour_us: int = tunable(3000, 500, 50_000, 100, "us", "how far back in time the outline's events are taken")
     acceleration_m_s2: float = tunable(15.0, 0.1, 1000.0, 1.0, "m/s^2", "Kalman: 1 sigma of the acceleration")
     approach_m_s: float = tunable(3.0, 0.1, 100.0, 0.5, "m/s", "Kalman: 1 sigma of the speed towards the camera")

@@ -53,7 +53,7 @@ def ball_track(
     parameters: TrackParameters, ball: TrackedBall, end_us: int, earlier: tuple[BallTrack, ...] = ()
 ) -> BallTrack:
     """The ball's present state."""
-    return ball.track(end_us, parameters.latency_us, earlier)
+    return ball.track(end_us, parameters.latency_us, parameters.outline_px, earlier)
 
 
 def is_beyond(mean: NDArray[np.float64], camera: Camera) -> bool:

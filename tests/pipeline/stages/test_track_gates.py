@@ -286,7 +286,7 @@ def test_a_ball_reaches_as_far_as_its_rim(monkeypatch: pytest.MonkeyPatch) -> No
 
     def state(**changes: object) -> tuple[TrackedBall, BallTrack]:
         _, ball, _ = updated(monkeypatch, sighting(**changes))
-        return ball, ball.track(20_000, 40.0, ())
+        return ball, ball.track(20_000, 40.0, 0.5, ())
 
     first = tracked_ball().rim
     (_, usual), (ball, bright) = state(behind_px=USUAL_BEHIND_PX), state(behind_px=0.8, behind=0.4)
@@ -299,6 +299,7 @@ def test_a_ball_reaches_as_far_as_its_rim(monkeypatch: pytest.MonkeyPatch) -> No
     assert bright.measured.radius_px - usual.measured.radius_px == pytest.approx(rim_px)
     spread = np.diag([1.0, 1.0, 0.0, 0.0, 1.0]) * ball.rim.std_px(float(usual.mean[4])) ** 2
     np.testing.assert_allclose(bright.covariance - ball.total_covariance(), spread, atol=1e-9)
+    assert ball.track(20_000, 40.0, 0.0, ()).mean[4] == usual.mean[4], "the circle of the events ahead"
     for changes in ({"part": OF_DARK}, {"visible": 0.9}):
         assert state(behind_px=0.8, behind=0.4, **changes)[0].rim == first
 
