@@ -57,7 +57,7 @@ class Rim:
         return Rim(self.behind_px + (sighting.behind_px - self.behind_px) / distances, shown, distances, outlines)
 
     def outside_px(self, speed_px_s: float) -> float:
-        """How far the rim lies outside the circle that is tracked; negative inside."""
+        """Distance of the rim outside the circle that is tracked; negative inside."""
         late_px = RIM_SHARE * speed_px_s * LATE_BEHIND_US * 1e-6
         seen_px = self._seen_px
         return max(seen_px - late_px, 0.0) if seen_px > 0.0 else seen_px
