@@ -9,8 +9,6 @@ import pytest
 from tests.mutants.bugs import MUTANTS
 from tests.mutants.mutation import ROOT, Copy, report
 
-pytestmark = pytest.mark.slow
-
 
 def test_every_bug_can_be_planted_in_one_way() -> None:
     assert [str(mutant) for mutant in MUTANTS if mutant.times_found != 1] == []
@@ -29,5 +27,6 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return copy.root
 
 
+@pytest.mark.slow
 def test_nine_of_ten_bugs_are_caught(sound: Path) -> None:
     assert len(report(MUTANTS, sound)) <= 0.1 * len(MUTANTS)

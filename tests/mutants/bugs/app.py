@@ -156,8 +156,8 @@ COACH = [
     ),
     Mutant(
         "app/coach/statistics.py",
-        "ELLIPSE_SIGMAS * np.sqrt(",
-        "ELLIPSE_SIGMAS * np.square(",
+        "reach = np.sort(_distances(shots, centre, covariance))[count - 1]",
+        "reach = np.sort(_distances(shots, centre, covariance))[-1]",
         "tests/app/coach/test_terms.py",
     ),
     Mutant(

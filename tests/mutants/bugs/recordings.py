@@ -193,8 +193,8 @@ FORMATS = [
     ),
     Mutant(
         "pipeline/recording_folders.py",
-        "these = [path for path in below if path.absolute() not in not_these]",
-        "these = list(below)",
+        "                and path.absolute() not in not_these\n",
+        "",
         "tests/app/test_batch.py -k found_once",
     ),
     Mutant("pipeline/text_table.py", 'text = text.replace(",", ".")', "pass", "tests/pipeline/test_truth_table.py"),
