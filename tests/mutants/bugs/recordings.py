@@ -257,15 +257,27 @@ CAMERAS = [
     ),
     Mutant(
         "pipeline/cameras/recent_events.py",
-        "self._events -= len(self._kept.popleft()[1])",
+        "self._events -= len(self._kept.popleft().events)",
         "self._kept.popleft()",
         "tests/app/test_live.py -k bounded",
     ),
     Mutant(
         "pipeline/cameras/recent_events.py",
-        "kept = [events for number, events in self._kept if number == clock]",
-        "kept = [events for _, events in self._kept]",
+        "kept = [one.events for one in self._kept if one.clock == clock]",
+        "kept = [one.events for one in self._kept]",
         "tests/app/test_live.py -k bounded",
+    ),
+    Mutant(
+        "pipeline/cameras/recent_events.py",
+        "return self._needed is None or",
+        "return True or",
+        "tests/app/test_live.py -k kept",
+    ),
+    Mutant(
+        "pipeline/cameras/event_stream.py",
+        "if said_us is None or not 0 <= end_us - said_us < SAID_US:",
+        "if said_us is None:",
+        "tests/pipeline/cameras/test_event_stream.py",
     ),
     Mutant(
         "pipeline/cameras/replay.py",
