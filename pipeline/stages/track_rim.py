@@ -16,7 +16,8 @@ from .track_outline import Sighting
 # The rim's share of a change of the distance between the events ahead and those behind, and the distance behind at
 # which `track.outline_px` is 0.5, as on the other simulator's samples (-0.7 to -1.1 px). By radii on our simulator:
 # grounds of albedo 0.06 to 0.8 and textured ones, thresholds of ON and OFF of 0.15 to 0.6, blur of 0.1 to 1.2 px, usual
-# and slow pixels, 5 to 22 m/s (seeds 90000-90072; a line fitted to them has 0.68 and -0.85 px).
+# and slow pixels, 5 to 22 m/s (seeds 90000-90072; a line fitted to them has 0.68 and -0.85 px). On other balls, of
+# radii of 6 to 92 px (seeds 90300, 90301 and 90600-90611), the radius is then 0.25 px off at most.
 RIM_SHARE, USUAL_BEHIND_PX = 0.6, -0.83
 # What is added is known as badly as this, 1 sigma: thresholds of OFF may be twice those of ON. So much off is the
 # centre as well, by 0.3 to 0.9 px: the shading is not in the ball's middle, and moves on it with the view.
