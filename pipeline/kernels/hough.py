@@ -72,7 +72,7 @@ def best_circles(
     """Circles through pixels (n,), n > 0, by `vote` and `peak`, without votes around a better one; best first.
 
     Pixels that are too lonely for a circle with enough votes do not vote, only circles with enough are looked at, and
-    only votes that were given are set to zero again: on the few cells of a large image that noise activates 10 x
+    only votes that were given are set to zero again: on the few cells of a large image that noise activates 9 x
     faster than new votes and `peak`.
 
     Parameters
