@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import cv2
 import numpy as np
@@ -43,7 +44,7 @@ def compared(a: Sequence[Chunk]) -> list[Chunk]:
 def note_without_a(run: ViewedRun) -> list[Chunk]:
     """Text of the comparison while nothing is pinned, and a hint in each pane that has nothing to show without A."""
     text = "## Nothing to compare yet\n\nPress **Pin as A** above the viewer, then change parameters: that is B."
-    look = {"labels": HOW_TO_PIN, "colors": at.OTHERS_COLOUR, "radii": -0.1, "show_labels": True}
+    look: dict[str, Any] = {"labels": HOW_TO_PIN, "colors": at.OTHERS_COLOUR, "radii": -0.1, "show_labels": True}
     flat = [A + at.SURFACE, at.SURFACE_DIFFERENCE, A + at.DEROTATED_LOGO]
     return [
         *_note(run, text),

@@ -99,7 +99,7 @@ def _odds(run: ViewedRun, name: str, row: int, said: list[Witness | None]) -> li
 def _strips(witnesses: list[Witness | None], row: int) -> list[Strips]:
     """Lines of one witness at every tick: its ellipse, a cross at its axis, its bar, and a mark at its magnitude.
 
-    All ticks at once: one by one they take three times as long.
+    All ticks at once: one by one, with lines that Rerun converts, a flight of 20 ticks takes 3.6 times as long.
     """
     drawn: list[Strips] = [[] for _ in witnesses]
     known = [

@@ -11,8 +11,7 @@ const PATIENCE_MS = 5000; // as long as a picture takes to draw where there is n
 const SIZE_STEP_PX = 50; // the layout is made anew for a viewer that is larger or smaller by more
 const REST_MS = 500; // a slider that is held still for so long rests, one that is let go of at once
 const POLL_MS = 50;
-const LAYOUT_MS = 5000; // the longest until the first layout is shown
-const LAYOUT_TRIES = 10; // on a busy machine without a graphics card each takes its time
+const LAYOUT_MS = 5000; // the longest until the first layout is shown: each takes the viewer long without a graphics card
 const RESIZED_MS = 500; // a window that keeps its size for so long has it
 const NUMBERS_MS = 1000; // as long as numbers wait for their picture
 
@@ -368,10 +367,10 @@ export class RunRequests extends EventTarget {
   // Waits for the first layout: before it there is one of the viewer's own. One that comes while the viewer is starting
   // can get lost, and is not taken a second time: then it gets another one of the same panes.
   async #laidOut() {
-    for (let tries = 0; tries < LAYOUT_TRIES && await this.viewer.tab(LAYOUT_MS) === null; tries++) {
-      this.#layoutOf = null;
-      await this.#fit();
-    }
+    if (await this.viewer.tab(LAYOUT_MS) !== null) return;
+    this.#layoutOf = null;
+    await this.#fit();
+    await this.viewer.tab();
   }
 
   // The panes of a viewer of another size; a picture that is on its way brings them along.
