@@ -30,7 +30,7 @@ export class Results extends EventTarget {
     }
     const parts = pinned_metrics ? [differing(differences)] : [];
     parts.push(this.#table(both, costs.map((cost) => Object.values(cost ?? {}).reduce((a, b) => a + b, 0))));
-    for (const reason of new Set(both.map((one) => one.no_shot_reason).filter(Boolean))) {
+    for (const reason of new Set(both.map((one) => one.no_shot_reason ?? "").filter(Boolean))) {
       parts.push(element("p.note", {}, sentence(reason)));
     }
     for (const reason of new Set(both.map((one) => mainShot(one)?.best_reason).filter(Boolean))) {
