@@ -333,16 +333,18 @@ def _with_alternatives(
 ) -> ContrastEstimate:
     """The estimate with its rivals and their covariances, its own with what near ones and the polarities add.
 
-    A near rival adds its distance, by the odds that it is the right one, where these are not NEGLIGIBLE.
+    A near rival adds its distance, by the odds that it is the right one, where these are not NEGLIGIBLE: along the
+    answer the difference of the magnitudes, across it that of the axes.
     """
     assert answer.spin_rps is not None and answer.covariance_rps2 is not None
     kept = _polarity_covariance(answer, events, ball, settings)
-    gaps = spins_rad_s[1:] / TURN - answer.spin_rps
-    near = np.linalg.norm(gaps, axis=1) < NEAR * np.linalg.norm(answer.spin_rps)
+    others_rps = spins_rad_s[1:] / TURN
+    near = np.linalg.norm(others_rps - answer.spin_rps, axis=1) < NEAR * np.linalg.norm(answer.spin_rps)
     odds = np.exp(-LOG_ODDS_PER_SIGMA * margins[1:])
-    for gap, one in zip(gaps[near], odds[near], strict=True):
+    for other_rps, one in zip(others_rps[near], odds[near], strict=True):
         if one > NEGLIGIBLE:
-            kept += np.outer(gap, gap) * one / (1.0 + one)
+            gap_rps = _distance(answer.spin_rps, other_rps)
+            kept += np.outer(gap_rps, gap_rps) * one / (1.0 + one)
     rivals, some = spins_rad_s[1:][~near], events.thinned(settings.rival_events)
     objective, covariances = _with_place(some, ball, settings), np.empty((len(rivals), 3, 3))
     for k, rival in enumerate(rivals):
@@ -356,6 +358,21 @@ def _with_alternatives(
         rival_covariances_rps2=covariances,
         margins=margins[1:][~near],
     )
+
+
+def _distance(spin_rps: Floats, other_rps: Floats) -> Floats:
+    """Vector (3,) from a spin to another: along it the difference of the magnitudes, across it that of the axes.
+
+    The straight line between two spins of one magnitude has a part along each of them, which is no error of it.
+    """
+    magnitude_rps = float(np.linalg.norm(spin_rps))
+    axis = spin_rps / magnitude_rps
+    along_rps = float(other_rps @ axis)
+    across = other_rps - along_rps * axis
+    across_rps = float(np.linalg.norm(across))
+    arc_rps = magnitude_rps * math.atan2(across_rps, along_rps)
+    distance: Floats = (np.linalg.norm(other_rps) - magnitude_rps) * axis + arc_rps * across / max(across_rps, 1e-12)
+    return distance
 
 
 def _polarity_covariance(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -83,19 +84,38 @@ def test_each_rival_has_a_covariance() -> None:
 
 @pytest.mark.parametrize(("margin", "widened"), [(2.6, True), (2.8, False)])
 def test_a_near_rival_widens_the_error_unless_its_odds_are_negligible(margin: float, widened: bool) -> None:
+    plain, added = added_by_rival(lambda spin_rps: 1.1 * spin_rps, margin)
+    odds = math.exp(-LOG_ODDS_PER_SIGMA * margin)
+    expected = np.outer(plain, plain) * 0.01 * odds / (1.0 + odds) if widened else np.zeros((3, 3))
+    np.testing.assert_allclose(added, expected, atol=1e-9)
+
+
+def test_a_near_rival_of_the_same_magnitude_widens_the_axis_alone() -> None:
+    angle = math.radians(14)
+
+    def turned(spin_rps: np.ndarray) -> np.ndarray:
+        across = np.cross(spin_rps, [0.0, 0.0, 1.0])
+        across *= np.linalg.norm(spin_rps) / np.linalg.norm(across)
+        return math.cos(angle) * spin_rps + math.sin(angle) * across
+
+    spin_rps, added = added_by_rival(turned, 1.0)
+    axis, odds = spin_rps / np.linalg.norm(spin_rps), math.exp(-LOG_ODDS_PER_SIGMA)
+    assert axis @ added @ axis == pytest.approx(0.0, abs=1e-9)
+    assert np.trace(added) == pytest.approx((angle * np.linalg.norm(spin_rps)) ** 2 * odds / (1.0 + odds))
+
+
+def added_by_rival(rival: Callable[[np.ndarray], np.ndarray], margin: float) -> tuple[np.ndarray, np.ndarray]:
+    """An answer, and what `rival(answer)` adds to its covariance."""
     events = dotted_ball(SPIN, duration_s=0.012, events=300)
     plain = estimate_spin(events, BALL, ContrastSettings(), starts_rps=SPIN[None])
     some, stretch = contrast._centred(events)
-    spins = 2 * math.pi * np.stack([SPIN, 1.1 * SPIN])
+    spins = 2 * math.pi * np.stack([plain.spin_rps, rival(plain.spin_rps)])
     given, margins = replace(plain, kept_rps2=np.zeros((3, 3))), np.array([0.0, margin])
     answer, alone = (
         contrast._with_alternatives(given, some, spins[:k], margins[:k], BALL, ContrastSettings(), stretch)
         for k in (2, 1)
     )
-    odds = math.exp(-LOG_ODDS_PER_SIGMA * margin)
-    gap = 1.1 * SPIN - plain.spin_rps
-    expected = np.outer(gap, gap) * odds / (1.0 + odds) if widened else np.zeros((3, 3))
-    np.testing.assert_allclose(answer.kept_rps2 - alone.kept_rps2, expected, atol=1e-9)
+    return plain.spin_rps, answer.kept_rps2 - alone.kept_rps2
 
 
 def result(**changes: object) -> ContrastResult:
