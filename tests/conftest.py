@@ -1,6 +1,6 @@
 """Fixtures, options and workers of all tests.
 
-A run of everything has four workers on two cores, for browsers and limits of time leave a core idle. Numba keeps
+A run of everything has three workers on two cores, for browsers and limits of time leave a core idle. Numba keeps
 machine code beside the sources, so what one of them compiles the others load; a lock for each function has them wait
 for it instead of compiling the same. So that they need not wait, one begins with the file that compiles most and the
 others with files that need hardly any kernel. Files with a browser, which waits more than it computes, come one by one
@@ -35,7 +35,7 @@ settings.register_profile("spinscope", deadline=None, max_examples=50, derandomi
 settings.load_profile("spinscope")
 
 SAMPLES = Path(__file__).parents[1] / "sample_recordings"
-WORKERS = 4
+WORKERS = 3
 OTHERS_BETWEEN = 4  # files between two with a browser
 FIRST = (
     "pipeline/stages/test_contract.py",  # compiles all kernels of the stages

