@@ -69,7 +69,7 @@ def test_thrower_and_the_frame_camera_beside_it(cache: Path) -> None:
     magnitude, axis = worst(best)
     assert magnitude < 0.12 and axis < 2.5
     for row in best:
-        assert float(str(row["axis_error_deg"])) < 3 * float(str(row["axis_std_deg"])) < 8
+        assert float(str(row["axis_error_deg"])) < 3 * float(str(row["axis_std_deg"])) < 12
         assert 0.8 < float(str(row["tracked_ms"])) / float(str(row["duration_ms"])) <= 1.0
     frames = run("frames", cache).rows
     assert all(row in rows for row in where(frames, method="best"))  # the same flights, not run again
