@@ -162,7 +162,10 @@ class LiveRun:
         self._spins.start()
         switch_s = sys.getswitchinterval()
         sys.setswitchinterval(SWITCH_S)
-        gc.freeze()  # nobody looks for garbage among what is there already: 0.1 s in which no thread works
+        # Nobody looks for garbage among what is there already: that takes 0.1 s in which no thread works.
+        was_frozen = gc.get_freeze_count() > 0
+        gc.collect()
+        gc.freeze()
         self.stream.start()
         tracker.start()
         next_status_s = now_s() + STATUS_S
@@ -188,7 +191,8 @@ class LiveRun:
             tracker.join()
             self._spins.join()
             self.stream.join()
-            gc.unfreeze()
+            if not was_frozen:  # what the program has frozen itself stays so
+                gc.unfreeze()
             sys.setswitchinterval(switch_s)
         yield self._status(STATUS_S - max(next_status_s - now_s(), 0.0))
 

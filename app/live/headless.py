@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -254,8 +253,6 @@ def row_words(row: ResultRow) -> str:
 
 
 def warm_up() -> None:
-    """Have everything in memory before the first event: kernels loaded, Python's garbage search rid of them."""
+    """Have the kernels in memory before the first event."""
     note("loading the kernels ...")
     load_kernels()
-    gc.collect()
-    gc.freeze()

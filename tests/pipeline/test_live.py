@@ -113,17 +113,31 @@ def test_a_new_clock_ends_a_shot_and_begins_another(
     assert any(said in one.text for one in outputs if isinstance(one, LiveNotice))
 
 
-def test_an_abandoned_run_leaves_no_thread_and_no_frozen_objects(samples: Path) -> None:
+def test_an_abandoned_run_leaves_no_thread_and_no_frozen_objects(samples: Path, request: pytest.FixtureRequest) -> None:
     session, before = Session.open(samples / "own/bounce.h5"), set(threading.enumerate())
     recording = session.recording
     camera = ReplayCamera(recording.chunks, recording.width_px, recording.height_px, loops=True)  # type: ignore[union-attr]
     run = LiveRun(lambda tick_us, on_notice: EventStream(camera, tick_us), session.parameters, QUICK)
     outputs = run.outputs()
+    gc.unfreeze()  # what these tests have frozen
+    request.addfinalizer(gc.freeze)
     next(outputs)
     assert gc.get_freeze_count() > 0, "no search through all that is there while the camera runs"
     outputs.close()  # type: ignore[attr-defined]
     assert set(threading.enumerate()) <= before
     assert gc.get_freeze_count() == 0
+
+
+def test_what_the_program_has_frozen_itself_stays_frozen(samples: Path) -> None:
+    session = Session.open(samples / "own/bounce.h5")
+    recording = session.recording
+    camera = ReplayCamera(recording.chunks, recording.width_px, recording.height_px, loops=True)  # type: ignore[union-attr]
+    run = LiveRun(lambda tick_us, on_notice: EventStream(camera, tick_us), session.parameters, QUICK)
+    gc.freeze()
+    outputs = run.outputs()
+    next(outputs)
+    outputs.close()  # type: ignore[attr-defined]
+    assert gc.get_freeze_count() > 0
 
 
 def test_a_camera_s_error_comes_out(samples: Path, monkeypatch: pytest.MonkeyPatch) -> None:
