@@ -87,7 +87,7 @@ class SpinEstimate(ReadOnlyArrays):
         """The estimate, refused where its magnitude is above the highest spin that is looked for."""
         if self.magnitude_rps is None or self.magnitude_rps <= max_spin_rps:
             return self
-        reason = f"{self.magnitude_rps:.0f} rps is above spin.max_spin_rps = {max_spin_rps:g} rps"
+        reason = f"the spin is above spin.max_spin_rps = {max_spin_rps:g} rps: {self.magnitude_rps:.4g} rps"
         return SpinEstimate.refused(self.method, reason, self.events)
 
     @property

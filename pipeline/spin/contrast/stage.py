@@ -363,6 +363,20 @@ def misses_rhythm(rate: RateResult, answer: ContrastEstimate) -> bool:
     return bool(np.all(off_rps > RHYTHM_SIGMAS * math.hypot(std, RHYTHM_SHARE * magnitude, SIGHT_RPS)))
 
 
+def _may_be_one_of(parameters: ContrastParameters, answer: ContrastEstimate, normal_flow: SpinEstimate) -> bool:
+    """Whether the normal flow's spin is one of those that make the pattern sharp: the best one or a rival.
+
+    Stamps on two sides of a ball, whose edges move in opposite directions, can give it half of the spin.
+    """
+    assert answer.spin_rps is not None and answer.covariance_rps2 is not None
+    spins_rps = (answer.spin_rps, *answer.rivals_rps)
+    covariances_rps2 = (answer.covariance_rps2, *answer.rival_covariances_rps2)
+    return any(
+        sigmas_apart(SpinEstimate(METHOD, spin_rps, covariance_rps2, None), normal_flow) <= parameters.flow_sigmas
+        for spin_rps, covariance_rps2 in zip(spins_rps, covariances_rps2, strict=True)
+    )
+
+
 def _rarer_polarity(state: ContrastState) -> float:
     """Share of the polarity that fewer of the events have."""
     share = float(np.mean(np.concatenate([part.polarity for _, part in state.parts])))
@@ -390,7 +404,8 @@ def _judged(
     reason, against = state.reason, None
     if reason is not None:
         # Where nothing turns, the normal flow has seen no pattern either, but noise; of two spins it is a mixture.
-        against = None if turns_seen and not state.changes else FLOW_METHOD
+        one_pattern = turns_seen and not state.changes
+        against = None if one_pattern and _may_be_one_of(parameters, answer, normal_flow) else FLOW_METHOD
     elif may_be_outline:
         reason = (
             "nearly all logo events have one polarity and have not come back: a slow sensor's outline does that too"

@@ -127,6 +127,16 @@ def test_only_where_nothing_turns_is_normal_flow_doubted_with_contrast() -> None
     assert unsure.status == "refused" and unsure.against is None
 
 
+@pytest.mark.parametrize(("magnitude_rps", "against"), [(50.0, None), (25.0, None), (37.0, "normal_flow")])
+def test_where_contrast_leaves_two_spins_open_normal_flow_must_be_one_of_them(
+    magnitude_rps: float, against: str | None
+) -> None:
+    rivals = {"rivals_rps": np.array([[25.0, 0.0, 0.0]]), "rival_covariances_rps2": np.eye(3)[None]}
+    flow = SpinEstimate("normal_flow", np.array([magnitude_rps, 0.0, 0.0]), np.eye(3), None)
+    estimate = judged(answered(**rivals, margins=np.array([0.5])), flow)
+    assert estimate.status == "refused" and estimate.against == against
+
+
 @pytest.mark.parametrize(
     ("scanned_turns", "changes", "settled"),
     [
