@@ -209,7 +209,8 @@ def _announce_contacts(parameters: TrackParameters, state: TrackState, earlier: 
         ended.append(_end_at(contact, ball))
         after = ball.after(contact, state.measuring, state.shots)
         after.doubt = ended[-1].doubt
-        earlier[after.shot] = follow_path(parameters, after, ball.path, after.start_us + parameters.contour_us)
+        path = [replace(point, circle=None) if point.end_us == contact.stray_us else point for point in ball.path]
+        earlier[after.shot] = follow_path(parameters, after, path, after.start_us + parameters.contour_us)
         state.balls[place] = after
         state.past.gone.append(ball)
         state.shots += 1

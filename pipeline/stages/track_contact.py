@@ -46,6 +46,11 @@ LEAST_JUMP_M_S = 1.0
 STRONGER = 2.0
 # Steps of the hinge's time: of the test, and of its refinement.
 STEP_US, FINE_STEP_US, REFINED_US = 2000, 250, 8000
+# A circle beside the hinge is a racket's or an arm's outline on the old path where the others, without it, are so many
+# times nearer to theirs (in chi^2) and gain as much as by a contact. Before or after a bounce none is.
+STRAY_RATIO = 4.0
+# Circles that must be left on either side of it.
+CIRCLES_ASIDE = 2
 # The instant is good to so much, and what else it may have been lies within a cost so much higher (3 sigma).
 INSTANT_US, DOUBTED_COST = 2000, 9.0
 # A table's friction is at most this share of its push (0.25 to 0.5 published for rubber-free contact).
@@ -72,6 +77,8 @@ class Contact:
         Whether it is no shaking of the camera.
     path : HingedPath
         The ball's path in space before and after it.
+    stray_us : int, optional
+        End of the tick whose circle is not the ball's, None where all are.
     """
 
     time_us: int
@@ -80,6 +87,7 @@ class Contact:
     kind: Kind
     is_certain: bool
     path: HingedPath
+    stray_us: int | None = None
 
 
 def find_contact(
@@ -103,11 +111,11 @@ def find_contact(
     coarse_us, gain, last_us = float(hinges_us[np.argmax(gains)]), float(gains.max()), points[-1].end_us
     if gain < LEAST_GAIN or coarse_us > min(points[-least_after].end_us, last_us - straddled_us):
         return None  # or not yet
-    places = Places.of(points, (coarse_us, coarse_us + straddled_us), camera, ball_radius_m)
     likely_us = hinges_us[gains > gain - DOUBTED_COST]
     from_us, to_us = max(likely_us[0] - REFINED_US, points[0].end_us), min(likely_us[-1] + REFINED_US, last_us)
     times_us = np.arange(from_us, to_us, FINE_STEP_US)
-    costs = places.costs(times_us)
+    straddling_us = coarse_us, coarse_us + straddled_us
+    places, costs, stray_us = _places(points, straddling_us, times_us, camera, ball_radius_m)
     refined = HingedPath(places, float(times_us[np.argmin(costs)]), camera, ball_radius_m)
     before, after = refined.velocity_m_s(refined.hinge_us - 1), refined.velocity_m_s(refined.hinge_us)
     if np.linalg.norm(after - before) < LEAST_JUMP_M_S:
@@ -117,7 +125,26 @@ def find_contact(
     time_us = round(refined.hinge_us)
     earliest_us = min(time_us, round(possible_us[0]) + INSTANT_US)
     latest_us = max(time_us, min(round(possible_us[-1]) - INSTANT_US, last_us - straddled_us))
-    return Contact(time_us, earliest_us, latest_us, kind, _is_certain(points, camera, ball_radius_m), refined)
+    is_certain = _is_certain(points, camera, ball_radius_m)
+    return Contact(time_us, earliest_us, latest_us, kind, is_certain, refined, stray_us)
+
+
+def _places(
+    points: list[PathPoint], straddling_us: tuple[float, float], times_us: Floats, camera: Camera, ball_radius_m: float
+) -> tuple[Places, Floats, int | None]:
+    """Places of the ball, their costs with a hinge at these times (m,), and the end of the tick that is a stray's."""
+    places, stray_us = Places.of(points, straddling_us, camera, ball_radius_m), None
+    costs = places.costs(times_us)
+    before = sum(point.end_us < straddling_us[0] for point in points)
+    for stray in (before - 1, before):
+        others = points[:stray] + points[stray + 1 :]
+        if not CIRCLES_ASIDE <= stray <= len(others) - CIRCLES_ASIDE:
+            continue
+        without = Places.of(others, straddling_us, camera, ball_radius_m)
+        lower = without.costs(times_us)
+        if lower.min() < min(costs.min() - LEAST_GAIN, costs.min() / STRAY_RATIO):
+            places, costs, stray_us = without, lower, points[stray].end_us
+    return places, costs, stray_us
 
 
 def _is_certain(points: list[PathPoint], camera: Camera, ball_radius_m: float) -> bool:
