@@ -29,6 +29,7 @@ from .track_initiation import begin_tracks, is_search_due
 from .track_limits import Limits
 from .track_outline import VOTE_US, Edge
 from .track_parameters import TrackParameters
+from .track_path import PathPoint
 from .track_result import BallTrack, EndedBy, ShotEnd, Status, TrackResult
 from .track_search import SearchMemory
 from .track_state import Earlier, TrackState, ball_track, follow_path, is_beyond
@@ -39,6 +40,11 @@ MAY_ROLL = "the ball is slow and was seen for too short a time to tell whether i
 # Circles measured after a contact until it is announced; fewer would not tell when it was. At a shot's end, the one
 # there is.
 AFTER_CONTACT, AFTER_CONTACT_AT_END = 3, 1
+# Two paths are one ball's where a hinge joins them so nearly: variance of the circles about it over that on clean
+# scenes. One ball's have 1 to 3, those of two balls that pass each other by a radius more than 1000.
+SAME_BALL_ROUGHNESS = 10.0
+# How much of the second path is taken: the change test looks for a hinge between the last circles.
+CONTINUED_US = 20_000
 
 
 def start(parameters: TrackParameters, context: Context) -> TrackState:
@@ -179,9 +185,28 @@ def _doubles(balls: list[TrackedBall]) -> list[TrackedBall]:
 
 
 def _end(parameters: TrackParameters, state: TrackState, ball: TrackedBall, end_us: int, ended_by: EndedBy) -> ShotEnd:
-    """End of a shot, at a contact if one came so late that the ball was hardly seen after it."""
-    contact = _contact(parameters, state, ball, AFTER_CONTACT_AT_END)
+    """End of a shot, at a contact if one came so late that the ball was hardly seen after it, or found anew."""
+    contact = _contact(parameters, state, ball.path, AFTER_CONTACT_AT_END)
+    if contact is None and ended_by == "lost":
+        contact = _contact_before_found(parameters, state, ball)
     return ShotEnd(ball.shot, end_us, ended_by) if contact is None else _end_at(contact, ball)
+
+
+def _contact_before_found(parameters: TrackParameters, state: TrackState, ball: TrackedBall) -> Contact | None:
+    """The contact that a lost ball had before it was found as another one; None where no ball's path continues its own.
+
+    A racket's outline on the old path can be taken for the ball's until the ball that it sent back is found elsewhere.
+    """
+    for other in state.balls:
+        first_us = other.path[0].end_us
+        if other is ball or other.began_by != "found" or not ball.path[0].end_us < first_us <= ball.path[-1].end_us:
+            continue
+        path = [point for point in ball.path if point.end_us < first_us]
+        path += [point for point in other.path if point.end_us <= first_us + CONTINUED_US]
+        contact = _contact(parameters, state, path, AFTER_CONTACT_AT_END)
+        if contact is not None and contact.path.roughness < SAME_BALL_ROUGHNESS:
+            return contact
+    return None
 
 
 def _end_at(contact: Contact, ball: TrackedBall) -> ShotEnd:
@@ -189,9 +214,11 @@ def _end_at(contact: Contact, ball: TrackedBall) -> ShotEnd:
     return ShotEnd(ball.shot, contact.earliest_us, contact.kind, doubt)
 
 
-def _contact(parameters: TrackParameters, state: TrackState, ball: TrackedBall, circles_after: int) -> Contact | None:
+def _contact(
+    parameters: TrackParameters, state: TrackState, path: list[PathPoint], circles_after: int
+) -> Contact | None:
     context = state.context
-    return find_contact(ball.path, context.camera, context.ball_radius_m, parameters.contour_us, circles_after)
+    return find_contact(path, context.camera, context.ball_radius_m, parameters.contour_us, circles_after)
 
 
 def _announce_contacts(parameters: TrackParameters, state: TrackState, earlier: Earlier) -> list[ShotEnd]:
@@ -203,7 +230,7 @@ def _announce_contacts(parameters: TrackParameters, state: TrackState, earlier: 
     for place, ball in enumerate(state.balls):
         if ball.measured is None or ball.shot in earlier:
             continue
-        contact = _contact(parameters, state, ball, AFTER_CONTACT)
+        contact = _contact(parameters, state, ball.path, AFTER_CONTACT)
         if contact is None:
             continue
         ended.append(_end_at(contact, ball))

@@ -12,7 +12,9 @@ from spinscope.pipeline.camera import Camera, CameraParameters
 from spinscope.pipeline.results import Circle
 from spinscope.pipeline.simulator import Ball, Flight, Scene, flight
 from spinscope.pipeline.simulator.motion import Trajectory, trajectory, triple
-from spinscope.pipeline.stages import track_contact
+from spinscope.pipeline.stage import Context
+from spinscope.pipeline.stages import track, track_contact
+from spinscope.pipeline.stages.track_ball import TrackedBall
 from spinscope.pipeline.stages.track_contact import Contact, find_contact
 from spinscope.pipeline.stages.track_parameters import TrackParameters
 from spinscope.pipeline.stages.track_path import PathPoint
@@ -237,6 +239,59 @@ def test_a_contact_is_announced_after_three_circles_and_at_the_end_after_one() -
     assert after + 1 <= known[0] <= after + 2
     at_the_end = [n for n in range(after + 1) if find_contact(circles[: n + 1], camera, 0.02, CONTOUR_US, 1)]
     assert at_the_end and at_the_end[0] <= after
+
+
+def with_stray(path: list[PathPoint], at_us: float, strays: int) -> tuple[list[PathPoint], int]:
+    """The path with its first circles after a contact on the old path, as by a racket's outline, and their place."""
+    first = next(n for n, point in enumerate(path) if point.end_us > at_us)
+    circles = [point.circle for point in path[first - 2 : first]]
+    assert circles[0] is not None and circles[1] is not None
+    x_px, y_px = circles[1].x_px - circles[0].x_px, circles[1].y_px - circles[0].y_px
+    old = [
+        replace(circles[1], x_px=circles[1].x_px + n * x_px, y_px=circles[1].y_px + n * y_px)
+        for n in range(1, strays + 1)
+    ]
+    ahead = [replace(point, circle=circle) for point, circle in zip(path[first:], old, strict=False)]
+    return path[:first] + ahead + path[first + strays :], first
+
+
+@pytest.mark.parametrize("seed", range(5300, 5310))
+def test_a_rackets_outline_on_the_old_path_does_not_delay_a_hit(seed: int) -> None:
+    way, camera = hit(seed)
+    at_us = contact_s(way) * 1e6
+    path, stray = with_stray(path_of(way, camera, rng_of(seed)), at_us, 1)
+    contact = first_contact(path, camera)
+    assert contact is not None and contact.kind == "hit"
+    assert contact.stray_us == path[stray].end_us and abs(contact.time_us - at_us) < 500
+    x, y, radius = camera.silhouette(way.at(np.array([path[stray].end_us * 1e-6])).position_m, 0.02)
+    off_px = contact.path.state(path[stray].end_us)[[0, 1, 4]] - [x[0], y[0], radius[0]]
+    assert np.abs(off_px).max() < 0.5
+
+
+@pytest.mark.parametrize("aside_px", [0.0, 20.0])
+@pytest.mark.parametrize("seed", range(5320, 5325))
+def test_a_lost_ball_was_hit_where_a_ball_that_was_found_continues_its_path(seed: int, aside_px: float) -> None:
+    """And not where that one passes by at a radius."""
+    way, camera = hit(seed)
+    at_us, circles = contact_s(way) * 1e6, path_of(way, camera, rng_of(seed))
+    lost, first = with_stray(circles, at_us, 1)
+    found = [
+        replace(point, circle=replace(point.circle, y_px=point.circle.y_px + aside_px))
+        for point in circles[first + 1 :]
+        if point.circle is not None
+    ]
+    state = track.start(TrackParameters(), Context(camera, 0.02, {"filter.contour_mode": "plain"}))
+    ring = np.array([640.0, 360.0, 4000.0, 0.0, 18.0])
+    filters = [state.measuring.filter_at(ring, np.eye(5)) for _ in range(2)]
+    ball = TrackedBall(0, circles[0].end_us, "start", filters[0], lost[first].end_us, ring, lost[: first + 1])
+    other = TrackedBall(1, found[0].end_us, "found", filters[1], found[-1].end_us, ring, found)
+    ball.coast(found[-1].end_us)
+    state.balls = [ball, other]
+    end = track._end(TrackParameters(), state, ball, ball.seen_us, "lost")
+    if aside_px:
+        assert end.ended_by == "lost" and end.end_us == ball.seen_us
+    else:
+        assert end.ended_by == "hit" and abs(end.end_us - at_us) < 500
 
 
 def test_a_short_path_tells_nothing() -> None:
