@@ -27,6 +27,7 @@ from spinscope.pipeline.recordings.trials import trial_windows_us
 from spinscope.pipeline.registry import STAGES
 from spinscope.pipeline.session import Choices, Progress, Session
 from spinscope.pipeline.shots import ShotLog
+from spinscope.pipeline.stages.track_parameters import TrackParameters
 from spinscope.pipeline.toml import toml_tables
 
 LATENCY_RANGE_US, OUTLINE_RANGE_PX = 10_000.0, 5.0  # of `track.latency_us` and `track.outline_px`
@@ -207,15 +208,17 @@ def calibrate_outline(
 ) -> list[str]:
     """Find track.outline_px by shots at known distances from the lens; see `calibrate_latency`.
 
-    A recording without a shot is said and left out; of several shots in one the longest counts.
+    The shots are tracked as later ones are, with the usual offset, and what their circles are too large is added to it.
+    So what the events behind a ball tell of its rim is not counted twice. A recording without a shot is said and left
+    out; of several shots in one the longest counts.
     """
     _check_name(out)
+    usual_px = TrackParameters().outline_px
     said: list[str] = []
     outlines: list[MeasuredOutline] = []
     for path, distance_m in zip(recordings, distances_m, strict=True):
         try:
-            # The circles are then those of the outline itself.
-            session = Session.open(path, Choices(camera, ("track.outline_px=0",), reading=reading))
+            session = Session.open(path, Choices(camera, (f"track.outline_px={usual_px}",), reading=reading))
             if not session.states_focal_length:
                 raise RecordingError(f"nothing states the focal length: give --camera: {path}")
             shots = ShotLog.of(session.ticks(("track",), forget=STAGES.names)).shots
@@ -231,14 +234,16 @@ def calibrate_outline(
     if not outlines:
         raise RecordingError("; ".join(said))
     found = outline_offset(outlines, session.ball_radius_m, lens)
-    if not 0.0 <= found.outline_px <= OUTLINE_RANGE_PX:
+    outline_px = usual_px + found.offset_px
+    if not 0.0 < outline_px <= OUTLINE_RANGE_PX:
         raise RecordingError(
-            f"the outline seems to be {found.outline_px:.2f} px outside the ball: check distances and focal length"
+            f"the circles seem to be {found.offset_px:+.2f} px larger than the ball: check distances and focal length"
         )
-    _write_with(camera, {"outline_px": round(found.outline_px, 3)}, out)
+    _write_with(camera, {"outline_px": round(outline_px, 3)}, out)
     known = (
-        f"the pixels see the outline {found.outline_px:.2f} +- {found.std_px:.2f} px outside the ball ({len(outlines)} "
-        f"shots); the lens's centre is {1000 * found.farther_m:.0f} mm farther away than measured"
+        f"with the usual offset of {usual_px:g} px the circles are {found.offset_px:+.2f} +- {found.std_px:.2f} px larger "
+        f"than the ball ({len(outlines)} shots): track.outline_px = {outline_px:.2f}; the lens's centre is "
+        f"{1000 * found.farther_m:.0f} mm farther away than measured"
     )
     return [*said, known, f"wrote {out}"]
 

@@ -145,8 +145,9 @@ def latency(
     With --disc: how late. Let a disc with marks turn before the camera, facing it, with a pulse a turn on the trigger
     input (a light barrier). Record it at two speeds or more, turning the same way.
 
-    With --distance-m: how far outside a ball its outline is seen. Record shots that cross the image at known distances,
-    at two or more of them, some shots at each.
+    With --distance-m: how far outside a ball its outline is seen, beside what the tracker tells of lens and ground from
+    the events behind each ball. Record shots that cross the image at known distances, at two or more of them, some
+    shots at each.
     """
     from .. import calibration as running
 

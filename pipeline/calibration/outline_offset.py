@@ -1,4 +1,4 @@
-"""Offset of the outline: how far outside the ball the pixels see its edge (`track.outline_px`), by shots.
+"""Offset of the circles: by how much they are larger than the ball, for `track.outline_px`, by shots.
 
 A ball looks as large as its distance says, plus the offset, which is the same number of pixels at any distance. Where
 the lens's centre lies in the camera is not known to a centimetre, which is as much as the offset: so shots at two
@@ -30,12 +30,12 @@ MOST_STD_PX = 0.3  # beyond it the usual 0.5 px is as good
 
 @dataclass(frozen=True, slots=True)
 class MeasuredOutline:
-    """Outline of one shot where it is nearest to the image's middle.
+    """Circle of one shot where it is nearest to the image's middle.
 
     Attributes
     ----------
     x_px, y_px, radius_px : float
-        As the pixels see it.
+        As tracked.
     distance_m : float
         From the lens to the ball's centre, as measured.
     """
@@ -48,15 +48,15 @@ class MeasuredOutline:
 
 @dataclass(frozen=True, slots=True)
 class OutlineOffset:
-    """Distance from the ball out to the outline seen, its 1 sigma, and how much farther the lens is than measured."""
+    """Radius of the circles less the ball's, its 1 sigma, and how much farther the lens is than measured."""
 
-    outline_px: float
+    offset_px: float
     std_px: float
     farther_m: float
 
 
 def outline_offset(outlines: Sequence[MeasuredOutline], ball_radius_m: float, camera: Camera) -> OutlineOffset:
-    """Find the offset of the outline.
+    """Find the offset of the circles.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def outline_offset(outlines: Sequence[MeasuredOutline], ball_radius_m: float, ca
     rays = camera.rays([one.x_px for one in outlines], [one.y_px for one in outlines])
     sight = rays / np.linalg.norm(rays, axis=1)[:, None]
     radii_px = np.array([one.radius_px for one in outlines])
-    outline_px, farther_m = 0.0, 0.0
+    offset_px, farther_m = 0.0, 0.0
     for _ in range(5):  # Gauss and Newton's method: the outline depends on the distance nearly as 1 over it
         at_m = np.maximum(distances_m + farther_m, 2 * ball_radius_m)
         expected_px = camera.silhouette(sight * at_m[:, None], ball_radius_m)[2]
@@ -89,9 +89,9 @@ def outline_offset(outlines: Sequence[MeasuredOutline], ball_radius_m: float, ca
         rows = np.column_stack([np.ones_like(at_m), slope_px_m]) * weights[:, None]
         rows = np.vstack([rows, [0.0, 1.0 / CENTRE_STD_M]])
         wanted = np.append((radii_px - expected_px) * weights, -farther_m / CENTRE_STD_M)
-        (outline_px, step_m), *_ = np.linalg.lstsq(rows, wanted)
+        (offset_px, step_m), *_ = np.linalg.lstsq(rows, wanted)
         farther_m += float(step_m)
-    off = (radii_px - expected_px - outline_px - slope_px_m * step_m) * weights
+    off = (radii_px - expected_px - offset_px - slope_px_m * step_m) * weights
     scatter = max(1.0, float(np.sum(off**2)) / max(off.size - 2, 1))  # over what is expected of it
     std_px = math.sqrt(float(np.linalg.inv(rows.T @ rows)[0, 0]) * scatter)
     if std_px > MOST_STD_PX:
@@ -99,4 +99,4 @@ def outline_offset(outlines: Sequence[MeasuredOutline], ball_radius_m: float, ca
             f"the shots tell the outline's offset to {std_px:.1f} px only, {MOST_STD_PX:g} are of use: record more, at "
             "distances farther apart, and check the distances"
         )
-    return OutlineOffset(float(outline_px), std_px, farther_m)
+    return OutlineOffset(float(offset_px), std_px, farther_m)
