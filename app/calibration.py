@@ -241,8 +241,8 @@ def calibrate_outline(
         )
     _write_with(camera, {"outline_px": round(outline_px, 3)}, out)
     known = (
-        f"with the usual offset of {usual_px:g} px the circles are {found.offset_px:+.2f} +- {found.std_px:.2f} px larger "
-        f"than the ball ({len(outlines)} shots): track.outline_px = {outline_px:.2f}; the lens's centre is "
+        f"with the usual offset of {usual_px:g} px the circles are {found.offset_px:+.2f} +- {found.std_px:.2f} px "
+        f"larger than the ball ({len(outlines)} shots): track.outline_px = {outline_px:.2f}; the lens's centre is "
         f"{1000 * found.farther_m:.0f} mm farther away than measured"
     )
     return [*said, known, f"wrote {out}"]

@@ -25,6 +25,7 @@ from tests.track_runs import HEIGHT, WIDTH, disc_events, merged
 
 CAMERA = Camera.of(CameraParameters(), WIDTH, HEIGHT)
 RADIUS_M, OUTLINE_PX = 0.02, 0.7
+RADIUS_ONLY = np.array([0.0, 0.0, 0.0, 0.0, 1.0])  # of a ring
 
 
 def outlines(
@@ -97,7 +98,7 @@ def test_command_counts_what_the_events_behind_tell_once(tmp_path: Path, behind_
     recordings = {}
     for distance_m in (1.2, 2.4):
         ring = np.array([500.0, 359.5, 3.5 * focal_px / distance_m, 0.0, RADIUS_M / distance_m * focal_px + OUTLINE_PX])
-        ahead, behind = (disc_events(ring + [0, 0, 0, 0, off_px], 0, 60_000) for off_px in (0.0, behind_px))
+        ahead, behind = (disc_events(ring + off_px * RADIUS_ONLY, 0, 60_000) for off_px in (0.0, behind_px))
         recordings[distance_m] = merged(ahead[ahead.on], behind[~behind.on]), WIDTH, HEIGHT
     written = calibrated(tmp_path, recordings)
     expected_px = OUTLINE_PX + RIM_SHARE * (behind_px - USUAL_BEHIND_PX)
