@@ -3,8 +3,9 @@
 The tracked circle is that of the events ahead, less `track.outline_px`. How far outside the rim these come differs: the
 softer the lens and the stronger the contrast, the earlier; where the ground is nearly as bright as the ball's shaded
 rim, they are those of its shading further in. The events behind tell which: what moves those ahead outwards moves those
-behind inwards, and where the shading's are seen ahead, those behind still come at the rim. `track.outline_px` is found with
-this rule at work (`calibrate latency --distance-m`): it holds what the events behind do not tell of a sensor and lens.
+behind inwards, and where the shading's are seen ahead, those behind still come at the rim. `track.outline_px` is found
+with this rule at work (`calibrate latency --distance-m`): it holds what the events behind do not tell of a sensor and
+lens.
 """
 
 from __future__ import annotations

@@ -36,15 +36,16 @@ def _spline(offset: float) -> float:
 
 
 def _on_map(points: Floats, pole: Floats, cell: float) -> list[tuple[float, float]]:
-    """Lambert's equal-area map around the pole, in cells; the middle is cell (middle, middle)."""
+    """Lambert's equal-area maps of both hemispheres, in cells, side by side; the pole is cell (middle, middle)."""
     across = np.array([0.0, -pole[2], pole[1]]) if abs(pole[0]) < 0.6 else np.array([pole[2], 0.0, -pole[0]])
     u = across / np.linalg.norm(across)
     v = np.cross(pole, u)
-    middle = 0.5 * (int(4.0 / cell) + 5 - 1)
+    size = int(2.0 * math.sqrt(2.0) / cell) + 5
     places = []
     for point in points:
-        scale = math.sqrt(2.0 / max(1.0 + float(pole @ point), 1e-6)) / cell
-        places.append((float(u @ point) * scale + middle, float(v @ point) * scale + middle))
+        scale = math.sqrt(2.0 / (1.0 + abs(float(pole @ point)))) / cell
+        middle, beyond = 0.5 * (size - 1), size if pole @ point < 0.0 else 0
+        places.append((float(u @ point) * scale + middle + beyond, float(v @ point) * scale + middle))
     return places
 
 
@@ -72,8 +73,10 @@ def naive_score(
     """The score and each event's share, straight from its definition; normals (3, n)."""
     spin_rps = spin_rad_s / (2 * np.pi)
     points = turned(normals.T, -spin_rps, t_s)
-    some = points[:: max(1, len(points) // 64)].sum(axis=0) + np.array([0.0, 0.0, 1e-9])
-    pole = some / np.linalg.norm(some)
+    some = points[:: max(1, len(points) // 64)]
+    mean = some.sum(axis=0) + np.array([0.0, 0.0, 1e-9])
+    pole = np.linalg.matrix_power(some.T @ some / len(some) + 1e-3 * np.eye(3), 8) @ mean
+    pole /= np.linalg.norm(pole)
     places, shares, added = _on_map(points, pole, cell), np.empty(t_s.size), floor * 0.55**2
     permuted = naive_time_permuted(t_s, starts, times_each)
     for segment, (first, last) in enumerate(itertools.pairwise(starts)):

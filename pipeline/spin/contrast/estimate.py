@@ -106,8 +106,7 @@ def estimate_spin(
     spins = np.empty((0, 3)) if starts_rps is None else np.asarray(starts_rps, np.float64).reshape(-1, 3) * TURN
     searching = searching or not len(spins)
     if searching:
-        found = grid_search(moving.columns, settings.fastest_rps, settings.floor, settings.search_events, 6)
-        spins = maximise_over_growing_segments(moving, np.concatenate([spins, found]), settings)
+        spins = _searched(events, moving, spins, settings)
     seen_again = stretch.span_s * float(np.linalg.norm(spins[0])) > SCAN_FROM_TURNS * TURN
     if scanning and (not searching or seen_again):
         # The scan's few events may rank what is known already below its aliases.
@@ -198,6 +197,23 @@ def _objective(events: SphereEvents, settings: ContrastSettings, sigma_rad: floa
     """The score of all these events together; B from at least LEAST_PERMUTED permuted ones."""
     window = whole_window(events.columns, max(1, round(LEAST_PERMUTED / len(events))))
     return Objective(window, np.empty((3, 3, 0)), sigma_rad, settings.floor, NO_OFFSETS, 1.0)
+
+
+def _searched(events: SphereEvents, moving: SphereEvents, starts_rad_s: Floats, settings: ContrastSettings) -> Floats:
+    """Spins (k, 3) found among all spins and from the starts, those best for all events first.
+
+    Bursts of few events hardly differ from chance, so the search is made without what stands still and with it.
+    """
+    found = []
+    for part in (moving,) if moving is events else (moving, events):
+        grid = grid_search(part.columns, settings.fastest_rps, settings.floor, settings.search_events, 6)
+        found.append(maximise_over_growing_segments(part, np.concatenate([starts_rad_s, grid]), settings))
+    if len(found) == 1:
+        return found[0]
+    spins = np.concatenate(found)
+    whole = _objective(events.thinned(settings.refine_events // 2), settings, 1.5 * settings.sigma_rad)
+    best_first: Floats = spins[np.argsort(-scores(spins, whole.window, whole.sigma_rad, whole.floor), kind="stable")]
+    return best_first
 
 
 def maximise_over_growing_segments(events: SphereEvents, spins_rad_s: Floats, settings: ContrastSettings) -> Floats:

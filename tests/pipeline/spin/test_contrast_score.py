@@ -78,6 +78,30 @@ def test_the_score_is_its_twins(seed, count, speed, spread, segment_s, times_eac
     assert total == pytest.approx(expected, abs=2e-4 * count)
 
 
+@pytest.mark.parametrize("turned_rad", [0.0, 0.7, 1.5])
+def test_a_stamp_counts_as_much_on_either_side_of_the_ball(turned_rad) -> None:
+    """Strokes, and the same through the ball's centre: each scores what both score, and what they score alone."""
+    random = np.random.default_rng(0)
+    along, across = random.uniform(-0.5, 0.5, 400), 0.02 * random.standard_normal(400)
+    x, y = np.where(np.arange(400) % 2, (along, across), (across + 0.2, along))
+    stamp = np.stack([x, y, np.ones(400)]) / np.sqrt(x**2 + y**2 + 1.0)
+    stamp = turned(stamp.T, np.array([turned_rad, 0.0, 0.0]) / (2 * np.pi), np.ones(400)).T
+    spin, t_s, polarity = 2 * np.pi * SPIN, np.sort(random.uniform(-0.02, 0.02, 400)), np.zeros(400, np.int64)
+    seen = turned(stamp.T, SPIN, t_s).T
+
+    def shares(normals: np.ndarray, repeated: int) -> np.ndarray:
+        events = EventColumns(
+            np.repeat(t_s, repeated), normals, np.repeat(polarity, repeated), np.array([0, 400 * repeated])
+        )
+        ratios = np.empty(400 * repeated)
+        score(ratios, spin, whole_window(events, 3), 0.04, 1.5)
+        return ratios.reshape(400, repeated).sum(axis=0)
+
+    (alone,) = shares(np.ascontiguousarray(seen), 1)
+    sides = shares(np.stack([seen, -seen], axis=2).reshape(3, 800), 2)
+    assert sides == pytest.approx([alone, alone], rel=0.05)
+
+
 def test_logarithms_are_the_librarys() -> None:
     values = np.concatenate([np.geomspace(1e-3, 1e3, 400), [1.0, 2.0, math.sqrt(2.0), 1.0 - 1e-9]])
     expected = np.log(values)
@@ -136,6 +160,13 @@ def test_the_spin_is_found_from_nothing(spin) -> None:
     answer = answer_of(dotted_ball(np.array(spin)))
     assert_same(answer.spin_rps, np.array(spin))
     assert answer.contrast > 1.0
+
+
+@pytest.mark.parametrize("seed", [0, 2, 3, 6, 8])
+def test_a_logo_of_few_events_that_is_always_in_view_is_found(seed) -> None:
+    """Ten events in half a millisecond are no burst: the search does not rest on those that happen to coincide."""
+    spin = np.array([0.0, 0.0, 90.0])
+    assert_same(answer_of(dotted_ball(spin, seed=seed)).spin_rps, spin)
 
 
 def test_a_start_with_the_wrong_number_of_turns_is_put_right() -> None:
