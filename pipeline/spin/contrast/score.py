@@ -79,7 +79,8 @@ def derotate(derotated: Floats, spin_rad_s: Floats, t_s: Floats, normals: Floats
 def _pole(points: Floats) -> tuple[float, float, float]:
     """Direction along which most of the unit vectors (3, n) lie, of either sign, by about POLE_EVENTS of them.
 
-    Their mean, multiplied by the eighth power of their second moments: the first axis of these, nearly.
+    Their mean, multiplied by the eighth power of their second moments: the first axis of these, nearly. A thousandth of
+    the unit matrix keeps it a direction where they cancel.
     """
     moments, squared, mean = 1e-3 * np.eye(3), np.empty((3, 3)), np.array([0.0, 0.0, 1e-9])
     used = points[:, :: max(1, points.shape[1] // POLE_EVENTS)]
