@@ -1,34 +1,23 @@
 """Fixtures, options and workers of all tests.
 
 A run of everything has three workers on two cores, for browsers and limits of time leave a core idle. Numba keeps
-machine code beside the sources, so what one of them compiles the others load; a lock for each function has them wait
-for it instead of compiling the same. So that they need not wait, one begins with the file that compiles most and the
-others with files that need hardly any kernel. Files with a browser, which waits more than it computes, come one by one
-among the others, and no file that takes long comes near the end, where the other workers would wait for it.
+machine code beside the sources: what one of them compiles, the others wait for and load. So that they need not wait,
+one begins with the file that compiles most and the others with files that need hardly any kernel. Files with a browser,
+which waits more than it computes, come one by one among the others, and no file that takes long comes near the end,
+where the other workers would wait for it.
 """
 
 from __future__ import annotations
 
 import gc
-import hashlib
 import os
 import sys
-import tempfile
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import settings
-from numba.core.compiler_lock import global_compiler_lock
-from numba.core.dispatcher import Dispatcher
-
-try:
-    import fcntl
-except ImportError:  # Windows: the workers then compile some functions twice
-    fcntl = None  # type: ignore[assignment]
 
 # Kernels compile inside the first example. The gate tries the same examples every time; a developer others each time.
 settings.register_profile("spinscope", deadline=None, max_examples=50, derandomize=bool(os.environ.get("CI")))
@@ -81,11 +70,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Let workers and child processes share byte code, and workers wait for what another one is compiling."""
+    """Let workers and child processes share byte code."""
     if sys.dont_write_bytecode and (cache := getattr(config, "cache", None)):
         _share_bytecode(cache.mkdir("bytecode"))
-    if hasattr(config, "workerinput") and fcntl is not None:
-        _compile_once(Path(tempfile.gettempdir()) / f"spinscope-{config.workerinput['testrunuid']}")
 
 
 def pytest_collection_finish() -> None:
@@ -107,23 +94,3 @@ def _share_bytecode(folder: Path) -> None:
     sys.dont_write_bytecode, sys.pycache_prefix = False, str(folder)
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     os.environ["PYTHONPYCACHEPREFIX"] = str(folder)
-
-
-def _compile_once(folder: Path) -> None:
-    folder.mkdir(exist_ok=True)
-    compile_here = Dispatcher.compile
-
-    @contextmanager
-    def locked(dispatcher: Dispatcher) -> Iterator[None]:
-        code = dispatcher.py_func.__code__
-        name = hashlib.sha1(f"{code.co_filename}:{code.co_firstlineno}".encode()).hexdigest()
-        with (folder / name).open("w") as file:
-            fcntl.flock(file, fcntl.LOCK_EX)
-            yield
-
-    def compile_locked(dispatcher: Dispatcher, signature: Any) -> Any:
-        # numba's own lock first: a thread that waits for it must not hold what the thread inside it needs.
-        with global_compiler_lock, locked(dispatcher):
-            return compile_here(dispatcher, signature)
-
-    Dispatcher.compile = compile_locked

@@ -1,9 +1,14 @@
-"""Numba's cache of compiled kernels where it cannot be written."""
+"""Numba's cache of compiled kernels: where it cannot be written, and for several processes."""
 
 from __future__ import annotations
 
+import os
 import pkgutil
+import subprocess
+import sys
 from importlib import import_module
+from pathlib import Path
+from subprocess import PIPE
 from typing import Any
 
 import pytest
@@ -61,3 +66,21 @@ def test_kernels_of_other_packages_keep_numbas_own_cache() -> None:
 
     own.__module__ = "elsewhere"
     assert type(njit(cache=True)(own)._cache) is FunctionCache
+
+
+@pytest.mark.skipif(compilation.fcntl is None, reason="no locks of files")
+def test_of_several_processes_one_compiles_and_the_others_load(tmp_path: Path) -> None:
+    code = (
+        "import spinscope.pipeline.compilation, numpy; from spinscope.pipeline.kernels.rotation import axis_and_length;"
+        "input(); print(axis_and_length(numpy.zeros(3)), sum(axis_and_length.stats.cache_misses.values()))"
+    )
+    here = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    processes = [
+        subprocess.Popen([sys.executable, "-c", code], stdin=PIPE, stdout=PIPE, text=True, env=here) for _ in range(2)
+    ]
+    for process in processes:  # both have loaded the compiler before either needs it
+        assert process.stdin is not None
+        process.stdin.write("\n")
+        process.stdin.flush()
+    said = sorted(process.communicate(timeout=120)[0].strip() for process in processes)
+    assert said == ["(0.0, 0.0, 1.0, 0.0) 0", "(0.0, 0.0, 1.0, 0.0) 1"]
