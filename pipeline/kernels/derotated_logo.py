@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit
 
 from .arrays import Bytes, Flags, Floats, Integers, Singles
+from .order_statistics import value_of_rank
 from .rotation import axis_and_length, rotate
 
 CELLS = 48  # along the cube of a painting: 2.7 degrees, a pixel's share of a ball of 20 px radius
@@ -97,11 +98,13 @@ def sample_density(found: Singles, density: Singles, directions: Floats, frame: 
 @njit(cache=True, nogil=True)
 def full_count(counts: Singles) -> float:
     """Count (n,) that is shown in full colour: what a twentieth of the marked places exceed; 0 for none."""
-    marked = counts[counts > 0]
-    if marked.size == 0:
-        return 0.0
-    rank = int(FULL_RANK * (marked.size - 1))
-    return float(np.partition(marked, rank)[rank])
+    marked = np.empty(counts.size)
+    m = 0
+    for n in range(counts.size):
+        if counts[n] > 0:
+            marked[m] = counts[n]
+            m += 1
+    return value_of_rank(marked[:m], int(FULL_RANK * (m - 1))) if m else 0.0
 
 
 @njit(cache=True, nogil=True)
@@ -180,7 +183,8 @@ def paint(
             counts = np.empty((2, canvas.places.size), np.float32)
             sample_density(counts, density, canvas.directions, frames[kind][moment])
             if canvas.colours.shape[0] == 1:
-                counts[0] += counts[1]
+                for n in range(counts.shape[1]):
+                    counts[0, n] += counts[1, n]
                 counts = counts[:1]
             colour_counts(pictures[kind][moment], canvas.places, counts, canvas.colours, canvas.ground)
 

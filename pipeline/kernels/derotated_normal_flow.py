@@ -30,7 +30,8 @@ def derotated_normals(normals: Floats, t_us: Integers, common_us: int, spin_rad_
         angle = -speed * (t_us[i] - common_us) * 1e-6
         cosine = np.cos(angle)
         normal = (normals[i, 0], normals[i, 1], normals[i, 2])
-        derotated[i] = rotate(normal, (ax, ay, az), np.sin(angle), cosine, 1.0 - cosine)
+        turned = rotate(normal, (ax, ay, az), np.sin(angle), cosine, 1.0 - cosine)
+        derotated[i, 0], derotated[i, 1], derotated[i, 2] = turned
     return derotated
 
 
@@ -153,19 +154,24 @@ def derotated_constraints(
     speeds, variances, sizes = np.empty(n), np.empty(n), np.empty(n, np.int64)
     near, frame = np.empty((3, NEIGHBOURS)), np.empty((3, 3))
     count = 0
+    members, own, own_us = np.empty(n, np.int64), np.empty((n, 3)), np.empty(n, np.int64)
     for polarity in range(2):
-        members = np.flatnonzero(on == (polarity == 1))
-        own, own_us = turned[members], t_us[members]
-        for k in range(stride // 2, members.size, stride):
+        m = 0
+        for i in range(n):
+            if on[i] == (polarity == 1):
+                members[m], own_us[m] = i, t_us[i]
+                own[m, 0], own[m, 1], own[m, 2] = turned[i, 0], turned[i, 1], turned[i, 2]
+                m += 1
+        for k in range(stride // 2, m, stride):
             ex, ey, ez = own[k, 0], own[k, 1], own[k, 2]
             # Two directions that span the tangent plane (Duff et al., JCGT 2017).
             sign = 1.0 if ez >= 0.0 else -1.0
             p = -1.0 / (sign + ez)
             q = ex * ey * p
-            frame[0] = ex, ey, ez
-            frame[1] = 1.0 + sign * ex * ex * p, sign * q, -sign * ex
-            frame[2] = q, sign + ey * ey * p, -ey
-            size = _gather(near, own, own_us, k, frame, reach_rad, reach_us)
+            frame[0, 0], frame[0, 1], frame[0, 2] = ex, ey, ez
+            frame[1, 0], frame[1, 1], frame[1, 2] = 1.0 + sign * ex * ex * p, sign * q, -sign * ex
+            frame[2, 0], frame[2, 1], frame[2, 2] = q, sign + ey * ey * p, -ey
+            size = _gather(near, own[:m], own_us[:m], k, frame, reach_rad, reach_us)
             if size < FEWEST:
                 continue
             nu, nv, drift, variance, sharpness = fit_moving_line(
@@ -177,14 +183,17 @@ def derotated_constraints(
             nx = nu * frame[1, 0] + nv * frame[2, 0]
             ny = nu * frame[1, 1] + nv * frame[2, 1]
             nz = nu * frame[1, 2] + nv * frame[2, 2]
-            lines[count] = ey * nz - ez * ny, ez * nx - ex * nz, ex * ny - ey * nx
+            lines[count, 0], lines[count, 1], lines[count, 2] = ey * nz - ez * ny, ez * nx - ex * nz, ex * ny - ey * nx
             events[count], speeds[count], variances[count], sizes[count] = members[k], drift, variance, size
             count += 1
-    events = events[:count].copy()
-    rows = derotated_normals(lines[:count], 2 * common_us - t_us[events], common_us, spin_rad_s)
-    wx, wy, wz = spin_rad_s
-    speeds = speeds[:count] + rows[:, 0] * wx + rows[:, 1] * wy + rows[:, 2] * wz
-    return events, rows, speeds, variances[:count].copy(), sizes[:count].copy()
+    mirrored_us = np.empty(count, np.int64)
+    for k in range(count):
+        mirrored_us[k] = 2 * common_us - t_us[events[k]]
+    rows = derotated_normals(lines[:count], mirrored_us, common_us, spin_rad_s)
+    wx, wy, wz = spin_rad_s[0], spin_rad_s[1], spin_rad_s[2]
+    for k in range(count):
+        speeds[k] = speeds[k] + rows[k, 0] * wx + rows[k, 1] * wy + rows[k, 2] * wz
+    return events[:count].copy(), rows, speeds[:count].copy(), variances[:count].copy(), sizes[:count].copy()
 
 
 @numba.njit(cache=True, nogil=True)
@@ -213,8 +222,8 @@ def position_response(normals: Floats, sights: Floats, rows: Floats, spin_rad_s:
     d, off, bent = np.empty(3), np.empty(3), np.empty(3)
     for i in range(n):
         e, s, a = normals[i], sights[i], rows[i]
-        line = np.array((a[1] * e[2] - a[2] * e[1], a[2] * e[0] - a[0] * e[2], a[0] * e[1] - a[1] * e[0]))
-        turn = np.array((wy * e[2] - wz * e[1], wz * e[0] - wx * e[2], wx * e[1] - wy * e[0]))
+        line = (a[1] * e[2] - a[2] * e[1], a[2] * e[0] - a[0] * e[2], a[0] * e[1] - a[1] * e[0])
+        turn = (wy * e[2] - wz * e[1], wz * e[0] - wx * e[2], wx * e[1] - wy * e[0])
         facing = e[0] * s[0] + e[1] * s[1] + e[2] * s[2]
         facing_rate = turn[0] * s[0] + turn[1] * s[1] + turn[2] * s[2]
         for which in range(3):

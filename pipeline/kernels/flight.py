@@ -9,17 +9,21 @@ Silhouettes are given as (n, 3) float64 `places` focal_px (X / Z, Y / Z, ball ra
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 
 from .arrays import Floats
 from .hinged_path import solve
-from .moving_circle import inverse_matrix
+from .moving_circle import inverse_matrix, product
 
 # Student's t for the circles: with 4 degrees of freedom one that is 10 sigma off counts for a fifteenth.
 T_FREEDOM = 4.0
 # From a first guess that is a few pixels off to the noise of hundredths in steps that let no bad circle lead.
 ROUNDS, FIRST_NOISE_PX, SHRINK = 8, 4.0, 0.25
+# Where position, velocity and the radius' error stand in a motion: all but the accelerations.
+OTHERS = (0, 1, 2, 3, 4, 5, 15)
 
 
 @njit(cache=True, nogil=True)
@@ -35,8 +39,12 @@ def basis_at(tau_s: float, half_s: float) -> tuple[float, float, float]:
 def guess_motion(motion: Floats, centres_m: Floats, tau_s: Floats, gravity_m_s2: Floats, drag_per_m: float) -> None:
     """Write the motion with gravity and drag alone that is nearest to centres (n, 3) in space."""
     n = tau_s.size
-    mean_s = tau_s.mean()
-    spread = ((tau_s - mean_s) ** 2).sum()
+    mean_s, spread = 0.0, 0.0
+    for i in range(n):
+        mean_s += tau_s[i]
+    mean_s /= n
+    for i in range(n):
+        spread += (tau_s[i] - mean_s) ** 2
     motion[15] = 0.0
     # First the velocity, for the drag; then the line through what is left without the bend.
     for bent in (False, True):
@@ -71,6 +79,14 @@ def predict_places(
         places[i, 0] *= scale
         places[i, 1] *= scale
         places[i, 2] = ball_radius_m * scale + motion[15]
+
+
+@njit(cache=True, nogil=True)
+def _subtract(differences: Floats, places: Floats, seen: Floats) -> None:
+    """Write `places` less `seen`, (n, 3) each, into `differences`."""
+    for i in range(places.shape[0]):
+        for c in range(3):
+            differences[i, c] = places[i, c] - seen[i, c]
 
 
 @njit(cache=True, nogil=True)
@@ -172,7 +188,7 @@ def fit_motion(
     floor = FIRST_NOISE_PX
     for _ in range(ROUNDS):
         predict_places(seen, motion, tau_s, half_s, camera[0], camera[1])
-        off[:] = places - seen
+        _subtract(off, places, seen)
         precision[0] = precision[1] = 1.0 / max(centre_2, floor * floor)
         precision[2] = 1.0 / max(radius_2, floor * floor)
         centre_sum, radius_sum = 0.0, 0.0
@@ -195,23 +211,27 @@ def fit_motion(
                 whole[6 + i, 6 + j] += prior[i, j]
                 whole[6 + i, 16] -= prior[i, j] * (motion[6 + j] - expected[6 + j])
         solve(step, whole, whole[:, 16], 16)
-        motion += step
+        for i in range(16):
+            motion[i] += step[i]
         floor *= SHRINK
     predict_places(seen, motion, tau_s, half_s, camera[0], camera[1])
-    off[:] = places - seen
+    _subtract(off, places, seen)
     system[:] = 0.0
     _add_circles(system, motion, off, seen, weights, precision, tau_s, half_s, camera)
     system[15, 15] += 1.0 / radius_std_px**2
     system[15, 16] -= motion[15] / radius_std_px**2
-    own = np.array([0, 1, 2, 3, 4, 5, 15])
-    inner, cross, slope = np.empty((7, 7)), np.empty((9, 7)), np.empty(7)
+    inner, cross = np.empty((7, 7)), np.empty((9, 7))
     for i in range(7):
-        slope[i] = system[own[i], 16]
         for j in range(7):
-            inner[i, j] = system[own[i], own[j]]
+            inner[i, j] = system[OTHERS[i], OTHERS[j]]
         for j in range(9):
-            cross[j, i] = system[6 + j, own[i]]
-    gain = cross @ inverse_matrix(inner)
-    information = system[6:15, 6:15] - gain @ cross.T
-    gradient = system[6:15, 16] - gain @ slope
-    return information, gradient, off, np.sqrt(np.array([centre_2, radius_2]))
+            cross[j, i] = system[6 + j, OTHERS[i]]
+    gain = product(cross, inverse_matrix(inner))
+    information, gradient, found_px = system[6:15, 6:15].copy(), system[6:15, 16].copy(), np.empty(2)
+    for i in range(9):
+        for k in range(7):
+            gradient[i] -= gain[i, k] * system[OTHERS[k], 16]
+            for j in range(9):
+                information[i, j] -= gain[i, k] * cross[j, k]
+    found_px[0], found_px[1] = math.sqrt(centre_2), math.sqrt(radius_2)
+    return information, gradient, off, found_px

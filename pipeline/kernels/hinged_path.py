@@ -61,7 +61,9 @@ def edge_channels(times_s: Floats, circles: Floats, noises: Floats, errors_px2: 
     ux, uy = circles[n - 1, 0] - circles[0, 0], circles[n - 1, 1] - circles[0, 1]
     length = math.hypot(ux, uy)
     ux, uy = (ux / length, uy / length) if length > 0.0 else (0.0, 0.0)
-    channels = np.array([[ux, uy, 1.0], [-uy, ux, 0.0], [0.0, 0.0, 1.0]])
+    channels = np.zeros((3, 3))
+    channels[0, 0], channels[0, 1], channels[0, 2] = ux, uy, 1.0
+    channels[1, 0], channels[1, 1], channels[2, 2] = -uy, ux, 1.0
     values, weights = np.zeros((n, 3)), np.empty((n, 3))
     way_px = 0.0
     for i in range(n):

@@ -100,17 +100,22 @@ def best_circles(
     voters = _pixels_with_others(x_px, y_px, 2 * reach, math.ceil(math.sqrt(least_support * perimeter[0])))
     if voters.size == 0:
         return np.empty(0), np.empty((0, 3), np.int64)
-    x_px, y_px = x_px[voters], y_px[voters]
-    left, top = x_px.min() - reach, y_px.min() - reach
-    width, height = x_px.max() + reach + 1 - left, y_px.max() + reach + 1 - top
+    left, top, right, bottom = x_px[voters[0]], y_px[voters[0]], x_px[voters[0]], y_px[voters[0]]
+    for voter in voters:
+        left, right = min(left, x_px[voter]), max(right, x_px[voter])
+        top, bottom = min(top, y_px[voter]), max(bottom, y_px[voter])
+    left, top = left - reach, top - reach
+    width, height = right + reach + 1 - left, bottom + reach + 1 - top
     offsets = _offsets(radius0_px, radii, width)
     least = np.empty(offsets.size, np.uint16)  # votes of a circle with enough support, at each offset
+    fewest = 65535
     for n in range(offsets.size):
         least[n] = math.ceil(math.sqrt(least_support * perimeter[offsets[n] % radii]))
-    enough = np.empty(x_px.size * offsets.size // max(least.min(), 1) + 1, np.int64)
+        fewest = min(fewest, int(least[n]))
+    enough = np.empty(voters.size * offsets.size // max(fewest, 1) + 1, np.int64)
     m = 0
-    for i in range(x_px.size):
-        centre = ((y_px[i] - top) * width + x_px[i] - left) * radii
+    for voter in voters:
+        centre = ((y_px[voter] - top) * width + x_px[voter] - left) * radii
         for n in range(offsets.size):
             cell = np.uint64(centre + offsets[n])
             count = votes[cell] + np.uint16(1)
@@ -139,8 +144,8 @@ def best_circles(
         found += 1
         for row in range(max(0, b - near), min(height, b + near + 1)):
             votes[(row * width + max(0, a - near)) * radii : (row * width + min(width, a + near + 1)) * radii] = 0
-    for i in range(x_px.size):
-        centre = ((y_px[i] - top) * width + x_px[i] - left) * radii
+    for voter in voters:
+        centre = ((y_px[voter] - top) * width + x_px[voter] - left) * radii
         for n in range(offsets.size):
             votes[np.uint64(centre + offsets[n])] = 0
     return supports[:found].copy(), circles[:found].copy()
@@ -244,7 +249,8 @@ def active_cells(values: Bytes, x_px: Pixels, y_px: Pixels, least: int, cell_px:
         return np.empty(0, np.int64), np.empty(0, np.int64)
     stride = _stride(values.shape[1] // cell_px + 3)
     active = np.zeros((values.shape[0] // cell_px + 3) * stride, np.uint8)
-    for i in chosen[:bright]:
+    for n in range(bright):
+        i = chosen[n]
         active[(y_px[i] // cell_px + 1) * stride + x_px[i] // cell_px + 1] = 1
     columns, rows = _marked_cells(active, stride, bright)
     m = 0
@@ -285,8 +291,11 @@ def twice_as_wide(columns: Integers, rows: Integers) -> tuple[Integers, Integers
     """Columns and rows (m,) int64 of the cells of twice the width in which these cells lie, rising by row."""
     if columns.size == 0:
         return columns, rows
-    stride = _stride(columns.max() // 2 + 1)
-    wide = np.zeros((rows.max() // 2 + 1) * stride, np.uint8)
+    last_column, last_row = 0, 0
+    for n in range(columns.size):
+        last_column, last_row = max(last_column, columns[n]), max(last_row, rows[n])
+    stride = _stride(last_column // 2 + 1)
+    wide = np.zeros((last_row // 2 + 1) * stride, np.uint8)
     for n in range(columns.size):
         wide[rows[n] // 2 * stride + columns[n] // 2] = 1
     return _marked_cells(wide, stride, columns.size)

@@ -66,14 +66,18 @@ def update(
             surprise += off[a] * inverse[a, b] * off[b]
     if surprise > most_surprise:
         return False, later, spread
-    gain, kept = np.zeros((STATES, 3)), np.eye(STATES)
+    gain, kept = np.zeros((STATES, 3)), np.zeros((STATES, STATES))
     for i in range(STATES):
+        kept[i, i] = 1.0
         for b in range(3):
             for a in range(3):
                 gain[i, b] += covariance[i, OBSERVED[a]] * inverse[a, b]
             later[i] += gain[i, b] * off[b]
             kept[i, OBSERVED[b]] -= gain[i, b]
-    spread[:] = _transformed(kept, covariance) + _transformed(gain, noise)
+    spread, added = _transformed(kept, covariance), _transformed(gain, noise)
+    for i in range(STATES):
+        for k in range(STATES):
+            spread[i, k] += added[i, k]
     return True, later, spread
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from .arrays import Floats
-from .moving_circle import inverse_matrix
+from .moving_circle import inverse_matrix, product
 from .rotation import Vector
 
 # Lift that no ball shows: 60 m/s^2 (150 rps at 30 m/s: 65). It keeps the largest likelihood finite where the circles
@@ -43,12 +43,32 @@ def lift_likelihood(
     most : float
         Logarithm of the likelihood of the most likely lift over that of none.
     """
-    seen = information @ open_terms
-    gain = seen @ inverse_matrix(open_terms.T @ seen + np.eye(open_terms.shape[1]))
-    left = information - gain @ seen.T
-    pull[:] = gradient - gain @ (open_terms.T @ gradient) - left @ known
-    lift = inverse_matrix(left + np.eye(9) / ANY_LIFT_M_S2**2) @ pull
-    return left, 0.5 * float(pull @ lift)
+    causes = open_terms.shape[1]
+    seen, left = product(information, open_terms), information.copy()
+    overlap, along = np.zeros((causes, causes)), np.zeros(causes)
+    for a in range(causes):
+        overlap[a, a] = 1.0
+        for i in range(9):
+            along[a] += open_terms[i, a] * gradient[i]
+            for b in range(causes):
+                overlap[a, b] += open_terms[i, a] * seen[i, b]
+    gain = product(seen, inverse_matrix(overlap))
+    for i in range(9):
+        pull[i] = gradient[i]
+        for a in range(causes):
+            pull[i] -= gain[i, a] * along[a]
+            for j in range(9):
+                left[i, j] -= gain[i, a] * seen[j, a]
+        for j in range(9):
+            pull[i] -= left[i, j] * known[j]
+    bounded, total = left.copy(), 0.0
+    for i in range(9):
+        bounded[i, i] += 1.0 / ANY_LIFT_M_S2**2
+    inverse = inverse_matrix(bounded)
+    for i in range(9):
+        for j in range(9):
+            total += pull[i] * inverse[i, j] * pull[j]
+    return left, 0.5 * total
 
 
 @njit(cache=True, nogil=True)
@@ -208,8 +228,13 @@ def spin_grid(
                     for other in range(3):
                         squared += lift[node] * quadratic[node, other] * lift[other]
                 weights[a, m] = _averaged(along, squared, lift_std * lift_std)
-        best = weights.max()
-        weights -= best
+        best = -np.inf
+        for a in range(directions):
+            for m in range(magnitudes):
+                best = max(best, weights[a, m])
+        for a in range(directions):
+            for m in range(magnitudes):
+                weights[a, m] -= best
         misfit = max(2.0 * (most - best) / freedom, 0.0)
         if narrowing == NARROWINGS:
             break
@@ -230,5 +255,7 @@ def spin_grid(
         low, high = max(low + (first - 1) * step, low), min(low + (last + 2) * step, high)
         begin += (after - 1) * turn
         width = min((around - widest + 3) * turn, 2.0 * math.pi)
-    weights[:] = np.exp(weights / max(misfit, 1.0))
+    for a in range(directions):
+        for m in range(magnitudes):
+            weights[a, m] = math.exp(weights[a, m] / max(misfit, 1.0))
     return low, step, begin, turn, misfit

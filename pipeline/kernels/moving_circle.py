@@ -59,13 +59,15 @@ def _set_rows(flags: Flags) -> Integers:
     return rows[:m].copy()
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def residuals(circle: Floats, ellipticity: Floats, tau_s: Floats, x_px: Floats, y_px: Floats) -> Floats:
     """Distances (n,) in px of events from the outline, > 0 outside."""
-    dx, dy = x_px - (circle[0] + circle[2] * tau_s), y_px - (circle[1] + circle[3] * tau_s)
-    square = dx * dx + dy * dy + 1e-18
-    bulge = (ellipticity[0] * (dx * dx - dy * dy) + ellipticity[1] * 2.0 * dx * dy) / square
-    distances: Floats = np.sqrt(square) - circle[4] * (1.0 + bulge)
+    distances = np.empty(tau_s.size)
+    for i in range(tau_s.size):
+        dx, dy = x_px[i] - (circle[0] + circle[2] * tau_s[i]), y_px[i] - (circle[1] + circle[3] * tau_s[i])
+        square = dx * dx + dy * dy + 1e-18
+        bulge = (ellipticity[0] * (dx * dx - dy * dy) + ellipticity[1] * 2.0 * dx * dy) / square
+        distances[i] = math.sqrt(square) - circle[4] * (1.0 + bulge)
     return distances
 
 
@@ -77,7 +79,9 @@ def inverse_matrix(matrix: Floats) -> Floats:
     """
     n = matrix.shape[0]
     left = matrix.copy()
-    inverse = np.eye(n)
+    inverse = np.zeros((n, n))
+    for i in range(n):
+        inverse[i, i] = 1.0
     for i in range(n):
         pivot = 1.0 / left[i, i]
         for k in range(n):
@@ -90,6 +94,17 @@ def inverse_matrix(matrix: Floats) -> Floats:
                     left[j, k] -= factor * left[i, k]
                     inverse[j, k] -= factor * inverse[i, k]
     return inverse
+
+
+@njit(cache=True, nogil=True)
+def product(left: Floats, right: Floats) -> Floats:
+    """Product (m, n) of small matrices (m, k) and (k, n): BLAS sums in another order on another processor."""
+    result = np.zeros((left.shape[0], right.shape[1]))
+    for i in range(left.shape[0]):
+        for j in range(left.shape[1]):
+            for k in range(right.shape[1]):
+                result[i, k] += left[i, j] * right[j, k]
+    return result
 
 
 @njit(cache=True, nogil=True)
@@ -196,7 +211,8 @@ def fit_circle(
     information, gradient = np.zeros((5, 5)), np.zeros(5)
     gate, scatter, weight_sum = gate_px, gate_px, 0.0
     # The velocity is fitted in px/ms, so that all unknowns are of the same size.
-    scale = np.array([1.0, 1.0, 1e3, 1e3, 1.0])
+    scale = np.ones(5)
+    scale[2] = scale[3] = 1e3
     for _ in range(most_rounds):
         weight_sum, squares = _normal_equations(information, gradient, circle, ellipticity, tau_s, x_px, y_px, gate)
         for k in range(5):
@@ -250,9 +266,13 @@ def in_square(x_px: Pixels, y_px: Pixels, centre_x_px: float, centre_y_px: float
 
 
 @njit(cache=True, nogil=True)
-def relative_events(chosen: Integers, events: Events, reference_us: float) -> tuple[Floats, Floats, Floats]:
-    """Seconds after the reference time, columns and rows of the chosen events, (m,) float64 each."""
-    t_us, x_px, y_px, _ = events
-    tau_s = np.empty(chosen.size)
-    tau_s[:] = (t_us[chosen] - reference_us) * 1e-6
-    return tau_s, x_px[chosen].astype(np.float64), y_px[chosen].astype(np.float64)
+def relative_events(chosen: Integers, events: Events, reference_us: float) -> tuple[Floats, Floats, Floats, Flags]:
+    """Seconds after the reference time, columns and rows of the chosen events, (m,) float64 each, and polarity."""
+    t_us, x_px, y_px, on = events
+    tau_s, x, y = np.empty(chosen.size), np.empty(chosen.size), np.empty(chosen.size)
+    is_on = np.empty(chosen.size, np.bool_)
+    for n in range(chosen.size):
+        i = chosen[n]
+        tau_s[n] = (t_us[i] - reference_us) * 1e-6
+        x[n], y[n], is_on[n] = x_px[i], y_px[i], on[i]
+    return tau_s, x, y, is_on

@@ -12,6 +12,7 @@ from numba import njit
 
 from .arrays import Events, Flags, Floats
 from .moving_circle import WHOLE, fit_circle, in_square, near_outline, relative_events, residuals
+from .order_statistics import value_of_rank
 
 # Events used for a fit: beyond this the pixels' common errors outweigh the statistical, 0.1 px / sqrt(n).
 MOST_EVENTS = 200
@@ -88,8 +89,10 @@ def vote_velocity(
         Distance from the outline at which an event no longer counts.
     """
     m = votes.shape[0] // 2
-    sign = np.where(on, 1.0, -1.0) if signed else np.zeros(on.size)
-    always = 0.0 if signed else 1.0
+    sign, always = np.zeros(on.size), 0.0 if signed else 1.0
+    if signed:
+        for e in range(on.size):
+            sign[e] = 1.0 if on[e] else -1.0
     for j in range(-m, m + 1):
         for i in range(-m, m + 1):
             if i * i + j * j > m * m:
@@ -160,18 +163,11 @@ def support(
         side = 0 if across > 0.0 else 1
         visible[side] += 1.0
         seen[side] += counts[b] >= least
-    return np.array(
-        [
-            float(ahead + behind),
-            ahead_on / max(ahead, 1),
-            behind_on / max(behind, 1),
-            seen[0] / max(visible[0], 1.0),
-            seen[1] / max(visible[1], 1.0),
-            in_view / SECTORS,
-            float(outside),
-            float(inside),
-        ]
-    )
+    found = np.empty(8)  # set one by one: an array of a list takes seconds to compile
+    found[0], found[1], found[2] = ahead + behind, ahead_on / max(ahead, 1), behind_on / max(behind, 1)
+    found[3], found[4] = seen[0] / max(visible[0], 1.0), seen[1] / max(visible[1], 1.0)
+    found[5], found[6], found[7] = in_view / SECTORS, outside, inside
+    return found
 
 
 @njit(cache=True, nogil=True)
@@ -194,7 +190,7 @@ def distance_behind(
         if on[i] != bright and across < 0.0 and across * across > least * (dx * dx + dy * dy):
             behind[m] = error[i]
             m += 1
-    return float(np.partition(behind[:m], m // 2)[m // 2]) if m >= LEAST_EVENTS else np.nan
+    return value_of_rank(behind[:m], m // 2) if m >= LEAST_EVENTS else np.nan
 
 
 @njit(cache=True, nogil=True)
@@ -253,14 +249,16 @@ def fit_outline(
     nothing = np.full(5, np.nan), np.zeros((5, 5)), 0.0, np.zeros(8), np.nan
     if chosen.size < LEAST_EVENTS:
         return nothing
-    tau_s, x, y = relative_events(chosen, events, reference_us)
+    tau_s, x, y, _ = relative_events(chosen, events, reference_us)
     circle, covariance, scatter, weight = fit_circle(expected, prior_std, ellipticity, tau_s, x, y, gate_px, 0.6, 9)
-    if not (np.all(np.isfinite(circle)) and circle[4] > 1.0 and weight >= LEAST_WEIGHT and scatter <= MOST_SCATTER_PX):
+    is_finite = True
+    for k in range(5):
+        is_finite &= math.isfinite(circle[k])
+    if not (is_finite and circle[4] > 1.0 and weight >= LEAST_WEIGHT and scatter <= MOST_SCATTER_PX):
         return nothing
     around_px = max(4.0 * ON_OUTLINE_PX, EARLY_SHARE * circle[4])
     around = near_outline(circle, events, reference_us, around_px, MOST_AROUND, WHOLE)
-    tau_s, x, y = relative_events(around, events, reference_us)
-    on = events[3][around]
+    tau_s, x, y, on = relative_events(around, events, reference_us)
     found = support(circle, ellipticity, tau_s, x, y, on, width_px, height_px)
     behind_px = distance_behind(circle, ellipticity, tau_s, x, y, on, found[1] > found[2])
     return circle, covariance, scatter, found, behind_px
@@ -297,23 +295,27 @@ def find_moving_circle(
     gate_px : float
         Width of the last vote: what a Hough circle may be off, about 2 px on balls of 20 px.
     """
-    circle = np.array([x_px, y_px, 0.0, 0.0, radius_px])
+    circle = np.zeros(5)
+    circle[0], circle[1], circle[4] = x_px, y_px, radius_px
     chosen = in_square(events[1], events[2], x_px, y_px, 1.3 * radius_px + fastest_px_s * span_s)
     chosen = chosen[:: max(1, chosen.size // MOST_VOTERS) | 1].copy()
     gate, span = 0.3 * radius_px, fastest_px_s
     if chosen.size < LEAST_EVENTS:
         circle[:] = np.nan
         return circle, gate
-    tau_s, x, y = relative_events(chosen, events, reference_us)
+    tau_s, x, y, on = relative_events(chosen, events, reference_us)
     for turn in range(2):
         if turn == 1:
             gate, span = max(2.0, 0.15 * radius_px), 0.3 * radius_px / span_s
         step = gate / span_s
         m = math.ceil(span / step)
         votes = np.zeros((2 * m + 1, 2 * m + 1))
-        vote_velocity(votes, circle, tau_s, x, y, events[3][chosen], step, gate, signed)
-        row, column = divmod(np.argmax(np.abs(votes)), 2 * m + 1)
-        if votes[row, column] != 0.0:
-            circle[2] += (column - m) * step
-            circle[3] += (row - m) * step
+        vote_velocity(votes, circle, tau_s, x, y, on, step, gate, signed)
+        best, best_row, best_column = 0.0, m, m
+        for row in range(2 * m + 1):
+            for column in range(2 * m + 1):
+                if abs(votes[row, column]) > best:
+                    best, best_row, best_column = abs(votes[row, column]), row, column
+        circle[2] += (best_column - m) * step
+        circle[3] += (best_row - m) * step
     return circle, gate

@@ -46,8 +46,13 @@ def low_passed(signal: Floats, cutoff_cycles: float) -> Floats:
 @numba.njit(cache=True, nogil=True)
 def falling_crossings(signal: Floats) -> Floats:
     """Places (m,), in samples, of the falls from above zero to zero or below; linear in between."""
-    last = np.flatnonzero((signal[:-1] > 0.0) & (signal[1:] <= 0.0))
-    return last + signal[last] / (signal[last] - signal[last + 1])
+    crossings = np.empty(signal.size)
+    m = 0
+    for i in range(signal.size - 1):
+        if signal[i] > 0.0 and signal[i + 1] <= 0.0:
+            crossings[m] = i + signal[i] / (signal[i] - signal[i + 1])
+            m += 1
+    return crossings[:m].copy()
 
 
 @numba.njit(cache=True, nogil=True)
@@ -75,12 +80,17 @@ def shortest_period(correlation: Floats, shortest: int, share: float) -> int:
 
     A rotation's multiples repeat as well as the rotation itself; its parts (the letters of the logo) repeat worse.
     """
-    before, here, after = correlation[:-2], correlation[1:-1], correlation[2:]
-    peaks = 1 + np.flatnonzero((here > before) & (here >= after) & (here > 0.0))
-    peaks = peaks[peaks >= shortest]
-    if not peaks.size:
-        return 0
-    return int(peaks[correlation[peaks] >= share * correlation[peaks].max()][0])
+    peaks = np.empty(correlation.size, np.int64)
+    m, highest = 0, 0.0
+    for lag in range(max(shortest, 1), correlation.size - 1):
+        here = correlation[lag]
+        if here > correlation[lag - 1] and here >= correlation[lag + 1] and here > 0.0:
+            peaks[m], highest = lag, max(highest, here)
+            m += 1
+    for n in range(m):
+        if correlation[peaks[n]] >= share * highest:
+            return int(peaks[n])
+    return 0
 
 
 @numba.njit(cache=True, nogil=True)

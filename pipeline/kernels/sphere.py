@@ -60,8 +60,9 @@ def intersect_ball(
             ex, ey, ez = ex - back * rx, ey - back * ry, ez - back * rz
         length = np.sqrt(ex * ex + ey * ey + ez * ez)
         ex, ey, ez = ex / length, ey / length, ez / length
-        normals[i] = ex, ey, ez
-        points[i] = cx + ball_radius_m * ex, cy + ball_radius_m * ey, cz + ball_radius_m * ez
+        normals[i, 0], normals[i, 1], normals[i, 2] = ex, ey, ez
+        points[i, 0], points[i, 1] = cx + ball_radius_m * ex, cy + ball_radius_m * ey
+        points[i, 2] = cz + ball_radius_m * ez
     return points, normals
 
 
@@ -86,7 +87,7 @@ def surface_velocity(points_m: Floats, normals: Floats, vx_px_s: Floats, vy_px_s
         ex, ey, ez = normals[i, 0], normals[i, 1], normals[i, 2]
         a, b = vx_px_s[i] * z / focal_px, vy_px_s[i] * z / focal_px
         along = -(a * ex + b * ey) / (ex * rx + ey * ry + ez)
-        velocity[i] = a + rx * along, b + ry * along, along
+        velocity[i, 0], velocity[i, 1], velocity[i, 2] = a + rx * along, b + ry * along, along
     return velocity
 
 
@@ -103,5 +104,5 @@ def spin_rows(points_m: Floats, normals: Floats, directions: Floats, focal_px: f
         jx, jy = scale * directions[i, 0], scale * directions[i, 1]
         jz = -(jx * points_m[i, 0] + jy * points_m[i, 1]) / z
         ex, ey, ez = normals[i, 0], normals[i, 1], normals[i, 2]
-        rows[i] = ey * jz - ez * jy, ez * jx - ex * jz, ex * jy - ey * jx
+        rows[i, 0], rows[i, 1], rows[i, 2] = ey * jz - ez * jy, ez * jx - ex * jz, ex * jy - ey * jx
     return rows

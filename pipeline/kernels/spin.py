@@ -6,6 +6,7 @@ import numba
 import numpy as np
 
 from .arrays import Floats
+from .order_statistics import median
 
 
 @numba.njit(cache=True, nogil=True)
@@ -21,7 +22,9 @@ def solve3(m: Floats, b: Floats) -> tuple[Floats, float]:
     x[0] = b[0] * c0 + m[0, 1] * (m[1, 2] * b[2] - b[1] * m[2, 2]) + m[0, 2] * (b[1] * m[2, 1] - m[1, 1] * b[2])
     x[1] = m[0, 0] * (b[1] * m[2, 2] - m[1, 2] * b[2]) + b[0] * c1 + m[0, 2] * (m[1, 0] * b[2] - b[1] * m[2, 0])
     x[2] = m[0, 0] * (m[1, 1] * b[2] - b[1] * m[2, 1]) + m[0, 1] * (b[1] * m[2, 0] - m[1, 0] * b[2]) + b[0] * c2
-    return x / determinant, determinant
+    for k in range(3):
+        x[k] /= determinant
+    return x, determinant
 
 
 @numba.njit(cache=True, nogil=True)
@@ -110,7 +113,7 @@ def robust_spin(
         for i in range(n):
             predicted = rows[i, 0] * spin[0] + rows[i, 1] * spin[1] + rows[i, 2] * spin[2]
             off[i] = abs(predicted - speeds[i]) / stds[i]
-        scale = max(1.4826 * np.median(off), 1e-9)
+        scale = max(1.4826 * median(off.copy()), 1e-9)
         matrix[:, :] = 0.0
         right = np.zeros(3)
         for i in range(n):

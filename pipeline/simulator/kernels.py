@@ -105,7 +105,7 @@ def _tails(
     height_px, rests = background.size // width, physics.pause_us == 0.0
     i = 0
     while i < cursor[0]:
-        p = listing[i]
+        p = listing[i] + 0  # int64, as all other places: else numba compiles what follows for int32, too
         y, x = p // width, p % width
         new_role = pixel.TAIL
         for k in range(box.shape[1]):
@@ -153,8 +153,11 @@ def _leave(pixels: Pixels, box: Ints, old: int, new: int, k: int, width: int) ->
 @njit(cache=True, nogil=True)
 def leave_all(pixels: Pixels, box: Ints, width: int) -> None:
     """Make tails of all pixels in these boxes (k, 4), into `pixels`: their bodies may come no more."""
+    boxes = np.zeros((2, box.shape[0], box.shape[1]), np.int32)
     for k in range(box.shape[0]):
-        _leave(pixels, np.stack((box, np.zeros_like(box))), 0, 1, k, width)
+        for side in range(box.shape[1]):
+            boxes[0, k, side] = box[k, side]
+        _leave(pixels, boxes, 0, 1, k, width)
 
 
 @njit(cache=True, nogil=True)

@@ -339,7 +339,16 @@ def time_permuted(events: EventColumns, times_each: int) -> tuple[EventColumns, 
                 t_s[at] = events.t_s[first + int((j + shift) / times_each * count)]
                 rows[at] = first + i
                 at += 1
-    return EventColumns(t_s, take_columns(events.normals, rows), events.polarity[rows], starts), rows
+    return EventColumns(t_s, take_columns(events.normals, rows), _taken(events.polarity, rows), starts), rows
+
+
+@numba.njit(cache=True, nogil=True)
+def _taken(column: Integers, rows: Integers) -> Integers:
+    """Entries (m,) of a column (n,)."""
+    taken = np.empty(rows.size, column.dtype)
+    for i in range(rows.size):
+        taken[i] = column[rows[i]]
+    return taken
 
 
 @numba.njit(cache=True, nogil=True)
@@ -397,8 +406,11 @@ def segmented_window(events: EventColumns, segment_s: float, max_events: int, se
             count += 1
     starts[count] = kept
     rows = rows[:kept]
-    thinned = EventColumns(t_s[rows], take_columns(events.normals, rows), events.polarity[rows], starts[: count + 1])
-    return whole_window(thinned, 1)
+    thinned_s = np.empty(kept)
+    for i in range(kept):
+        thinned_s[i] = t_s[rows[i]]
+    normals, polarity = take_columns(events.normals, rows), _taken(events.polarity, rows)
+    return whole_window(EventColumns(thinned_s, normals, polarity, starts[: count + 1]), 1)
 
 
 @numba.njit(cache=True, nogil=True)

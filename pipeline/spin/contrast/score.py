@@ -299,8 +299,10 @@ def changed_spin(spin_rad_s: Floats, axes: Floats, change: Floats) -> Floats:
     across = math.hypot(change[1], change[2])
     angle = across / magnitude
     ahead, sideways = math.cos(angle), math.sin(angle) / max(across, 1e-12)
-    direction = ahead * axes[0] + sideways * (change[1] * axes[1] + change[2] * axes[2])
-    changed: Floats = direction * max(magnitude + change[0], 1e-3)
+    changed = np.empty(3)
+    for k in range(3):
+        direction = ahead * axes[0, k] + sideways * (change[1] * axes[1, k] + change[2] * axes[2, k])
+        changed[k] = direction * max(magnitude + change[0], 1e-3)
     return changed
 
 
@@ -317,7 +319,9 @@ def scores_near(
     events, permuted, at_px = window.events, window.permuted, np.zeros(3)
     for m in range(changes.shape[0]):
         if objective.prior_px.size:
-            place_px = offsets_px + changes[m, 3:]
+            place_px = np.empty(3)
+            for k in range(3):
+                place_px[k] = offsets_px[k] + changes[m, 3 + k]
             if place_px[0] != at_px[0] or place_px[1] != at_px[1] or place_px[2] != at_px[2]:
                 at_px = place_px
                 normals = shifted_normals(window.events.normals, objective.slopes, at_px)
@@ -337,16 +341,29 @@ def scores_near(
 @numba.njit(cache=True, nogil=True)
 def spin_axes(spin_rad_s: Floats) -> Floats:
     """The spin's direction and two directions across it: (3, 3), orthonormal rows."""
-    x, y, z = spin_rad_s / math.sqrt(spin_rad_s[0] ** 2 + spin_rad_s[1] ** 2 + spin_rad_s[2] ** 2)
-    return np.array(orthonormal_axes(x, y, z))
+    length = math.sqrt(spin_rad_s[0] ** 2 + spin_rad_s[1] ** 2 + spin_rad_s[2] ** 2)
+    rows = orthonormal_axes(spin_rad_s[0] / length, spin_rad_s[1] / length, spin_rad_s[2] / length)
+    axes = np.empty((3, 3))
+    for i in range(3):
+        for k in range(3):
+            axes[i, k] = rows[i][k]
+    return axes
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def difference_steps(objective: Objective, spin_rad_s: Floats) -> Floats:
     """Step of each unknown (c,) that moves the events by about half a kernel: rad/s, then px."""
     t_s = objective.window.events.t_s
-    mean = np.sum(t_s / t_s.size)
-    spread_s = max(math.sqrt(np.sum((t_s - mean) ** 2 / t_s.size)), 1e-5)
+    mean, variance, terms = 0.0, 0.0, np.empty(t_s.size)
+    for i in range(t_s.size):  # sums in loops of their own: the divisions are vectorized
+        terms[i] = t_s[i] / t_s.size
+    for i in range(t_s.size):
+        mean += terms[i]
+    for i in range(t_s.size):
+        terms[i] = (t_s[i] - mean) ** 2 / t_s.size
+    for i in range(t_s.size):
+        variance += terms[i]
+    spread_s = max(math.sqrt(variance), 1e-5)
     magnitude = math.sqrt(spin_rad_s[0] ** 2 + spin_rad_s[1] ** 2 + spin_rad_s[2] ** 2)
     steps = np.full(3 + objective.prior_px.size, OFFSET_STEP_PX)
     steps[0] = min(STEP_SIGMAS * objective.sigma_rad / spread_s, 0.3 * magnitude)

@@ -18,6 +18,7 @@ import numba
 import numpy as np
 
 from ...kernels.arrays import Floats, Integers
+from ...kernels.order_statistics import median
 from .events import BallUncertainty, ContrastSettings, EventColumns, SphereEvents, segmented_window
 from .score import CELLS_PER_SIGMA, TURN, Objective, changed_spin, difference_steps, score, scores_near, spin_axes
 
@@ -132,9 +133,13 @@ def _halved(spins: Floats, ratio: float, spacing_rad: float) -> Floats:
         for larger in (-0.25, 0.25):
             for right in (-0.25, 0.25):
                 for up in (-0.25, 0.25):
-                    direction = axes[0] + spacing_rad * (right * axes[1] + up * axes[2])
-                    length = math.sqrt(direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2)
-                    parts[at] = direction * (magnitude * math.exp(larger * ratio) / length)
+                    square = 0.0
+                    for i in range(3):
+                        parts[at, i] = axes[0, i] + spacing_rad * (right * axes[1, i] + up * axes[2, i])
+                        square += parts[at, i] ** 2
+                    factor = magnitude * math.exp(larger * ratio) / math.sqrt(square)
+                    for i in range(3):
+                        parts[at, i] *= factor
                     at += 1
     return parts
 
@@ -202,7 +207,9 @@ def local_model(objective: Objective, spin_rad_s: Floats, offsets_px: Floats, sc
     Hall and Hausman, 1974): the correlations are taken from there, the sizes from second differences, kept within a
     factor CURVATURE_TRUST of their median, since differences over a sharp maximum can go wrong, even negative.
     """
-    steps = scale * difference_steps(objective, spin_rad_s)
+    steps = difference_steps(objective, spin_rad_s)
+    for k in range(steps.size):
+        steps[k] *= scale
     count, n = steps.size, objective.window.events.t_s.size
     changes = np.zeros((2 * count + 1, count))
     for k in range(count):
@@ -211,14 +218,18 @@ def local_model(objective: Objective, spin_rad_s: Floats, offsets_px: Floats, sc
     values = scores_near(shares, objective, spin_rad_s, offsets_px, changes)
     scatter, sizes, gradient = np.empty((count, count)), np.empty(count), np.empty(count)
     for k in range(count):
-        shares[1 + k] = 0.5 * (shares[1 + k] - shares[1 + count + k])
+        slopes, back = shares[1 + k], shares[1 + count + k]
+        for i in range(n):
+            slopes[i] = 0.5 * (slopes[i] - back[i])
         for j in range(k + 1):
-            scatter[k, j] = scatter[j, k] = np.sum(shares[1 + k] * shares[1 + j])
+            others, total = shares[1 + j], 0.0
+            for i in range(n):
+                total += slopes[i] * others[i]
+            scatter[k, j] = scatter[j, k] = total
         scatter[k, k] = max(scatter[k, k], 1e-12)
         sizes[k] = (2.0 * values[0] - values[1 + k] - values[1 + count + k]) / scatter[k, k]
         gradient[k] = 0.5 * (values[1 + k] - values[1 + count + k])
-    ranked = np.sort(sizes)
-    usual = max(0.5 * (ranked[(count - 1) // 2] + ranked[count // 2]), LEAST_CURVATURE)
+    usual = max(median(sizes.copy()), LEAST_CURVATURE)
     curvature = np.empty((count, count))
     for k in range(count):
         sizes[k] = min(max(sizes[k], usual / CURVATURE_TRUST), usual * CURVATURE_TRUST)
@@ -252,12 +263,18 @@ def cholesky_solve(matrix: Floats, right: Floats) -> Floats:
 @numba.njit(cache=True, nogil=True)
 def _newton_step(objective: Objective, model: LocalModel, offsets_px: Floats) -> Floats:
     """Change (c,), in units of the steps, to the maximum of the model of weighted score less the prior's cost."""
-    curvature, gradient = objective.weight * model.curvature, objective.weight * model.gradient
+    curvature, gradient = model.curvature.copy(), model.gradient.copy()
+    for k in range(gradient.size):
+        gradient[k] *= objective.weight
+        for j in range(gradient.size):
+            curvature[k, j] *= objective.weight
     for k in range(offsets_px.size):
         precision = (model.steps[3 + k] / objective.prior_px[k]) ** 2
         curvature[3 + k, 3 + k] += precision
         gradient[3 + k] -= precision * offsets_px[k] / model.steps[3 + k]
-    largest = max(np.diag(curvature).max(), 0.0)
+    largest = 0.0
+    for k in range(gradient.size):
+        largest = max(largest, curvature[k, k])
     for k in range(gradient.size):
         curvature[k, k] += 0.02 * largest + 1e-12
     return cholesky_solve(curvature, gradient)
@@ -281,10 +298,14 @@ def maximise(
             if scale == 1.0:
                 usual = model
         change = _newton_step(objective, model, offsets_px)
-        length = math.sqrt(np.sum(change**2))
+        square = 0.0
+        for k in range(change.size):
+            square += change[k] ** 2
+        length = math.sqrt(square)
         whole = min(1.0, 2.0 / max(length, 1e-12))  # the model is not to be believed farther than a kernel
         changes, gains = np.empty((2, change.size)), np.empty(2)
-        changes[0], changes[1] = whole * change * model.steps, 0.5 * whole * change * model.steps
+        for k in range(change.size):
+            changes[0, k], changes[1, k] = whole * change[k] * model.steps[k], 0.5 * whole * change[k] * model.steps[k]
         values = scores_near(shares, objective, spin_rad_s, offsets_px, changes)
         for m in range(2):
             gains[m] = objective.weight * (values[m] - model.value)
@@ -299,7 +320,9 @@ def maximise(
             continue
         value = values[pick]
         spin_rad_s = changed_spin(spin_rad_s, spin_axes(spin_rad_s), changes[pick, :3])
-        offsets_px = offsets_px + changes[pick, 3:]
+        offsets_px = offsets_px.copy()
+        for k in range(offsets_px.size):
+            offsets_px[k] += changes[pick, 3 + k]
         if length < 0.1:
             break
     return spin_rad_s, offsets_px, value, usual
@@ -311,7 +334,8 @@ def maximise_each(objective: Objective, spins_rad_s: Floats, iterations: int) ->
     maxima, values, none = np.empty_like(spins_rad_s), np.empty(spins_rad_s.shape[0]), np.empty(0)
     shares, here = np.empty((spins_rad_s.shape[0], objective.window.events.t_s.size)), np.zeros((1, 3))
     for k in range(spins_rad_s.shape[0]):
-        maxima[k] = maximise(objective, spins_rad_s[k], none, iterations)[0]
+        best = maximise(objective, spins_rad_s[k], none, iterations)[0]
+        maxima[k, 0], maxima[k, 1], maxima[k, 2] = best[0], best[1], best[2]
         values[k] = scores_near(shares[k : k + 1], objective, maxima[k], none, here)[0]
     return maxima, values, shares
 
