@@ -1,4 +1,4 @@
-"""`spinscope live` and `spinscope watch`: the shots of a running camera, or of a recording in its place."""
+"""`spinscope live` and `spinscope watch`: the shots of a running camera, or of a recording or simulation in its place."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ SOURCE_OPTIONS = (
     click.option("--roi", "roi_px", type=int, nargs=4, metavar="X Y W H", help="Region of interest of the camera."),
     click.option("--most-mev-s", type=click.FloatRange(min=0, min_open=True), help="Event rate above which it drops."),
     click.option("--replay", type=RECORDING, metavar="FILE", help="Play a recording in the place of a camera."),
-    click.option("--speed", type=float, default=1.0, show_default=True, help="Of the replay; inf: no waiting."),
+    click.option("--simulate", "simulates", is_flag=True, help="Simulate a camera, on whose events biases act."),
+    click.option("--speed", type=float, default=1.0, show_default=True, help="Of replay and simulation; inf: no waiting."),
     click.option("--loop", "loops", is_flag=True, help="Play the recording again and again."),
     click.option("--fake", "fault", type=click.Choice(FAULTS), help="Have the replay misbehave every second."),
     click.option("--record", type=click.Path(path_type=Path), metavar="NAME.raw", help="Record the events."),
@@ -100,6 +101,7 @@ def run_camera(
     roi_px: tuple[int, int, int, int] | None,
     most_mev_s: float | None,
     replay: Path | None,
+    simulates: bool,
     speed: float,
     loops: bool,
     fault: str | None,
@@ -126,6 +128,7 @@ def run_camera(
         biases=biases,
         options=CameraOptions(roi_px, most_mev_s),
         replay=replay,
+        simulates=simulates,
         speed=speed,
         loops=loops,
         fault=fault,

@@ -1,16 +1,26 @@
-"""Opening of the camera, or of the recording that plays in its place, with the session's parameters."""
+"""Opening of the camera, or of a recording or simulated scene in its place, with the session's parameters."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from spinscope.pipeline.biases import BiasParameters, read_bias_values
-from spinscope.pipeline.cameras import CameraOptions, EventCamera, ReplayCamera, open_camera
+from spinscope.pipeline.biases import BiasParameters, read_bias_values, read_biases
+from spinscope.pipeline.camera import Camera
+from spinscope.pipeline.cameras import CameraOptions, EventCamera, ReplayCamera, SimulatedCamera, open_camera
 from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.live import session_of
 from spinscope.pipeline.recordings import Recording
 from spinscope.pipeline.session import Choices, Session
+
+from ..terminal import note
+
+# The simulated camera: small, so that two cores keep up in all its noise, before a ball of 5 m/s in half-light, where
+# the most sensitive biases are too noisy.
+SIMULATED_SIZE_PX, SIMULATED_ROUND_S = (346, 260), 1.0
+SIMULATED_LUX, SIMULATED_SPEED_M_S, SIMULATED_SPIN_RPS = 300.0, 5.0, 30.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,7 +37,11 @@ class CameraChoice:
         What the camera leaves out by itself.
     replay : Path, optional
         Recording in the place of a camera.
-    speed, loops, fault
+    simulates : bool
+        Whether a simulated camera takes the place of one.
+    speed : float
+        Of replay and simulation; see `ReplayCamera`.
+    loops, fault
         Of the replay; see `ReplayCamera`.
     """
 
@@ -35,6 +49,7 @@ class CameraChoice:
     biases: Path | None = None
     options: CameraOptions = CameraOptions()
     replay: Path | None = None
+    simulates: bool = False
     speed: float = 1.0
     loops: bool = False
     fault: str | None = None
@@ -42,22 +57,29 @@ class CameraChoice:
 
 def open_live(chosen: CameraChoice, choices: Choices) -> tuple[EventCamera, Session]:
     """The camera, and a session with its parameters; raises SpinscopeError."""
-    biases = {} if chosen.biases is None else read_bias_values(chosen.biases)
     if choices.window_us is not None:
         raise ParameterError("a camera has no --window: `spinscope convert IN OUT --window` cuts a recording")
+    sources = {"--camera": chosen.serial, "--replay": chosen.replay, "--simulate": chosen.simulates or None}
+    given = [name for name, value in sources.items() if value is not None]
+    if len(given) > 1:
+        raise ParameterError(f"{' and '.join(given)} exclude each other: give one of them")
+    if chosen.options != CameraOptions() and given in (["--replay"], ["--simulate"]):
+        raise ParameterError("--roi and --most-mev-s are of a camera that is plugged in: a recording has `convert --roi`")
     if chosen.replay is not None:
-        if chosen.serial is not None:
-            raise ParameterError("--camera and --replay exclude each other: give one of them")
-        if chosen.options != CameraOptions():
-            raise ParameterError("--roi and --most-mev-s are of a camera: a recording has `convert --roi`")
         session = Session.open(chosen.replay, choices)
         camera = replay_of(session, chosen)
-        if biases:
-            camera.set_biases(biases)
+        if chosen.biases is not None:
+            camera.set_biases(read_bias_values(chosen.biases))
         return camera, session
     if chosen.loops or chosen.fault is not None:
         raise ParameterError("--loop and --fake are of a recording: give --replay FILE with them")
-    opened = open_camera(chosen.serial, biases, chosen.options)
+    opened: EventCamera
+    if chosen.simulates:
+        biases = BiasParameters() if chosen.biases is None else read_biases(chosen.biases)
+        opened = simulated_camera(choices, biases, chosen.speed)
+    else:
+        values = {} if chosen.biases is None else read_bias_values(chosen.biases)
+        opened = open_camera(chosen.serial, values, chosen.options)
     try:
         session = session_of(opened, choices)
     except BaseException:
@@ -76,7 +98,6 @@ def opened_anew(camera: EventCamera) -> EventCamera:
 def replay_of(session: Session, chosen: CameraChoice) -> ReplayCamera:
     """A session's recording that plays like a camera, with the biases that its sidecar states."""
     recording, stated = session.recording, session.sidecar.biases or BiasParameters()
-    limits = {name: (round(one.low or 0), round(one.high or 0)) for name, one in BiasParameters.tunables().items()}
     return ReplayCamera(
         lambda: recording.chunks() if isinstance(recording, Recording) else [recording.read()],
         recording.width_px,
@@ -85,6 +106,42 @@ def replay_of(session: Session, chosen: CameraChoice) -> ReplayCamera:
         speed=chosen.speed,
         loops=chosen.loops,
         fault=chosen.fault,
-        bias_limits=limits,
-        biases={name: getattr(stated, name) for name in limits},
+        bias_limits=bias_limits(),
+        biases=stated.as_dict(),
     )
+
+
+def simulated_camera(choices: Choices, biases: BiasParameters, speed: float) -> SimulatedCamera:
+    """A simulated EVK4 of few pixels, with the optics chosen, before a ball that is thrown again and again."""
+    from spinscope.pipeline.simulator import Light, rally, simulate_scene
+
+    parameters = choices.parameters()
+    optics = Camera.of(parameters.camera, *SIMULATED_SIZE_PX)
+    scene = rally(
+        shots=1,
+        duration_s=SIMULATED_ROUND_S,
+        speed_m_s=(SIMULATED_SPEED_M_S, SIMULATED_SPEED_M_S),
+        magnitude_rps=(SIMULATED_SPIN_RPS, SIMULATED_SPIN_RPS),
+        light=Light(illuminance_lux=SIMULATED_LUX),
+        camera=optics,
+    )
+    ball = replace(scene.balls[0], radius_m=parameters.ball.diameter_mm / 2000)
+    scene = replace(scene, balls=(ball,))
+
+    def simulate(values: Mapping[str, int]) -> EventBatch:
+        return simulate_scene(scene, camera=optics, sensor=BiasParameters(**values)).events
+
+    note("simulating the scene before the camera ...")
+    return SimulatedCamera(
+        simulate,
+        round(SIMULATED_ROUND_S * 1e6),
+        *SIMULATED_SIZE_PX,
+        bias_limits=bias_limits(),
+        biases=biases.as_dict(),
+        speed=speed,
+    )
+
+
+def bias_limits() -> dict[str, tuple[int, int]]:
+    """Lowest and highest value of the biases of an EVK4."""
+    return {name: (round(one.low or 0), round(one.high or 0)) for name, one in BiasParameters.tunables().items()}

@@ -1,4 +1,4 @@
-"""Running cameras: drivers, the replay of a recording as a camera, the stream of ticks, and the recorder.
+"""Running cameras: drivers, a recording and a simulated scene in their place, the stream of ticks, and the recorder.
 
 A clock is read here, so that stages and chain need none.
 """
@@ -20,3 +20,4 @@ from .recent_events import RecentEvents as RecentEvents
 from .recorder import Recorder as Recorder
 from .replay import FAULTS as FAULTS
 from .replay import ReplayCamera as ReplayCamera
+from .simulated import SimulatedCamera as SimulatedCamera

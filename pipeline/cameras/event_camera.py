@@ -195,7 +195,7 @@ def open_camera(
             missing.append(str(error))
         except CameraError as error:
             problems.append(str(error))
-    raise CameraError("; ".join(problems) or f"{_without_driver(missing)}; `--replay FILE` needs no camera")
+    raise CameraError("; ".join(problems) or f"{_without_driver(missing)}; `--replay FILE` and `--simulate` need no camera")
 
 
 def listed_cameras() -> list[ListedCamera]:

@@ -1,0 +1,79 @@
+"""Simulated camera: a scene that is simulated anew whenever a bias changes, for trying out what biases do."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+
+from ..errors import ParameterError
+from ..events import EventBatch
+from .clock import now_s
+from .event_camera import CameraPacket, EventCamera, check_biases
+
+PACKET_US = 1000  # as USB packets at millions of events a second
+
+
+class SimulatedCamera(EventCamera):
+    """A camera in front of a simulated scene that begins anew again and again, and on which biases act.
+
+    A change of biases takes as long as the simulation of one round. The camera's clock stands still meanwhile, so that
+    all later events are those of the new biases.
+
+    Parameters
+    ----------
+    simulate : callable
+        `simulate(biases) -> EventBatch`: the events of one round, in order of time, from 0.
+    round_us : int
+        Length of a round, a multiple of PACKET_US.
+    width_px, height_px : int
+        Size of the sensor.
+    bias_limits, biases : mapping
+        Lowest and highest value of each bias, and the values to begin with; CameraError where they do not agree.
+    speed : float
+        Times real time; infinity hands everything over as fast as it is taken.
+    """
+
+    name, serial = "simulated camera", "simulated"
+
+    def __init__(
+        self,
+        simulate: Callable[[Mapping[str, int]], EventBatch],
+        round_us: int,
+        width_px: int,
+        height_px: int,
+        *,
+        bias_limits: Mapping[str, tuple[int, int]],
+        biases: Mapping[str, int],
+        speed: float = 1.0,
+    ) -> None:
+        if not speed > 0.0:
+            raise ParameterError(f"speed = {speed:g} is no speed: give a number above 0, 1 is real time")
+        self.width_px, self.height_px = width_px, height_px
+        self.bias_limits, self.biases = dict(bias_limits), dict(biases)
+        check_biases(self.biases, self.bias_limits, self.name)
+        self.can_wait = speed == float("inf")
+        self._simulate, self._round_us, self._speed = simulate, round_us, speed
+        self._end_us = 0
+        self._apply_biases(self.biases)
+
+    def read(self) -> CameraPacket:
+        """The next packet at its time: a scene has no end."""
+        time.sleep(max(self._due_s() - now_s(), 0.0))
+        round_start_us, start_us = self._end_us - self._end_us % self._round_us, self._end_us % self._round_us
+        events = self._events.between(start_us, start_us + PACKET_US)
+        self._end_us += PACKET_US
+        return CameraPacket(EventBatch(events.t_us + round_start_us, *events.columns[1:]), self._end_us)
+
+    def close(self) -> None:
+        """There is nothing to let go of."""
+
+    def _apply_biases(self, biases: Mapping[str, int]) -> None:
+        self._events = self._simulate(biases)
+        self._begun: tuple[float, int] | None = None  # when its clock went on, and what it showed
+
+    def _due_s(self) -> float:
+        """Time at which the next packet is complete."""
+        if self._begun is None:
+            self._begun = now_s(), self._end_us
+        begun_s, begun_us = self._begun
+        return begun_s + (self._end_us + PACKET_US - begun_us) * 1e-6 / self._speed
