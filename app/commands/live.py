@@ -1,4 +1,4 @@
-"""`spinscope live` and `spinscope watch`: the shots of a running camera, or of a recording or simulation in its place."""
+"""`spinscope live` and `spinscope watch`: the shots of a camera, or of what is played or simulated in its place."""
 
 from __future__ import annotations
 
@@ -20,7 +20,9 @@ SOURCE_OPTIONS = (
     click.option("--most-mev-s", type=click.FloatRange(min=0, min_open=True), help="Event rate above which it drops."),
     click.option("--replay", type=RECORDING, metavar="FILE", help="Play a recording in the place of a camera."),
     click.option("--simulate", "simulates", is_flag=True, help="Simulate a camera, on whose events biases act."),
-    click.option("--speed", type=float, default=1.0, show_default=True, help="Of replay and simulation; inf: no waiting."),
+    click.option(
+        "--speed", type=float, default=1.0, show_default=True, help="Of --replay, --simulate; inf: no waiting."
+    ),
     click.option("--loop", "loops", is_flag=True, help="Play the recording again and again."),
     click.option("--fake", "fault", type=click.Choice(FAULTS), help="Have the replay misbehave every second."),
     click.option("--record", type=click.Path(path_type=Path), metavar="NAME.raw", help="Record the events."),

@@ -8,6 +8,7 @@ from dataclasses import asdict
 
 import numpy as np
 
+from spinscope.pipeline.cameras import EventCamera
 from spinscope.pipeline.errors import CameraError, ParameterError
 from spinscope.pipeline.results import Packet
 from spinscope.pipeline.stages.track_result import BallTrack
@@ -38,8 +39,10 @@ class CameraSweep:
     ----------
     name : str
         Of one of `swept_biases`.
-    limits, present : Mapping
-        Of the device: lowest and highest value of each bias, and values to go back to.
+    camera : EventCamera
+        Has the limits of each bias.
+    present : Mapping
+        Values to go back to.
     set_biases : callable
         `set_biases(values) -> int` changes biases of the camera; returns its time up to which events had come.
     points : int
@@ -57,13 +60,13 @@ class CameraSweep:
     Raises
     ------
     CameraError, ParameterError
-        For a bias that the device does not have, and points or times that are no sweep.
+        For a bias that the device does not have or that cannot be set, and points or times that are no sweep.
     """
 
     def __init__(
         self,
         name: str,
-        limits: Mapping[str, tuple[int, int]],
+        camera: EventCamera,
         present: Mapping[str, int],
         set_biases: Callable[[Mapping[str, int]], int],
         *,
@@ -71,7 +74,9 @@ class CameraSweep:
         measured_s: float = MEASURED_S,
         on_point: Callable[[BiasSweep], None] = lambda sweep: None,
     ) -> None:
-        offered = swept_biases(limits)
+        if camera.without_biases:
+            raise CameraError(camera.without_biases)
+        limits, offered = camera.bias_limits, swept_biases(camera.bias_limits)
         swept = next((one for one in offered if one.name == name), None)
         if swept is None:
             raise CameraError(f"the camera has no bias {name!r}: it has {', '.join(one.name for one in offered)}")
@@ -145,10 +150,8 @@ def proposed_value(sweep: BiasSweep) -> int | None:
     return best
 
 
-def proposal_words(sweep: BiasSweep, is_replay: bool) -> str:
-    """The proposal for people, and what it rests on: nothing where the events are a recording's."""
-    if is_replay:
-        return f"no value of {sweep.name} is proposed: the events of a recording do not change with biases"
+def proposal_words(sweep: BiasSweep) -> str:
+    """The proposal for people, and what it rests on."""
     value, has_ball = proposed_value(sweep), any(point.ball_on_hz for point in sweep.points)
     if value is None:
         return (

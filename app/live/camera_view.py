@@ -11,8 +11,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from spinscope.pipeline.biases import BiasParameters
-from spinscope.pipeline.cameras import ArrivedTick
+from spinscope.pipeline.biases import CURVES, BiasParameters
+from spinscope.pipeline.cameras import ArrivedTick, SimulatedCamera
 from spinscope.pipeline.cameras.event_camera import check_biases
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.live_outputs import LiveNotice, LiveOutput, LiveShot, LiveSpin, LiveStatus
@@ -227,14 +227,16 @@ class CameraView(CameraObserver):
     def bias_state(self) -> BiasState:
         """The camera's biases within the device's limits."""
         camera, known = self.opened.camera, BiasParameters.tunables()
+        shown = {name: (known[name].low or 0, known[name].high or 0) for name in self._biases if name in known}
+        is_model = isinstance(camera, SimulatedCamera) and not all(curve.calibrated for curve in CURVES.values())
         return BiasState(
             values=dict(self._biases),
-            known=True,
-            locked=None if camera.bias_limits else f"{camera.name} has no biases that could be set",
-            calibrated=True,
+            known=bool(self._biases),
+            locked=camera.without_biases or None,
+            calibrated=not is_model,
             ranges={
                 name: BiasRange(low, high, camera.biases[name], known[name].help if name in known else name)
-                for name, (low, high) in camera.bias_limits.items()
+                for name, (low, high) in (camera.bias_limits or shown).items()
             },
             swept=swept_biases(camera.bias_limits),
             of_camera=True,
@@ -243,7 +245,7 @@ class CameraView(CameraObserver):
     def set_biases(self, biases: Mapping[str, int]) -> None:
         """Change biases, as soon as the camera's thread comes to it."""
         camera = self.opened.camera
-        check_biases(biases, camera.bias_limits, camera.name)
+        check_biases(biases, camera)
         self._biases |= biases
         self.opened.set_biases(biases)
 
@@ -252,9 +254,7 @@ class CameraView(CameraObserver):
     ) -> BiasSweep:
         """Step the camera through the range of a bias, and give it its former value again."""
         live = self.opened
-        sweep = CameraSweep(
-            name, live.camera.bias_limits, self._biases, live.set_biases, points=points, on_point=report
-        )
+        sweep = CameraSweep(name, live.camera, self._biases, live.set_biases, points=points, on_point=report)
         report(sweep.sweep)
         self._sweep = sweep
         try:
@@ -266,7 +266,7 @@ class CameraView(CameraObserver):
             self._sweep = None
             sweep.end()
         made = sweep.sweep
-        return BiasSweep(made.name, made.total, made.points, proposal_words(made, live.camera.is_replay))
+        return BiasSweep(made.name, made.total, made.points, proposal_words(made))
 
 
 def _words(spin: LiveSpin) -> str:

@@ -187,7 +187,7 @@ def run_headless(
         if to.sweep is not None:
             sweep = CameraSweep(
                 to.sweep.name,
-                camera.bias_limits,
+                camera,
                 camera.biases,
                 live.set_biases,
                 points=to.sweep.points,
@@ -218,12 +218,12 @@ def run_headless(
                 if sweep is not None and sweep.done.is_set():
                     run.stop()
         if sweep is not None and to.sweep is not None:
-            _write_sweep(sweep.sweep, camera.is_replay, lines, to.sweep.figure)
+            _write_sweep(sweep.sweep, lines, to.sweep.figure)
     if table is not None:
         note(f"{table.count} shots in {table.path}, {table.disk_bytes / 1e6:.1f} MB with their events")
 
 
-def _write_sweep(sweep: BiasSweep, is_replay: bool, lines: JsonLines | None, figure: Path | None) -> None:
+def _write_sweep(sweep: BiasSweep, lines: JsonLines | None, figure: Path | None) -> None:
     """Write the event rates at each value, the value that they propose, and their figure."""
     for point in sweep.points:
         rates = {name: getattr(point, name) for name in ("noise_on_hz", "noise_off_hz", "ball_on_hz", "ball_off_hz")}
@@ -231,7 +231,7 @@ def _write_sweep(sweep: BiasSweep, is_replay: bool, lines: JsonLines | None, fig
         note(f"{sweep.name} = {point.value}: {words}")
         if lines is not None:
             lines.write({"bias": {"name": sweep.name, "value": point.value, **rates}})
-    words, value = proposal_words(sweep, is_replay), None if is_replay else proposed_value(sweep)
+    words, value = proposal_words(sweep), proposed_value(sweep)
     note(words)
     if lines is not None:
         lines.write({"proposed": {"name": sweep.name, "value": value, "text": words}})

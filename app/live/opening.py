@@ -64,13 +64,12 @@ def open_live(chosen: CameraChoice, choices: Choices) -> tuple[EventCamera, Sess
     if len(given) > 1:
         raise ParameterError(f"{' and '.join(given)} exclude each other: give one of them")
     if chosen.options != CameraOptions() and given in (["--replay"], ["--simulate"]):
-        raise ParameterError("--roi and --most-mev-s are of a camera that is plugged in: a recording has `convert --roi`")
+        raise ParameterError("--roi and --most-mev-s are of a camera alone: a recording has `convert --roi`")
     if chosen.replay is not None:
-        session = Session.open(chosen.replay, choices)
-        camera = replay_of(session, chosen)
         if chosen.biases is not None:
-            camera.set_biases(read_bias_values(chosen.biases))
-        return camera, session
+            raise ParameterError("--biases are of a camera: the events of a recording do not change with them any more")
+        session = Session.open(chosen.replay, choices)
+        return replay_of(session, chosen), session
     if chosen.loops or chosen.fault is not None:
         raise ParameterError("--loop and --fake are of a recording: give --replay FILE with them")
     opened: EventCamera
@@ -97,7 +96,7 @@ def opened_anew(camera: EventCamera) -> EventCamera:
 
 def replay_of(session: Session, chosen: CameraChoice) -> ReplayCamera:
     """A session's recording that plays like a camera, with the biases that its sidecar states."""
-    recording, stated = session.recording, session.sidecar.biases or BiasParameters()
+    recording, stated = session.recording, session.sidecar.biases
     return ReplayCamera(
         lambda: recording.chunks() if isinstance(recording, Recording) else [recording.read()],
         recording.width_px,
@@ -106,8 +105,7 @@ def replay_of(session: Session, chosen: CameraChoice) -> ReplayCamera:
         speed=chosen.speed,
         loops=chosen.loops,
         fault=chosen.fault,
-        bias_limits=bias_limits(),
-        biases=stated.as_dict(),
+        biases=None if stated is None else stated.as_dict(),
     )
 
 
@@ -131,17 +129,13 @@ def simulated_camera(choices: Choices, biases: BiasParameters, speed: float) -> 
     def simulate(values: Mapping[str, int]) -> EventBatch:
         return simulate_scene(scene, camera=optics, sensor=BiasParameters(**values)).events
 
+    limits = {name: (round(one.low or 0), round(one.high or 0)) for name, one in BiasParameters.tunables().items()}
     note("simulating the scene before the camera ...")
     return SimulatedCamera(
         simulate,
         round(SIMULATED_ROUND_S * 1e6),
         *SIMULATED_SIZE_PX,
-        bias_limits=bias_limits(),
+        bias_limits=limits,
         biases=biases.as_dict(),
         speed=speed,
     )
-
-
-def bias_limits() -> dict[str, tuple[int, int]]:
-    """Lowest and highest value of the biases of an EVK4."""
-    return {name: (round(one.low or 0), round(one.high or 0)) for name, one in BiasParameters.tunables().items()}

@@ -73,7 +73,7 @@ class BiasState:
     calibrated : bool
         Whether their meaning in physical units is calibrated.
     of_camera : bool
-        Whether they are those of a running camera, which a change acts on.
+        Whether they are those of a running camera, which a change acts on unless they are locked.
     """
 
     values: dict[str, int]

@@ -65,13 +65,15 @@ class EventCamera(ABC):
     width_px, height_px : int
         Size of the sensor.
     bias_limits : Mapping of str to (int, int)
-        Lowest and highest value of each bias, as the device states them.
+        Lowest and highest value of each bias that can be set, as the device states them.
     biases : Mapping of str to int
-        Present values.
+        Present values, as far as they are known.
+    without_biases : str
+        Why no bias can be set, for people; empty where some can.
     options : CameraOptions
         What it leaves out by itself.
     is_replay : bool
-        Whether its events are a recording's, which its biases do not change.
+        Whether its events are a recording's.
     can_wait : bool
         Whether it hands its events over whenever they are asked for, as no real camera does.
     """
@@ -86,6 +88,11 @@ class EventCamera(ABC):
     bias_limits: Mapping[str, tuple[int, int]]
     biases: Mapping[str, int]
 
+    @property
+    def without_biases(self) -> str:
+        """Reason for which no bias can be set."""
+        return "" if self.bias_limits else f"{self.name} has no biases that could be set"
+
     @abstractmethod
     def read(self) -> CameraPacket | None:
         """The next packet, after 50 ms at the latest, perhaps without events; None where no more come.
@@ -99,7 +106,7 @@ class EventCamera(ABC):
 
     def set_biases(self, biases: Mapping[str, int]) -> None:
         """Change some biases; raises CameraError for unknown ones and values beyond the device's limits."""
-        check_biases(biases, self.bias_limits, self.name)
+        check_biases(biases, self)
         self._apply_biases({**self.biases, **biases})
         self.biases = {**self.biases, **biases}
 
@@ -118,14 +125,16 @@ def check_region(roi_px: tuple[int, int, int, int], width_px: int, height_px: in
         )
 
 
-def check_biases(biases: Mapping[str, int], limits: Mapping[str, tuple[int, int]], name: str) -> None:
-    """Raise CameraError for biases that the device does not have, and values beyond its limits."""
+def check_biases(biases: Mapping[str, int], camera: EventCamera) -> None:
+    """Raise CameraError for biases that the device does not have or that cannot be set, and values out of range."""
+    if biases and camera.without_biases:
+        raise CameraError(camera.without_biases)
     for bias, value in biases.items():
-        if bias not in limits:
-            raise CameraError(f"{name} has no bias {bias!r}: it has {', '.join(limits) or 'none'}")
-        low, high = limits[bias]
+        if bias not in camera.bias_limits:
+            raise CameraError(f"{camera.name} has no bias {bias!r}: it has {', '.join(camera.bias_limits)}")
+        low, high = camera.bias_limits[bias]
         if not low <= value <= high:
-            raise CameraError(f"bias {bias} = {value} is out of range for {name}: {low} to {high}")
+            raise CameraError(f"bias {bias} = {value} is out of range for {camera.name}: {low} to {high}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,7 +204,7 @@ def open_camera(
             missing.append(str(error))
         except CameraError as error:
             problems.append(str(error))
-    raise CameraError("; ".join(problems) or f"{_without_driver(missing)}; `--replay FILE` and `--simulate` need no camera")
+    raise CameraError("; ".join(problems) or f"{_without_driver(missing)}; --replay FILE and --simulate need none")
 
 
 def listed_cameras() -> list[ListedCamera]:

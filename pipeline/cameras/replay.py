@@ -48,8 +48,8 @@ class ReplayCamera(EventCamera):
         Whether to begin anew at the end; the second round's times continue behind the first one's.
     fault : str, optional
         One of FAULTS, which comes every second of the recording.
-    bias_limits, biases : mapping
-        Biases that it pretends to have.
+    biases : mapping, optional
+        Those with which it was recorded, where they are known.
     """
 
     is_replay = True
@@ -64,7 +64,6 @@ class ReplayCamera(EventCamera):
         speed: float = 1.0,
         loops: bool = False,
         fault: str | None = None,
-        bias_limits: Mapping[str, tuple[int, int]] | None = None,
         biases: Mapping[str, int] | None = None,
     ) -> None:
         if not speed > 0.0:
@@ -72,7 +71,7 @@ class ReplayCamera(EventCamera):
         if fault is not None and fault not in FAULTS:
             raise ParameterError(f"there is no fault {fault!r}: there are {', '.join(FAULTS)}")
         self.name, self.serial, self.width_px, self.height_px = name, "replay", width_px, height_px
-        self.bias_limits, self.biases = dict(bias_limits or {}), dict(biases or {})
+        self.bias_limits, self.biases = {}, dict(biases or {})
         self._batches, self._speed, self._loops, self._fault = batches, speed, loops, fault
         self._random = np.random.default_rng(0)  # of bursts: the same every time
         self._begun_s: float | None = None
@@ -82,6 +81,14 @@ class ReplayCamera(EventCamera):
         self.can_wait = speed == float("inf")
         self._packet_us = PACKET_US if self.can_wait else max(PACKET_US, round(PACKET_US * speed))
         self._pieces = self._cut()
+
+    @property
+    def without_biases(self) -> str:
+        """Reason for which no bias can be set."""
+        return (
+            "biases act in the camera while it records: the events of a recording do not change with them any more. "
+            "`spinscope live --simulate` simulates a camera on which they act"
+        )
 
     def read(self) -> CameraPacket | None:
         """The next packet at its time; None at the end of a recording that is not looped."""
@@ -117,7 +124,7 @@ class ReplayCamera(EventCamera):
             raise CameraError(f"{self.name}: the camera was unplugged: plug it in again (replayed)")
 
     def _apply_biases(self, biases: Mapping[str, int]) -> None:
-        """A recording's events are what they are."""
+        """There are none that could be set."""
 
     def _packet(self, events: EventBatch, end_us: int, outside: int = 0) -> CameraPacket:
         if self._reset_us:

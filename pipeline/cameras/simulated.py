@@ -50,7 +50,7 @@ class SimulatedCamera(EventCamera):
             raise ParameterError(f"speed = {speed:g} is no speed: give a number above 0, 1 is real time")
         self.width_px, self.height_px = width_px, height_px
         self.bias_limits, self.biases = dict(bias_limits), dict(biases)
-        check_biases(self.biases, self.bias_limits, self.name)
+        check_biases(self.biases, self)
         self.can_wait = speed == float("inf")
         self._simulate, self._round_us, self._speed = simulate, round_us, speed
         self._end_us = 0

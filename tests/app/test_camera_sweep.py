@@ -17,7 +17,7 @@ from spinscope.app.live import headless
 from spinscope.app.live.camera_sweep import CameraSweep, proposal_words, proposed_value
 from spinscope.app.live.event_rates import EventRateMeter, EventRates
 from spinscope.app.tuning.bias_sweep import BiasSweep, BiasSweepPoint
-from spinscope.pipeline.cameras import CameraPacket, EventCamera
+from spinscope.pipeline.cameras import CameraPacket, EventCamera, ReplayCamera
 from spinscope.pipeline.errors import CameraError, ParameterError
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.live import session_of
@@ -52,6 +52,13 @@ class NoisyCamera(EventCamera):
         self.applied.append(dict(biases))
 
 
+def with_limits(**limits: tuple[int, int]) -> NoisyCamera:
+    """A camera with these biases."""
+    camera = NoisyCamera()
+    camera.bias_limits = limits
+    return camera
+
+
 def point(value: int, noise: float, on: float | None = None, off: float | None = None) -> BiasSweepPoint:
     return BiasSweepPoint(value=value, noise_on_hz=noise / 2, noise_off_hz=noise / 2, ball_on_hz=on, ball_off_hz=off)
 
@@ -68,8 +75,7 @@ def point(value: int, noise: float, on: float | None = None, off: float | None =
 def test_the_supplement_s_trade_off(points: list[BiasSweepPoint], value: int | None) -> None:
     sweep = BiasSweep("diff_on", len(points), points)
     assert proposed_value(sweep) == value
-    assert (f"= {value}" if value is not None else "no value") in proposal_words(sweep, is_replay=False)
-    assert "do not change with biases" in proposal_words(sweep, is_replay=True)
+    assert (f"= {value}" if value is not None else "no value") in proposal_words(sweep)
 
 
 def test_the_sweep_waits_for_the_camera_and_begins_a_value_anew_with_another_clock() -> None:
@@ -81,7 +87,7 @@ def test_the_sweep_waits_for_the_camera_and_begins_a_value_anew_with_another_clo
         asked.append((value, clock_us))
         return clock_us
 
-    sweep = CameraSweep("refr", {"refr": (0, 4)}, {"refr": 2}, set_biases, points=2, measured_s=0.05)
+    sweep = CameraSweep("refr", with_limits(refr=(0, 4)), {"refr": 2}, set_biases, points=2, measured_s=0.05)
     for start_us in [*range(0, 340_000, 5000), *range(0, 1_000_000, 5000)]:
         clock_us = start_us + 5000
         t_us = np.full(10, start_us)
@@ -100,10 +106,11 @@ def test_the_sweep_waits_for_the_camera_and_begins_a_value_anew_with_another_clo
         ({"name": "fo"}, CameraError, "it has refr"),
         ({"points": 1}, ParameterError, "2 to 25"),
         ({"measured_s": 0.0}, ParameterError, "above 0"),
+        ({"camera": ReplayCamera(list, 8, 6)}, CameraError, "do not change"),
     ],
 )
 def test_what_is_no_sweep(options: dict[str, Any], error: type[Exception], said: str) -> None:
-    given = {"name": "refr", "limits": {"refr": (0, 4)}, "present": {"refr": 2}, "set_biases": lambda biases: 0}
+    given = {"name": "refr", "camera": with_limits(refr=(0, 4)), "present": {"refr": 2}, "set_biases": lambda biases: 0}
     with pytest.raises(error, match=said):
         CameraSweep(**{**given, "points": 2, **options})
 

@@ -34,6 +34,7 @@ export class Biases extends EventTarget {
     const load = { type: "file", accept: ".bias,.json", hidden: true, onchange: () => attempt(() => this.#load()) };
     this.file = element("input", load);
     const options = this.state.swept.map(({ name, label }) => element("option", { value: name }, label));
+    const isFixed = this.state.of_camera && Boolean(this.state.locked); // nothing can be set or swept
     this.which = element("select", { "aria-label": "Bias to sweep" }, ...options);
     this.draw = element("button", { onclick: () => attempt(() => this.#sweep()) });
     this.text = element("div");
@@ -43,9 +44,9 @@ export class Biases extends EventTarget {
     parent.append(
       this.note,
       ...rows,
-      element("div.row", {}, open, save, this.stop, this.progress),
+      element("div.row", { hidden: isFixed }, open, save, this.stop, this.progress),
       this.file,
-      element("div.row", {}, this.which, this.draw),
+      element("div.row", { hidden: isFixed }, this.which, this.draw),
       this.charts,
       this.text,
     );
@@ -92,7 +93,7 @@ export class Biases extends EventTarget {
     const model = calibrated ? "" : " What a bias means in physical units is a model, not calibrated.";
     this.note.textContent = locked ??
       (ofCamera
-        ? "A moved slider sets the running camera."
+        ? `A moved slider sets the running camera.${model}`
         : `A moved slider simulates the scene again with the new setting.${model}`);
     this.draw.textContent = locked ? "Measure the folder's recordings" : "Sweep this bias";
     this.draw.title = locked

@@ -102,7 +102,7 @@ class InivationCamera(EventCamera):
         self.name = str(camera.getCameraName()).removesuffix(f"_{self.serial}")
         self.width_px, self.height_px = camera.getEventResolution()
         self.bias_limits, self.biases, self.options = {}, {}, options
-        check_biases(biases, self.bias_limits, self.name)
+        check_biases(biases, self)
         if options.most_mev_s is not None:
             raise CameraError(f"{self.name} has no limit of its event rate: leave out --most-mev-s")
         if options.roi_px is not None:

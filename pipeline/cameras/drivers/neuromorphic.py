@@ -124,7 +124,7 @@ class NeuromorphicCamera(EventCamera):
         self._configuration = self._limited(module, _configuration(module), options)
         own = self._configuration.biases
         self.biases = {name: int(getattr(own, name)) for name in self.bias_limits}
-        check_biases(biases, self.bias_limits, self.name)
+        check_biases(biases, self)
         self.options, self._dropped, self._end_us = options, 0, 0
         self._apply_biases({**self.biases, **biases})
         self.biases = {**self.biases, **biases}

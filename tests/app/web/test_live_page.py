@@ -25,6 +25,8 @@ class StandIn:
     """A camera with one bias, which says what was asked of it."""
 
     def __init__(self, window: Path) -> None:
+        self.locked: str | None = None
+        self.notices: list[str] = []
         self.window, self.asked = window, list[object]()
         self.recording: LiveRecording | None = None
 
@@ -38,7 +40,7 @@ class StandIn:
             kept_s=3.0,
             seconds=seconds,
             shots=shots,
-            notices=["unplugged"],
+            notices=self.notices,
             recording=self.recording,
         )
 
@@ -63,7 +65,8 @@ class StandIn:
 
     def bias_state(self) -> BiasState:
         ranges, swept = {"gain": BiasRange(0, 9, 3, "gain")}, [SweptBias("gain", "gain", ["gain"])]
-        return BiasState({"gain": 3}, True, None, True, ranges, swept, of_camera=True)
+        swept = swept if self.locked is None else []
+        return BiasState({"gain": 3}, True, self.locked, True, ranges, swept, of_camera=True)
 
     def set_biases(self, biases: Mapping[str, int]) -> None:
         if biases["gain"] > 9:
@@ -130,6 +133,7 @@ def test_the_buttons_of_the_panel(browser: Any, running: tuple[Served, StandIn])
     tab.open(made.address)
     panel = tab.panel("Live camera")
     panel.get_by_text("2 packets lost by the camera").wait_for()
+    live.notices = ["unplugged"]
     tab.page.locator("#notices").get_by_text("unplugged").wait_for()
     assert panel.locator("svg path").count() == 8
     tab.until("document.querySelector('img.live').naturalWidth === 64")
@@ -151,3 +155,19 @@ def test_the_buttons_of_the_panel(browser: Any, running: tuple[Served, StandIn])
     tab.until(f"location.hash.includes('recording={live.window.name}')")
     tab.page.close()
     assert live.asked == [Parameters().logo.pad_px, {"gain": 4}, ("serve", True), 10.0] and not tab.errors
+
+
+@needs_browser[0]
+@needs_browser[1]
+def test_biases_that_cannot_act_are_shown_and_cannot_be_moved(browser: Any, running: tuple[Served, StandIn]) -> None:
+    made, live = running
+    live.locked = "the events of a recording do not change"
+    tab = Tab(browser.new_page())
+    tab.page.route(re.compile(r"re_viewer_bg\.wasm"), lambda route: route.abort())
+    tab.open(made.address)
+    panel = tab.panel("Biases")
+    assert panel.locator(".note").first.text_content() == live.locked
+    assert panel.locator("[data-bias=gain] input:enabled").count() == 0
+    assert panel.locator("button:visible, select:visible").count() == 0
+    tab.page.close()
+    assert not live.asked and not tab.errors

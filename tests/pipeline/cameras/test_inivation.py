@@ -130,7 +130,7 @@ def test_it_hands_over_often_and_waits_for_no_frames(library: Any) -> None:
     [
         (CameraOptions((600, 0, 50, 50)), {}, "outside the sensor of 640 x 480 px"),
         (CameraOptions(most_mev_s=1.0), {}, "no limit of its event rate"),
-        (CameraOptions(), {"diff_on": 1}, "has no bias 'diff_on': it has none"),
+        (CameraOptions(), {"diff_on": 1}, "has no biases that could be set"),
     ],
 )
 def test_what_a_device_does_not_have(library: Any, options: CameraOptions, biases: dict[str, int], said: str) -> None:
