@@ -135,8 +135,9 @@ class ReplayCamera(EventCamera):
         if self._begun_s is None:
             self._begun_s = now_s()
         if self._speed != float("inf"):
-            due_s = self._begun_s + (end_us - self._start_us) * 1e-6 / self._speed
-            time.sleep(max(due_s - now_s(), 0.0))
+            wait_s = self._begun_s + (end_us - self._start_us) * 1e-6 / self._speed - now_s()
+            if wait_s > 0.0:  # a sleep of 0 s waits for Python's lock, 5 ms a thread that computes
+                time.sleep(wait_s)
 
     def _cut(self) -> Generator[_Piece, None, None]:
         """Cut the recording into packets of PACKET_US, round by round."""

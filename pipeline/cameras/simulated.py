@@ -58,7 +58,9 @@ class SimulatedCamera(EventCamera):
 
     def read(self) -> CameraPacket:
         """The next packet at its time: a scene has no end."""
-        time.sleep(max(self._due_s() - now_s(), 0.0))
+        wait_s = self._due_s() - now_s()
+        if wait_s > 0.0:  # a sleep of 0 s waits for Python's lock, 5 ms a thread that computes
+            time.sleep(wait_s)
         round_start_us, start_us = self._end_us - self._end_us % self._round_us, self._end_us % self._round_us
         events = self._events.between(start_us, start_us + PACKET_US)
         self._end_us += PACKET_US

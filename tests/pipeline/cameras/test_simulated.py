@@ -60,6 +60,10 @@ def test_it_keeps_to_its_pace_and_does_not_hurry_after_a_simulation(monkeypatch:
     for _ in range(2):
         made.read()
     assert slept == pytest.approx([0.002] * 5)
+    clock[0] += 0.005  # late: it hurries, and sleeps no more until it has caught up
+    for _ in range(3):
+        made.read()
+    assert slept[5:] == pytest.approx([0.001])
 
 
 def test_what_it_cannot_do() -> None:
