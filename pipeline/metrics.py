@@ -87,8 +87,8 @@ class ShotMetrics:
     start_us: int
     end_us: int
     logo_events: int
-    speed_m_s: float | None = _metric("Speed", "m/s", "Mean speed of the ball over the shot with the most logo events.")
-    radius_px: float | None = _metric("Radius", "px", "Median radius of the ball over that shot.")
+    speed_m_s: float | None = _metric("Speed", "m/s", "Mean speed of the ball over the shot.")
+    radius_px: float | None = _metric("Radius", "px", "Median radius of the ball over the shot.")
     best: str | None
     best_reason: str | None
     kind: str | None

@@ -63,17 +63,18 @@ def series(result: Result, suffix: str) -> bytes:
         return path.read_bytes()
 
 
-def as_rrd(result: Result) -> bytes:
+def as_rrd(result: Result, followed: int | None) -> bytes:
     """Run with its layouts as .rrd, as `spinscope view --save` writes it."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "run.rrd"
-        save(result, path)
+        save(result, path, followed=followed)
         return path.read_bytes()
 
 
-def figure(result: Result, suffix: str, pinned: Result | None) -> bytes:
+def figure(result: Result, suffix: str, followed: int | None, pinned: Result | None) -> bytes:
     """Figure of the series for a publication; `suffix` is its format's."""
-    return series_figure(ViewedRun.of(result), suffix, None if pinned is None else ViewedRun.of(pinned))
+    a = None if pinned is None else ViewedRun.of(pinned, followed)
+    return series_figure(ViewedRun.of(result, followed), suffix, a)
 
 
 def event_picture(events: EventBatch, width_px: int, height_px: int) -> bytes:
@@ -104,22 +105,22 @@ class Export:
     label : str
         For people.
     make : callable
-        `make(result) -> content`; `make(result, pinned=A)` where it `compares`.
+        `make(result) -> content`, with what it `takes` by keyword.
     media_type, suffix : str
         Of the file.
-    compares : bool
-        Whether it shows a pinned result A beside the present one.
+    takes : tuple of str
+        Attributes of the runner that it shows besides: `followed`, and `pinned` where A is shown beside the result.
     """
 
     label: str
     make: Callable[..., str | bytes]
     media_type: str
     suffix: str
-    compares: bool = False
+    takes: tuple[str, ...] = ()
 
 
 EXPORTS = {
-    "run.rrd": Export("Recording with layout (.rrd)", as_rrd, "application/octet-stream", "rrd"),
+    "run.rrd": Export("Recording with layout (.rrd)", as_rrd, "application/octet-stream", "rrd", ("followed",)),
     "results.json": Export("Results (JSON)", as_json, "application/json", "json"),
     "spins.csv": Export("Spin of every method (CSV)", spins_csv, "text/csv", "spins.csv"),
     "series.csv": Export("Series of every tick (CSV)", partial(series, suffix=".csv"), "text/csv", "series.csv"),
@@ -130,9 +131,9 @@ EXPORTS = {
         "series.parquet",
     ),
     "series.svg": Export(
-        "Figure of the series (SVG)", partial(figure, suffix=".svg"), "image/svg+xml", "series.svg", compares=True
+        "Figure of the series (SVG)", partial(figure, suffix=".svg"), "image/svg+xml", "series.svg", ("followed", "pinned")
     ),
     "series.pdf": Export(
-        "Figure of the series (PDF)", partial(figure, suffix=".pdf"), "application/pdf", "series.pdf", compares=True
+        "Figure of the series (PDF)", partial(figure, suffix=".pdf"), "application/pdf", "series.pdf", ("followed", "pinned")
     ),
 }

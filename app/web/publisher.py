@@ -6,7 +6,7 @@ import base64
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from typing import Any, Literal
 
 from spinscope.app.tuning.parameter_sweep import sensible_highs
@@ -28,7 +28,7 @@ from .schemas import Picture, PreviewMessage, RunMessage, RunRequest
 # A client learns of a run's progress this often, and not at all of one that is over at once: every change of the page
 # has the browser put the whole picture together anew, in the very time in which it is waited for.
 REPORT_S, QUIET_S = 0.05, 0.3
-PICTURES_KEPT = 3
+PICTURES_BYTES, PICTURES_LEAST = 32_000_000, 3  # kept for the way back: some ten settings of a flight of 100 ms
 DRAWING = "drawing"  # counted beside the stages
 
 State = Literal["loading", "computing", "drawing", "partial", "done", "failed"]
@@ -87,41 +87,40 @@ class Publisher:
     def __init__(self, session_id: str, queue: MessageQueue, drawings: DrawingCache) -> None:
         self.drawings = drawings
         self._session_id, self._queue = session_id, queue
-        self._pictures: OrderedDict[str, bytes] = OrderedDict()
+        self._pictures: OrderedDict[Hashable, tuple[Picture, bytes]] = OrderedDict()  # by what they show
 
     def report(self, request: RunRequest) -> RunReport:
         """Report on a new request."""
         return RunReport(self._queue, request.serial)
 
     def picture(self, picture_id: str) -> bytes | None:
-        """Bytes of a picture; None where a newer one has taken its place."""
-        return self._pictures.get(picture_id)
+        """Bytes of a picture; None where newer ones have taken its place."""
+        return next((content for made, content in tuple(self._pictures.values()) if made.id == picture_id), None)
 
     def draw(self, b: Result, a: Result | None, report: RunReport, *, followed: int | None, partial: bool) -> Picture:
-        """Draw a run with a shot followed, beside that of A if there is one, and keep the picture."""
+        """Draw a run with a shot followed, beside that of A if there is one; the picture kept of the same, if any."""
         report.tell("drawing", 1.0)
         began_s = time.perf_counter()
-        run = ViewedRun.of(b, followed)
-        chunks = self._chunks(b, run)
-        if a is None:
-            chunks += note_without_a(run)
+        results = (b,) if a is None else (b, a)
+        runs = [ViewedRun.of(result, followed) for result in results]
+        shown = tuple(map(_shown, results, runs))
+        if shown in self._pictures:
+            self._pictures.move_to_end(shown)
+            picture, _ = self._pictures[shown]
         else:
-            run_a = ViewedRun.of(a, followed)
-            chunks += [*compared(self._chunks(a, run_a)), *difference_chunks(run_a, run)]
-            chunks += note_with_a(run, _difference_text(a, b))
-        picture_id = f"{self._session_id}-{report.serial}{f'-part{len(b.ticks)}' if partial else ''}"
-        content = rrd_bytes(chunks, picture_id)
+            picture_id = f"{self._session_id}-{report.serial}{f'-part{len(b.ticks)}' if partial else ''}"
+            content = rrd_bytes(self._all_chunks(results, runs), picture_id)
+            picture = Picture(
+                id=picture_id,
+                size_bytes=len(content),
+                start_us=runs[0].start_us,
+                end_us=runs[0].end_us,
+                opening_us=runs[0].opening_us,
+            )
+            self._pictures[shown] = picture, content
+            self._keep_budget()
         report.add({DRAWING: time.perf_counter() - began_s})
-        self._pictures[picture_id] = content
-        while len(self._pictures) > PICTURES_KEPT:
-            self._pictures.popitem(last=False)
-        return Picture(
-            id=picture_id,
-            size_bytes=len(content),
-            start_us=run.start_us,
-            end_us=run.end_us,
-            opening_us=run.opening_us,
-        )
+        return picture
 
     def publish(
         self,
@@ -148,8 +147,30 @@ class Publisher:
             }
         report.tell("partial" if partial else "done", 1.0, force=True, picture=picture, **content)
 
+    def _all_chunks(self, results: Sequence[Result], runs: Sequence[ViewedRun]) -> list[Any]:
+        """Everything there is to see of B, and of A beside it where it is pinned."""
+        (b, *pinned), (run, *runs_a) = results, runs
+        chunks = self._chunks(b, run)
+        if not pinned:
+            return chunks + note_without_a(run)
+        chunks += [*compared(self._chunks(pinned[0], runs_a[0])), *difference_chunks(runs_a[0], run)]
+        return chunks + note_with_a(run, _difference_text(pinned[0], b))
+
+    def _keep_budget(self) -> None:
+        """Drop the pictures that were not asked for longest."""
+        while len(self._pictures) > PICTURES_LEAST:
+            if sum(picture.size_bytes for picture, _ in self._pictures.values()) <= PICTURES_BYTES:
+                return
+            self._pictures.popitem(last=False)
+
     def _chunks(self, result: Result, run: ViewedRun) -> list[Any]:
         return self.drawings.chunks(run, result.session.chain.keys(result.session.parameters))
+
+
+def _shown(result: Result, run: ViewedRun) -> Hashable:
+    """What a picture of the run shows: equal values, equal pictures."""
+    session = result.session
+    return session.chain.source.identity, session.parameters, len(run.ticks), run.stages, run.followed
 
 
 def _difference_text(a: Result, b: Result) -> str:

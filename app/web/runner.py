@@ -35,12 +35,15 @@ class Runner:
         What is run; another one takes its place when the scene is simulated again.
     result, pinned : Result or None
         Results of the last request that was completed: B, and A beside it.
+    followed : int or None
+        Number of the shot that it followed.
     """
 
     def __init__(self, recording: OpenRecording, requests: RequestQueue, publisher: Publisher) -> None:
         self.recording = recording
         self.result: Result | None = None
         self.pinned: Result | None = None
+        self.followed: int | None = None
         self._requests, self._publisher = requests, publisher
         self._slow = ThreadPoolExecutor(1, "slow stages")
         self._thread = threading.Thread(target=self._work, name="runner", daemon=True)
@@ -78,6 +81,7 @@ class Runner:
                 if request.pinned is not None:
                     a = Result.of(_with(clip, request.pinned), list(self._ticks(clip, request.pinned, request, report)))
                 self.result, self.pinned = self._complete(clip, request, report, a), a
+                self.followed = request.followed
                 self._show(self.result, a, request, report)
         except Superseded:
             return

@@ -184,7 +184,7 @@ def _add_exports(app: FastAPI, session_of: SessionOf) -> None:
             raise HTTPException(404, f"there is no {name}: there are {', '.join(exports.EXPORTS)}")
         if session.runner.result is None:
             raise HTTPException(409, "nothing has been computed yet")
-        beside = {"pinned": session.runner.pinned} if made.compares else {}
+        beside = {name: getattr(session.runner, name) for name in made.takes}
         content = await run_in_threadpool(made.make, session.runner.result, **beside)
         stem = "".join(c if c.isalnum() or c in "-_." else "_" for c in session.runner.recording.original.stem)
         headers = {"content-disposition": f'attachment; filename="{stem}.{made.suffix}"'}

@@ -248,14 +248,15 @@ class Control {
     const inBox = event.target === this.box;
     if (inBox && ["ArrowLeft", "ArrowRight", "Home", "End"].includes(event.key)) return;
     if (this.kind === "numbers" || event.ctrlKey || event.metaKey || event.altKey) return;
+    const high = inBox ? this.high : this.top;
     /** @type {number | null} */
     let value = null;
     if (event.key in steps) value = (this.settings.get(this.name) ?? this.low) + steps[event.key] * this.step;
     else if (event.key === "Home") value = this.low;
-    else if (event.key === "End") value = this.high;
+    else if (event.key === "End") value = high;
     if (value === null) return;
     event.preventDefault();
-    value = Math.min(Math.max(value, this.low), this.high);
+    value = Math.min(Math.max(value, this.low), high);
     value = Number(value.toPrecision(12));
     // A key that is held down moves on like a drag.
     this.stepping = true;

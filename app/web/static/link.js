@@ -73,11 +73,12 @@ export function carriedSettings({ settings, opening }) {
 export function linked() {
   const words = new URLSearchParams(location.hash.slice(1));
   const clip = (words.get("clip") ?? "").match(/^(-?\d+)-(-?\d+)$/);
+  const time = (words.get("t") ?? "").match(/^-?\d+$/);
   const biases = words.getAll("bias").map((text) => text.split(":"));
   return {
     recording: words.get("recording"),
     clip: clip && /** @type {[number, number]} */ ([Number(clip[1]), Number(clip[2])]),
-    time_us: Number(words.get("t")) || null,
+    time_us: time && Number(time[0]),
     tab: words.get("tab"),
     preset: words.get("preset") ?? "opened",
     followed: Number(words.get("shot")) || null,

@@ -213,7 +213,7 @@ function addTools(/** @type {Opening} */ opening) {
   byId("preset").replaceChildren(...options);
   byId("preset").onchange = (/** @type {any} */ { target }) => settings.takePreset(target.value, presets[target.value]);
   if (opening.is_live) app.live = new Live(panel("Live camera", true), app);
-  app.results = new Results(panel("Result", true), opening);
+  app.results = new Results(panel("Result", true), app);
   app.sweep = new Sweep(panel("Parameter sweep"), app);
   app.optimization = new Optimization(panel("Optimization"), app);
   app.ball = new Ball(panel("Fixed ball"), app);

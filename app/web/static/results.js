@@ -1,6 +1,8 @@
-// Results in numbers: B alone, or A and B beside each other with what differs. Event: `shown`.
+// Results in numbers of the shot that is seen: B alone, or A and B beside each other with what differs. Event: `shown`.
 
 /** @import { EstimateMetrics, MetricInfo, Opening, RunMessage, RunMetrics, ShotMetrics } from "./messages.d.ts" */
+/** @import { RunRequests } from "./server.js" */
+/** @import { Viewer } from "./viewer.js" */
 
 import { element, milliseconds, number } from "./elements.js";
 
@@ -10,43 +12,105 @@ const WITNESS_HELP =
 const AXIS_HELP = "Unit vector in the camera frame (x right, y down, z into the scene), right-hand rule; ± 1 sigma.";
 
 export class Results extends EventTarget {
-  /** @type {string | null} of the largest shot, for the coach */
+  /** @type {string | null} of the shot that is seen, for the coach */
   sentence = null;
+  /** @type {RunMessage | null} */
+  #latest = null;
+  /** @type {string} the shots that are told of: their numbers in A and B */
+  #told = "";
   /** @type {Set<string>} of all runs so far: what is still being computed keeps its place */
   #methods = new Set();
 
-  constructor(/** @type {any} */ parent, /** @type {Opening} */ opening) {
+  /**
+   * @param {any} parent
+   * @param {{opening: Opening, viewer: Viewer, runner: RunRequests}} app
+   */
+  constructor(parent, { opening, viewer, runner }) {
     super();
     this.parent = parent;
     this.opening = opening;
+    this.viewer = viewer;
+    this.runner = runner;
+    viewer.addEventListener("moved", () => {
+      if (this.#latest && this.#told !== String(this.#both.map((one) => this.#seen(one)))) this.show(this.#latest);
+    });
   }
 
-  show(/** @type {RunMessage} */ { metrics, pinned_metrics, costs_ms, pinned_costs_ms, differences }) {
+  // Metrics of A, where it is pinned, and of B.
+  get #both() {
+    const { metrics, pinned_metrics } = /** @type {RunMessage} */ (this.#latest);
+    return /** @type {RunMetrics[]} */ ([pinned_metrics, metrics].filter(Boolean));
+  }
+
+  /**
+   * Place of the shot in the list that the detail views show at the playhead: the followed one, or the first of those
+   * in flight; between two flights the one before.
+   * @param {RunMetrics} metrics
+   */
+  #seen({ shots }) {
+    const { followed } = this.runner;
+    if (followed !== null && followed <= shots.length) return followed - 1;
+    const at_us = this.viewer.playhead_us ?? this.#latest?.picture?.opening_us ?? 0;
+    const flying = shots.findIndex(({ start_us, end_us }) => start_us <= at_us && at_us <= end_us);
+    return flying >= 0 ? flying : Math.max(shots.findLastIndex(({ end_us }) => end_us < at_us), 0);
+  }
+
+  show(/** @type {RunMessage} */ message) {
+    const { metrics, pinned_metrics, costs_ms, pinned_costs_ms, differences } = message;
     if (!metrics) return;
-    const both = pinned_metrics ? [pinned_metrics, metrics] : [metrics];
+    this.#latest = message;
+    const both = this.#both;
+    const places = both.map((one) => this.#seen(one));
+    this.#told = String(places);
+    const shots = both.map((one, i) => one.shots[places[i]] ?? null);
     const costs = pinned_metrics ? [pinned_costs_ms, costs_ms] : [costs_ms];
     for (const { spin } of both.flatMap(({ shots }) => shots)) {
       for (const name of Object.keys(spin)) this.#methods.add(name);
     }
-    const parts = pinned_metrics ? [differing(differences)] : [];
-    parts.push(this.#table(both, costs.map((cost) => Object.values(cost ?? {}).reduce((a, b) => a + b, 0))));
+    const parts = shots.flatMap((shot, i) => this.#answer(shot, both.length > 1 ? "AB"[i] : ""));
+    if (pinned_metrics) parts.push(differing(differences));
+    const all_ms = costs.map((cost) => Object.values(cost ?? {}).reduce((a, b) => a + b, 0));
+    const counts = both.map(({ shots: all }, i) => all.length > 1 ? `${places[i] + 1} of ${all.length}` : "");
+    parts.push(this.#table(both, shots, counts, all_ms));
     for (const reason of new Set(both.map((one) => one.no_shot_reason ?? "").filter(Boolean))) {
       parts.push(element("p.note", {}, sentence(reason)));
-    }
-    for (const reason of new Set(both.map((one) => mainShot(one)?.best_reason).filter(Boolean))) {
-      parts.push(element("p.note", {}, `No spin is trusted: ${reason}`));
     }
     for (const doubt of new Set(both.map((one) => one.up_doubt).filter(Boolean))) {
       parts.push(element("p.note", {}, `Warning: ${doubt}`));
     }
     this.parent.replaceChildren(...parts);
-    this.sentence = mainShot(metrics)?.sentence ?? null;
+    this.sentence = shots.at(-1)?.sentence ?? null;
     this.dispatchEvent(new CustomEvent("shown"));
   }
 
-  #table(/** @type {RunMetrics[]} */ both, /** @type {number[]} */ costs_ms) {
+  /**
+   * The trusted answer of the whole shot in a sentence, or why there is none.
+   * @param {ShotMetrics | null} shot
+   * @param {string} which of A and B
+   */
+  #answer(shot, which) {
+    if (!shot) return [];
+    const isEarly = [...this.#methods].some((name) => !shot.spin[name]);
+    const method = this.opening.methods.find(({ name }) => name === shot.best)?.label;
+    const source = method ? `whole shot, by ${method}` : isEarly ? "slower methods still to come" : "whole shot";
+    const heading = element(
+      "p.answer",
+      {},
+      `${which && `${which}: `}${shot.sentence}`,
+      element("span", {}, ` · ${source}`),
+    );
+    const reason = method || isEarly ? null : shot.best_reason;
+    return reason ? [heading, element("p.note", {}, `No spin is trusted: ${reason}`)] : [heading];
+  }
+
+  /**
+   * @param {RunMetrics[]} both
+   * @param {(ShotMetrics | null)[]} shots those seen of A and B
+   * @param {string[]} counts which of how many they are
+   * @param {number[]} costs_ms
+   */
+  #table(both, shots, counts, costs_ms) {
     const { run_metrics, shot_metrics, methods, estimate_metrics } = this.opening;
-    const shots = both.map(mainShot);
     const rows = [
       ...run_metrics.map((metric) => row(metric.label, compared(both, metric), metric.help)),
       ...shot_metrics.map((metric) => row(metric.label, compared(shots, metric), metric.help)),
@@ -78,9 +142,8 @@ export class Results extends EventTarget {
     }
     rows.push(...witnessRows(shots));
     rows.push(row("Computing time", costs_ms.map(milliseconds), "All stages, when they were last computed."));
-    const counts = both.map(({ shots: all }) => (all.length > 1 ? `${all.length} shots, the largest` : ""));
     const columns = both.length > 1 ? ["A", "B"] : [""];
-    const names = columns.map((c, i) => [c, counts[i]].filter(Boolean).join(": "));
+    const names = columns.map((c, i) => [c, counts[i] && `shot ${counts[i]}`].filter(Boolean).join(": "));
     if (both.length > 1) names.push("B − A");
     const heading = headings("Whole shot", names);
     heading.title = "All results here are of the whole shot; the pictures show what is known so far at the playhead.";
@@ -106,17 +169,6 @@ function witnessRows(shots) {
     return row(name.replace(/^the /, ""), [...words, ...more], WITNESS_HELP);
   });
   return [element("tr.method", {}, heading), ...rows];
-}
-
-/**
- * @param {RunMetrics} metrics
- * @returns {ShotMetrics | null}
- */
-export function mainShot({ shots }) {
-  return shots.reduce(
-    (/** @type {ShotMetrics | null} */ best, shot) => (best && best.logo_events >= shot.logo_events ? best : shot),
-    null,
-  );
 }
 
 function differing(/** @type {[string, any, any][]} */ differences) {

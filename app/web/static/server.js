@@ -325,7 +325,7 @@ export class RunRequests extends EventTarget {
       const content = await this.connection.bytes(`pictures/${picture.id}`);
       if (this.#latest !== picture.id) return false;
       if (isWhole || !this.#hasLayout) await this.#fit();
-      const opening_us = (!this.#hasLayout && this.start.time_us) || picture.opening_us;
+      const opening_us = (this.#hasLayout ? null : this.start.time_us) ?? picture.opening_us;
       if (!(await this.viewer.show(content, picture.id, opening_us))) return false;
       if (!this.#hasLayout) await this.#laidOut();
       this.#hasLayout = true;

@@ -110,7 +110,7 @@ export class Sweep {
       label: `${name} = ${x(value)}`,
       ...more,
     });
-    this.note.textContent = name;
+    this.note.textContent = `${name}; spins of the shot with the most logo events`;
     for (const { name: metric, label, unit: own } of this.opening.estimate_metrics) {
       const series = this.opening.methods.map((method) => ({
         name: method.name.replaceAll("_", " "),

@@ -177,6 +177,7 @@ export class Viewer extends EventTarget {
     this.#newest = id;
     return this.#next(async () => {
       if (this.#newest !== id) return false;
+      if (this.#shown === id) return true; // the way back came before what it leads back from
       const taken = this.#taken_in(id);
       this.#sent.add(id);
       this.#channel.send_rrd(bytes);

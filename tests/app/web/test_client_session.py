@@ -16,11 +16,12 @@ from spinscope.app.web.client_session import ClientSession
 from spinscope.app.web.jobs import Job, error_text
 from spinscope.app.web.message_queue import MessageQueue, RequestQueue, Superseded
 from spinscope.app.web.open_recording import OpenRecording
+from spinscope.app.web.publisher import PICTURES_LEAST
 from spinscope.app.web.schemas import BiasesMessage, Picture, RunMessage, RunRequest, ServerMessage, ShotsMessage
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.session import Choices
 
-from .conftest import Client
+from .conftest import Client, Served
 
 
 @pytest.fixture(scope="module")
@@ -185,6 +186,22 @@ def test_a_dragged_slider_gets_a_picture_without_the_slowest_stage_first(
     told.clear()
     client.run({"logo": {"pad_px": 3.3}}, interactive=True)
     assert not [m for m in told if m["state"] == "partial"]
+
+
+def test_the_way_back_finds_the_picture_that_was_made(
+    client: Client, tuner: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def picture(pad_px: float, **more: Any) -> tuple[str, bytes]:
+        made = client.run({"logo": {"pad_px": pad_px}}, **more)["picture"]["id"]
+        return made, client.http.get(client.path(f"pictures/{made}")).content
+
+    first, other, pinned = picture(3.1), picture(3.2), picture(3.1, pinned={})
+    assert len({first, other, pinned}) == 3
+    assert picture(3.1) == first and picture(3.1, pinned={}) == pinned
+    monkeypatch.setattr("spinscope.app.web.publisher.PICTURES_BYTES", 1)
+    kept = [picture(pad_px)[0] for pad_px in (3.3, 3.4, 3.5, 3.6)][-PICTURES_LEAST:]
+    publisher = tuner.state.sessions[client.opening["session"]].publisher
+    assert [one for one in (first[0], *kept) if publisher.picture(one)] == kept
 
 
 def test_the_background_makes_way_while_somebody_waits(
