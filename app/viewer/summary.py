@@ -103,14 +103,21 @@ class _TickState:
         ]
 
     def _table(self) -> list[str]:
-        """Table of every method's answer or refusal, and of the truth where there is one."""
+        """Table of every method's answer, and of the truth where there is one; below it why the others refuse.
+
+        A reason in the table would push the axes out of sight.
+        """
         lines = ["| method | spin [rps] | axis (x, y, z) |", "|---|---|---|"]
         for method in self.run.methods:
             estimate = self.tick.estimates[method.name]
             name = f"**{method.label} ✔**" if self.tick.best == method.name else method.label
             lines.append(f"| {name} | {_magnitude(estimate)} | {axis_words(estimate)} |")
         reason, combined = self.tick.balls[0].best_reason, self.tick.get("combined")
-        notes = [] if combined is None or not combined.summary else [f"Combined: {combined.summary}.", ""]
+        notes = []
+        for method in self.run.methods:
+            if (refusal := self.tick.estimates[method.name].reason) is not None:
+                notes += [f"{method.label} refused: {refusal}.", ""]
+        notes += [] if combined is None or not combined.summary else [f"Combined: {combined.summary}.", ""]
         notes += [] if reason is None else [f"No spin is trusted: {reason}.", ""]
         return [*lines, *self._truth_rows(), "", *notes]
 
@@ -155,14 +162,17 @@ def _shot_table(run: ViewedRun) -> list[str]:
     if len(run.shots) < 2:
         return []
     lines = ["| shot | ms | began | spin [rps] | axis (x, y, z) | ended |", "|---|---|---|---|---|---|"]
+    notes = []
     for number, shot in enumerate(run.shots, 1):
         span = f"{shot.start_us / 1000:.0f} to {shot.end_us / 1000:.0f}"
-        spin, axis = f"not known: {shot.best_reason}", "-"
-        if shot.best is not None:
+        spin, axis = "not known", "-"
+        if shot.best is None:
+            notes += [f"Shot {number}: no spin is trusted: {shot.best_reason}.", ""]
+        else:
             spin, axis = _magnitude(shot.estimates[shot.best]), axis_words(shot.estimates[shot.best])
         began, ended = BEGAN_WORDS[shot.began_by], ENDED_WORDS[shot.ended_by]
         lines.append(f"| {number} | {span} | {began} | {spin} | {axis} | {ended} |")
-    return [*lines, ""]
+    return [*lines, "", *notes]
 
 
 def _true_spins(run: ViewedRun) -> list[Vector | None]:
@@ -221,7 +231,7 @@ def _without_ball(run: ViewedRun, tick: Tick, result: list[str]) -> list[str]:
 def _magnitude(estimate: SpinEstimate) -> str:
     magnitude, std = estimate.magnitude_rps, estimate.magnitude_std_rps
     if magnitude is None:
-        return f"refused: {estimate.reason}"
+        return "refused"
     return f"{magnitude:.1f}" if std is None else f"{magnitude:.1f} ± {std_words(std)}"
 
 

@@ -43,9 +43,10 @@ def summarize(path: Path, choices: Choices, on_progress: Progress | None = None)
     except Exception as error:  # noqa: BLE001  # whatever one file does, the others are listed
         return RecordingSummary(error=f"{type(error).__name__}: {error}")
     best = metrics.main_shot
-    return summary.model_copy(
-        update={"shots": len(metrics.shots), "spin": best.sentence if best else metrics.no_shot_reason}
-    )
+    spin = metrics.no_shot_reason if best is None else best.sentence
+    if best is not None and best.best_reason is not None:
+        spin = f"{best.sentence}: {best.best_reason}"
+    return summary.model_copy(update={"shots": len(metrics.shots), "spin": spin})
 
 
 def _small(picture: bytes) -> bytes:

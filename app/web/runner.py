@@ -99,7 +99,7 @@ class Runner:
         is_fast_first = request.interactive and not all(chain.knows(parameters, stage) for stage in chain.stages)
         whole = None if is_fast_first else self._slow.submit(self._whole, clip, request, report)
         ticks: list[Tick] = []
-        is_previewed = not request.interactive and playhead_us is not None  # the page has the picture soon
+        is_previewed = not request.has_preview
         for tick in self._ticks(clip, parameters, request, report, quick_stages()):
             ticks.append(tick)
             if not is_previewed and playhead_us is not None and tick.packet.end_us >= playhead_us:

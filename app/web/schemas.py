@@ -40,7 +40,8 @@ class OpenRequest(Request):
 class RunRequest(Request):
     """Run a clip with `parameters`, beside those pinned as A; the request with the highest serial is the newest.
 
-    While a slider is being dragged (`interactive`) a picture without the slowest stages comes first. The detail views
+    While a slider is being dragged (`interactive`) a picture without the slowest stages comes first. A preview, at the
+    playhead or where the viewer would open, comes before all pictures unless `has_preview` is false. The detail views
     follow the ball of shot number `followed`, from 1, while it flies; by default the tracker's first ball.
     """
 
@@ -51,6 +52,7 @@ class RunRequest(Request):
     end_us: Microseconds
     playhead_us: float | None = Field(default=None, allow_inf_nan=False)
     interactive: bool = False
+    has_preview: bool = True
     followed: int | None = Field(default=None, ge=1)
 
 

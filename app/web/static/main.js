@@ -59,8 +59,7 @@ async function start() {
   const { recording, presets } = opening;
   settings.start(snapshot(link));
   settings.fallback = { parameters: presets.opened, clip: recording.clip_us };
-  const first = { tab: link.tab ?? opening.tab, hasTools, time_us: link.time_us };
-  app.runner = new RunRequests(connection, settings, viewer, first);
+  app.runner = new RunRequests(connection, settings, viewer, { tab: link.tab ?? opening.tab, hasTools });
   app.runner.followed = link.followed ?? opening.followed;
   app.overview = new Overview(byId("overview"), recording);
   app.bar = new Bar(byId("bar"), opening.stages);
@@ -76,6 +75,7 @@ async function start() {
     const others = "`spinscope view --native` or `--save FILE.rrd` work without WebAssembly and WebGL";
     notice(`The viewer cannot run in this browser: ${error.message}; ${others}.`);
   });
+  if (link.time_us !== null) viewer.place(link.time_us);
   if (hasTools && Object.keys(link.biases).length) app.biases.take(link.biases);
   app.runner.request(true);
 }

@@ -116,7 +116,7 @@ export type RunMessage = { kind: "run"; serial: number; state: "loading" | "comp
 /** Metrics of a run over all its shots. */
 export type RunMetrics = { ticks: number; tracked_share: number; residual_px: number | null; jitter_px: number | null; logo_events: number; shots: ShotMetrics[]; no_shot_reason: string | null; up_doubt: string | null };
 /** Run a clip with `parameters`, beside those pinned as A; the request with the highest serial is the newest. */
-export type RunRequest = { serial: number; parameters: Record<string, Record<string, any>>; pinned?: Record<string, Record<string, any>> | null; start_us: number; end_us: number; playhead_us?: number | null; interactive?: boolean; followed?: number | null };
+export type RunRequest = { serial: number; parameters: Record<string, Record<string, any>>; pinned?: Record<string, Record<string, any>> | null; start_us: number; end_us: number; playhead_us?: number | null; interactive?: boolean; has_preview?: boolean; followed?: number | null };
 /** A group of controls; `terms` of the glossary explain it, `is_open` where it is unfolded at first. */
 export type SectionInfo = { title: string; terms: string[]; is_open: boolean; controls: ControlInfo[] };
 /** Statistics of the spin of a series of shots; None for what too few shots tell. */

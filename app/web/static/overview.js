@@ -27,6 +27,8 @@ export class Overview extends EventTarget {
     this.curve = drawing("g");
     this.svg.append(this.chosen, this.curve, this.bands, this.drag, this.playhead);
     this.words = element("span.words");
+    const click = recording.is_long ? "click a shot to work on it" : "click to move the playhead";
+    parent.title = `Event rate of the whole recording; ${click}, drag to choose a part`;
     parent.replaceChildren(this.svg, this.words);
     this.recording = recording;
     this.#dragging();
@@ -115,7 +117,9 @@ export class Overview extends EventTarget {
       drawing(
         "title",
         {},
-        `Shot ${index + 1}: ${(start / 1000).toFixed(1)} ms, ${length} ms long. Click to work on it.`,
+        `Shot ${index + 1}: ${(start / 1000).toFixed(1)} ms, ${length} ms long. Click to ${
+          this.recording.is_long ? "work on it" : "go there"
+        }.`,
       ),
     );
     return band;

@@ -2,6 +2,7 @@
 // picture, and where it cannot run.
 
 /** @import { PreviewMessage } from "./messages.d.ts" */
+/** @import { Overview } from "./overview.js" */
 /** @import { Connection, RunRequests } from "./server.js" */
 /** @import { Settings } from "./settings.js" */
 /** @import { Viewer } from "./viewer.js" */
@@ -19,10 +20,12 @@ export class Preview {
   #shown_us = null;
 
   /**
-   * @param {{connection: Connection, settings: Settings, runner: RunRequests, viewer: Viewer}} app
+   * @param {{connection: Connection, settings: Settings, runner: RunRequests, viewer: Viewer, overview: Overview}} app
    */
-  constructor({ connection, settings, runner, viewer }) {
+  constructor({ connection, settings, runner, viewer, overview }) {
     this.connection = connection;
+    this.viewer = viewer;
+    this.overview = overview;
     this.runner = runner;
     this.image = element("img", { alt: `${TITLES.join(", ")} at the playhead` });
     const titles = element("div.titles", {}, ...TITLES.map((title) => element("span", {}, title)));
@@ -53,6 +56,7 @@ export class Preview {
     this.image.src = picture;
     this.words.textContent = `${words}, at ${(t_us / 1000).toFixed(1)} ms`;
     this.#shown_us = t_us;
+    if (this.viewer.playhead_us === null) this.overview.move(t_us); // not yet moved by anybody
     this.node.hidden = false;
   }
 

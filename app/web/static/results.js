@@ -131,7 +131,7 @@ export class Results extends EventTarget {
       const spins = row("spin", apart ? [...magnitudes, spinDifference(estimates)] : magnitudes, SPIN_HELP);
       const directions = estimates.map(axis);
       const axes = row("axis", apart ? [...directions, axisDifference(estimates)] : directions, AXIS_HELP);
-      for (const one of [spins, axes]) {
+      for (const one of estimates.some((estimate) => estimate?.axis) ? [spins, axes] : [spins]) {
         trusted.forEach((is, i) => one.cells[1 + i].classList.toggle("doubted", !is));
         rows.push(one);
       }

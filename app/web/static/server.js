@@ -202,7 +202,7 @@ export class RunRequests extends EventTarget {
    * @param {Connection} connection
    * @param {Settings} settings
    * @param {Viewer} viewer
-   * @param {{tab: string, hasTools: boolean, time_us: number | null}} start tab in front and playhead at first
+   * @param {{tab: string, hasTools: boolean}} start tab in front at first
    */
   constructor(connection, settings, viewer, start) {
     super();
@@ -265,8 +265,10 @@ export class RunRequests extends EventTarget {
     this.#last = this.#wanted;
     // Without one the server previews what is seen first, which it knows at the end of the clip.
     const playhead_us = this.viewer.playhead_us ?? (interactive ? this.#previewed_us : null);
+    const has_preview = interactive || this.isBlind || !this.#hasLayout; // else the viewer has the picture soon
+    const request = { serial: ++this.serial, ...JSON.parse(this.#last), interactive, has_preview, playhead_us };
     try {
-      await this.connection.post("run", { serial: ++this.serial, ...JSON.parse(this.#last), interactive, playhead_us });
+      await this.connection.post("run", request);
     } catch (error) {
       this.#running = false;
       this.#last = null;
@@ -325,8 +327,7 @@ export class RunRequests extends EventTarget {
       const content = await this.connection.bytes(`pictures/${picture.id}`);
       if (this.#latest !== picture.id) return false;
       if (isWhole || !this.#hasLayout) await this.#fit();
-      const opening_us = (this.#hasLayout ? null : this.start.time_us) ?? picture.opening_us;
-      if (!(await this.viewer.show(content, picture.id, opening_us))) return false;
+      if (!(await this.viewer.show(content, picture.id, picture.opening_us))) return false;
       if (!this.#hasLayout) await this.#laidOut();
       this.#hasLayout = true;
       return true;

@@ -21,7 +21,7 @@ export function shortcuts({ viewer, overview, settings, opening, live }, hasTool
     const [start_us, end_us] = settings.clip;
     return viewer.seek(Math.min(Math.max(time_us, start_us), end_us));
   };
-  const step = (/** @type {number} */ ticks) => seek((viewer.playhead_us ?? settings.clip[0]) + ticks * tick_us());
+  const step = (/** @type {number} */ ticks) => seek((viewer.playhead_us ?? overview.playhead_us) + ticks * tick_us());
   const tabs = opening.tabs.slice(0, 9).map(({ label }, index) => ({
     keys: [String(index + 1)],
     shown: String(index + 1),

@@ -239,15 +239,16 @@ export class Viewer extends EventTarget {
     });
   }
 
-  // The playhead of a link: where the next recording is shown at, and the present one, too.
+  // The playhead of a link: the next recording is shown there, too.
   place(/** @type {number} */ time_us) {
     this.#moved(Math.round(time_us * 1000));
     return this.seek(time_us);
   }
 
   seek(/** @type {number} */ time_us, /** @type {PlayState} */ play_state = "paused") {
+    if (this.#shown === null) this.#moved(Math.round(time_us * 1000)); // where the first recording is shown
     return this.#next(async () => {
-      if (this.#shown === null) return this.#moved(Math.round(time_us * 1000)); // where the first recording is shown
+      if (this.#shown === null) return;
       const duration_nanos = BigInt(Math.round(time_us * 1000));
       await this.#viewer.set_time({ recording: storeOf(this.#shown), timeline: TIMELINE, duration_nanos, play_state });
     });
