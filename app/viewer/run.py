@@ -177,6 +177,19 @@ class ViewedRun:
         return {shot.number: number for number, shot in enumerate(self.shots, 1)}
 
     @cached_property
+    def seen_shots(self) -> list[tuple[int, int]]:
+        """Times, us, from which on the detail views show another shot, and its number for people.
+
+        Between two flights it is the one before.
+        """
+        seen: list[tuple[int, int]] = []
+        for tick in self.ticks:
+            number = self.shot_numbers.get(tick.balls[0].track.shot) if tick.balls else None
+            if number is not None and (not seen or seen[-1][1] != number):
+                seen.append((tick.packet.end_us, number))
+        return seen
+
+    @cached_property
     def final_shots(self) -> dict[int, Shot]:
         """Shots by the row of the tick with the result of the whole shot, of those followed there."""
         rows = {}

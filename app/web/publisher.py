@@ -116,6 +116,7 @@ class Publisher:
                 start_us=runs[0].start_us,
                 end_us=runs[0].end_us,
                 opening_us=runs[0].opening_us,
+                seen_shots=[run.seen_shots for run in runs],
             )
             self._pictures[shown] = picture, content
             self._keep_budget()

@@ -298,13 +298,18 @@ class BiasText(Response):
 
 
 class Picture(Response):
-    """An .rrd picture that is ready to be fetched."""
+    """An .rrd picture that is ready to be fetched.
+
+    `seen_shots` are, of B and then of A where it is pinned, the times from which on the detail views show another shot,
+    with its number from 1.
+    """
 
     id: str
     size_bytes: int
     start_us: int
     end_us: int
     opening_us: int
+    seen_shots: list[list[tuple[int, int]]]
 
 
 class Message(Response):

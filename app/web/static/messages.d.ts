@@ -98,7 +98,7 @@ export type OptimizationRequest = { parameters: Record<string, Record<string, an
 /** The points of a sweep so far. */
 export type ParameterSweep = { name: string; total: number; points: SweepPoint[] };
 /** An .rrd picture that is ready to be fetched. */
-export type Picture = { id: string; size_bytes: number; start_us: number; end_us: number; opening_us: number };
+export type Picture = { id: string; size_bytes: number; start_us: number; end_us: number; opening_us: number; seen_shots: [number, number][][] };
 /** Parameters read from a preset, and notices of former names in it. */
 export type PresetValues = { parameters: Record<string, Record<string, any>>; notices: string[] };
 /** Preview of a run at a time, before its picture: the address of a PNG, and the answer in words. */

@@ -1,7 +1,6 @@
 // Results in numbers of the shot that is seen: B alone, or A and B beside each other with what differs. Event: `shown`.
 
 /** @import { EstimateMetrics, MetricInfo, Opening, RunMessage, RunMetrics, ShotMetrics } from "./messages.d.ts" */
-/** @import { RunRequests } from "./server.js" */
 /** @import { Viewer } from "./viewer.js" */
 
 import { element, milliseconds, number } from "./elements.js";
@@ -23,16 +22,15 @@ export class Results extends EventTarget {
 
   /**
    * @param {any} parent
-   * @param {{opening: Opening, viewer: Viewer, runner: RunRequests}} app
+   * @param {{opening: Opening, viewer: Viewer}} app
    */
-  constructor(parent, { opening, viewer, runner }) {
+  constructor(parent, { opening, viewer }) {
     super();
     this.parent = parent;
     this.opening = opening;
     this.viewer = viewer;
-    this.runner = runner;
     viewer.addEventListener("moved", () => {
-      if (this.#latest && this.#told !== String(this.#both.map((one) => this.#seen(one)))) this.show(this.#latest);
+      if (this.#latest && this.#told !== String(this.#seen)) this.show(this.#latest);
     });
   }
 
@@ -42,17 +40,15 @@ export class Results extends EventTarget {
     return /** @type {RunMetrics[]} */ ([pinned_metrics, metrics].filter(Boolean));
   }
 
-  /**
-   * Place of the shot in the list that the detail views show at the playhead: the followed one, or the first of those
-   * in flight; between two flights the one before.
-   * @param {RunMetrics} metrics
-   */
-  #seen({ shots }) {
-    const { followed } = this.runner;
-    if (followed !== null && followed <= shots.length) return followed - 1;
-    const at_us = this.viewer.playhead_us ?? this.#latest?.picture?.opening_us ?? 0;
-    const flying = shots.findIndex(({ start_us, end_us }) => start_us <= at_us && at_us <= end_us);
-    return flying >= 0 ? flying : Math.max(shots.findLastIndex(({ end_us }) => end_us < at_us), 0);
+  // Places in the lists of shots of what the detail views show of A and B at the playhead.
+  get #seen() {
+    const { picture } = /** @type {RunMessage} */ (this.#latest);
+    const at_us = this.viewer.playhead_us ?? picture?.opening_us ?? 0;
+    const [b, a] = picture?.seen_shots ?? [];
+    return this.#both.map((_, i, both) => {
+      const changes = i === both.length - 1 ? b : a;
+      return (changes?.findLast(([from_us]) => from_us <= at_us) ?? changes?.[0] ?? [0, 1])[1] - 1;
+    });
   }
 
   show(/** @type {RunMessage} */ message) {
@@ -60,7 +56,7 @@ export class Results extends EventTarget {
     if (!metrics) return;
     this.#latest = message;
     const both = this.#both;
-    const places = both.map((one) => this.#seen(one));
+    const places = this.#seen;
     this.#told = String(places);
     const shots = both.map((one, i) => one.shots[places[i]] ?? null);
     const costs = pinned_metrics ? [pinned_costs_ms, costs_ms] : [costs_ms];

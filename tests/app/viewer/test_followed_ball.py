@@ -106,6 +106,8 @@ def test_another_shot_is_followed_while_it_flies_without_a_stage_run_again(resul
             assert tick.track.shot in (0, 2)
     assert result.session.chain.seconds == seconds
     assert OTHER_US[0] < other.opening_us <= OTHER_US[1], "the viewer opens where it flies"
+    assert [number for _, number in ViewedRun.of(result).seen_shots] == [1, 3]
+    assert [number for _, number in other.seen_shots] == [1, 2, 3]
     assert ViewedRun.of(result, followed=9).followed is None
 
 

@@ -55,7 +55,8 @@ def test_drawings_are_sorted_out_while_requests_never_cease(
 
 
 def progress(state: str = "computing", picture: str | None = None, share: float = 0.0) -> RunMessage:
-    made = None if picture is None else Picture(id=picture, size_bytes=1, start_us=0, end_us=1, opening_us=0)
+    sizes = {"size_bytes": 1, "start_us": 0, "end_us": 1, "opening_us": 0}
+    made = None if picture is None else Picture(id=picture, seen_shots=[[]], **sizes)
     return RunMessage(serial=1, state=state, share=share, stages_ms={}, total_ms=0.0, picture=made)
 
 
