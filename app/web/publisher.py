@@ -102,12 +102,12 @@ class Publisher:
         report.tell("drawing", 1.0)
         began_s = time.perf_counter()
         results = (b,) if a is None else (b, a)
-        runs = [ViewedRun.of(result, followed) for result in results]
-        shown = tuple(map(_shown, results, runs))
+        shown = followed, *map(_shown, results)
         if shown in self._pictures:
             self._pictures.move_to_end(shown)
             picture, _ = self._pictures[shown]
         else:
+            runs = [ViewedRun.of(result, followed) for result in results]
             picture_id = f"{self._session_id}-{report.serial}{f'-part{len(b.ticks)}' if partial else ''}"
             content = rrd_bytes(self._all_chunks(results, runs), picture_id)
             picture = Picture(
@@ -168,10 +168,10 @@ class Publisher:
         return self.drawings.chunks(run, result.session.chain.keys(result.session.parameters))
 
 
-def _shown(result: Result, run: ViewedRun) -> Hashable:
-    """What a picture of the run shows: equal values, equal pictures."""
-    session = result.session
-    return session.chain.source.identity, session.parameters, len(run.ticks), run.stages, run.followed
+def _shown(result: Result) -> Hashable:
+    """What a picture of a result shows: equal values, equal pictures."""
+    session, ticks = result.session, result.ticks
+    return session.chain.source.identity, session.parameters, len(ticks), tuple(ticks[0].results)
 
 
 def _difference_text(a: Result, b: Result) -> str:

@@ -96,7 +96,10 @@ class Runner:
         """
         parameters, chain, session = request.parameters, clip.chain, _with(clip, request.parameters)
         count, began_s, playhead_us = chain.tick_count(parameters), time.perf_counter(), request.playhead_us
-        is_fast_first = request.interactive and not all(chain.knows(parameters, stage) for stage in chain.stages)
+        is_known = all(chain.knows(parameters, stage) for stage in chain.stages)
+        if is_known and not request.has_preview:  # on the way back there is nothing to begin with
+            return Result.of(session, self._whole(clip, request, report))
+        is_fast_first = request.interactive and not is_known
         whole = None if is_fast_first else self._slow.submit(self._whole, clip, request, report)
         ticks: list[Tick] = []
         is_previewed = not request.has_preview

@@ -53,7 +53,7 @@ def client(tuner: Served) -> Client:
 
 def bytes_of(client: Client, parameters: dict[str, Any], contrast_ms: list[float]) -> bytes:
     """Change, wait, fetch: what the page does; notes what `contrast` took of it."""
-    done = client.run(parameters)
+    done = client.run(parameters, has_preview=False)  # the viewer has a picture
     contrast_ms.append(done["stages_ms"]["contrast"])
     return client.http.get(client.path(f"pictures/{done['picture']['id']}")).content
 

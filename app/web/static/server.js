@@ -308,7 +308,12 @@ export class RunRequests extends EventTarget {
     // For any change of the page the browser composes all of it anew: numbers come with their picture.
     if (this.#hasLayout) await Promise.race([seen.catch(() => {}), pause(NUMBERS_MS)]);
     this.#tell("numbers", message);
-    if (!(await seen)) return;
+    try {
+      if (!(await seen)) return;
+    } catch (error) {
+      notice(`The viewer does not show the newest picture: ${/** @type {Error} */ (error).message}. Reload the page.`);
+      return this.#end(serial);
+    }
     this.#end(serial);
     this.#tell("shown", message);
   }
