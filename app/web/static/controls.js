@@ -26,6 +26,7 @@ export class Controls {
   sections = [];
   /** @type {any[] | null} sections that were open before the search */
   #open = null;
+  #told = "none yet"; // what differs from the preset, as it is shown
 
   /**
    * @param {any} parent
@@ -47,13 +48,17 @@ export class Controls {
     this.refresh();
   }
 
+  // Nothing of the page is touched that stays as it is: a slider that is dragged has this done with every move.
   refresh() {
     for (const control of this.controls.values()) control.refresh();
+    const changed = [...this.controls.values()].filter(({ isChanged }) => isChanged);
+    const told = changed.map(({ name, value, before }) => `${name} ${value} ${before}`).join();
+    if (told === this.#told) return;
+    this.#told = told;
     for (const { mark, names } of this.sections) {
-      const count = names.filter((name) => this.differs(name)).length;
+      const count = changed.filter(({ name }) => names.includes(name)).length;
       mark.textContent = count ? `${count} changed` : "";
     }
-    const changed = [...this.controls.values()].filter(({ name }) => this.differs(name));
     this.changed.replaceChildren(...changed.map((control) => this.#difference(control)));
     this.changed.hidden = !changed.length;
   }
@@ -96,10 +101,6 @@ export class Controls {
     for (const [name, high] of Object.entries(highs)) this.controls.get(name)?.limit(high);
   }
 
-  differs(/** @type {string} */ name) {
-    return JSON.stringify(this.settings.get(name)) !== JSON.stringify(this.settings.presetValue(name));
-  }
-
   #section(/** @type {SectionInfo} */ { title, terms, is_open, controls }) {
     const mark = element("span.mark");
     const body = element("div.body");
@@ -108,7 +109,7 @@ export class Controls {
     const made = element("details.section", { open: is_open }, element("summary", {}, title, mark), help, body);
     made.dataset.title = title;
     for (const description of controls) {
-      const control = new Control(description, this);
+      const control = new Control(description, this.settings);
       this.controls.set(description.name, control);
       body.append(control.row);
     }
@@ -124,8 +125,10 @@ class Control {
   slider = null;
   dragging = false;
   stepping = false;
+  isChanged = false; // against the preset
+  #shown = ""; // value, preset and range as they are shown
 
-  constructor(/** @type {ControlInfo} */ info, /** @type {Controls} */ controls) {
+  constructor(/** @type {ControlInfo} */ info, /** @type {Settings} */ settings) {
     this.info = info;
     this.name = info.name;
     this.kind = info.kind;
@@ -134,8 +137,7 @@ class Control {
     this.high = info.high ?? Infinity;
     this.top = this.high; // upper end of the slider
     this.step = info.step ?? 1;
-    this.controls = controls;
-    this.settings = controls.settings;
+    this.settings = settings;
     const { allowed, unit, help, label: text } = info;
     const range = allowed ? `\nAllowed: ${allowed}.` : "";
     const start = `\nDefault: ${this.#text(info.default) || "none"}${unit ? ` ${unit}` : ""}.`;
@@ -168,9 +170,15 @@ class Control {
     return `${this.#text(value) || "auto"} ${this.info.unit}`.trim();
   }
 
-  refresh() {
+  refresh(isForced = false) {
     const value = this.settings.get(this.name);
-    this.row.classList.toggle("differs", this.controls.differs(this.name));
+    const [own, preset] = [value, this.settings.presetValue(this.name)].map((one) => JSON.stringify(one));
+    const shown = `${own} ${preset} ${this.top}`;
+    if (shown === this.#shown && !isForced) return;
+    // What is in somebody's hands is drawn when it is let go of.
+    this.#shown = this.dragging || document.activeElement === this.box ? "" : shown;
+    this.isChanged = own !== preset;
+    this.row.classList.toggle("differs", this.isChanged);
     if (this.kind === "switch") this.box.checked = value;
     else if (document.activeElement !== this.box || this.kind === "choice") this.box.value = this.#text(value);
     if (this.slider && !this.dragging) {
@@ -199,7 +207,7 @@ class Control {
     this.box.addEventListener("keyup", () => this.#stepped());
     this.box.addEventListener("blur", () => {
       this.#stepped();
-      this.refresh();
+      this.refresh(true);
     });
     const unit = element("span.unit", {}, this.info.unit);
     if (this.scale === "none") {
@@ -236,7 +244,7 @@ class Control {
     if (text === "" || wrong || !whole || (this.kind !== "numbers" && numbers.length > 1)) {
       notice(`${this.name} = ${text || "nothing"} is not possible: ${this.info.allowed}${whole ? "" : ", whole"}`);
       this.box.blur();
-      return this.refresh();
+      return this.refresh(true);
     }
     return this.#put(value);
   }
