@@ -131,9 +131,17 @@ EXPORTS = {
         "series.parquet",
     ),
     "series.svg": Export(
-        "Figure of the series (SVG)", partial(figure, suffix=".svg"), "image/svg+xml", "series.svg", ("followed", "pinned")
+        "Figure of the series (SVG)",
+        partial(figure, suffix=".svg"),
+        "image/svg+xml",
+        "series.svg",
+        ("followed", "pinned"),
     ),
     "series.pdf": Export(
-        "Figure of the series (PDF)", partial(figure, suffix=".pdf"), "application/pdf", "series.pdf", ("followed", "pinned")
+        "Figure of the series (PDF)",
+        partial(figure, suffix=".pdf"),
+        "application/pdf",
+        "series.pdf",
+        ("followed", "pinned"),
     ),
 }

@@ -28,7 +28,7 @@ from .schemas import Picture, PreviewMessage, RunMessage, RunRequest
 # A client learns of a run's progress this often, and not at all of one that is over at once: every change of the page
 # has the browser put the whole picture together anew, in the very time in which it is waited for.
 REPORT_S, QUIET_S = 0.05, 0.3
-PICTURES_BYTES, PICTURES_LEAST = 32_000_000, 3  # kept for the way back: some ten settings of a flight of 100 ms
+PICTURES_BYTES, PICTURES_LEAST = 32_000_000, 3  # kept for the way back: fifteen settings of a flight of 100 ms
 DRAWING = "drawing"  # counted beside the stages
 
 State = Literal["loading", "computing", "drawing", "partial", "done", "failed"]

@@ -99,6 +99,10 @@ def test_typing_reset_undo_and_redo(bare: Tab) -> None:
     assert bare.value("logo.pad_px") == 4.75
     bare.after(lambda: bare.page.locator("[data-name='logo.pad_px'] .reset").click())
     assert bare.page.locator(".control.differs").count() == 0
+    bare.slide("logo.pad_px", "End")  # of the slider, which ends inside of the ball
+    top = bare.page.evaluate("window.spinscope.controls.controls.get('logo.pad_px').top")
+    assert bare.value("logo.pad_px") == top < 100
+    bare.after(lambda: bare.page.click("#undo"))
 
 
 def test_values_that_do_not_go_together_are_taken_back(bare: Tab) -> None:
@@ -110,6 +114,54 @@ def test_values_that_do_not_go_together_are_taken_back(bare: Tab) -> None:
     notice.click()
 
 
+def test_the_results_are_of_the_shot_that_is_seen_at_the_playhead(bare: Tab) -> None:
+    bare.page.evaluate(
+        """window.spinscope.connection.addEventListener("run", ({ detail }) => {
+            if (detail.metrics) window.told = detail;
+        })"""
+    )
+    bare.slide("logo.pad_px")
+    bare.page.evaluate(
+        """(() => {
+            const { metrics, picture, ...rest } = window.told, [shot] = metrics.shots;
+            const doubtful = { ...shot, sentence: "One", best: null, best_reason: "of a test" };
+            const detail = {
+                ...rest,
+                metrics: { ...metrics, shots: [doubtful, { ...shot, sentence: "Two" }] },
+                picture: { ...picture, seen_shots: [[[20000, 1], [50000, 2]]] },
+            };
+            window.spinscope.runner.dispatchEvent(new CustomEvent("numbers", { detail }));
+        })()"""
+    )
+    for t_us, said in ((10000, "One"), (49999, "One"), (50000, "Two"), (20000, "One")):
+        bare.page.evaluate(f"window.spinscope.viewer.place({t_us})")
+        text = bare.page.inner_text("#side details[data-title='Result']")
+        assert text.splitlines()[1].startswith(f"{said} · whole shot") and f"shot {1 + (said == 'Two')} of 2" in text
+        assert ("No spin is trusted: of a test" in text) == (said == "One")
+        assert bare.page.evaluate("window.spinscope.results.sentence") == said
+    bare.after(lambda: bare.page.keyboard.press("Control+z"))
+
+
+def test_a_picture_that_the_viewer_does_not_show_is_said(bare: Tab) -> None:
+    bare.page.evaluate(
+        """(() => {
+            const { runner, viewer } = window.spinscope;
+            runner.isBlind = false;
+            viewer.layout = () => Promise.resolve();
+            viewer.show = () => Promise.reject(new Error("it sleeps"));
+        })()"""
+    )
+    bare.slide("logo.pad_px")
+    notice = bare.page.locator(".notice", has_text="does not show the newest picture: it sleeps")
+    notice.wait_for()
+    bare.until("!window.spinscope.runner.isWaiting")
+    bare.page.evaluate(
+        "(({ runner, viewer }) => (delete viewer.layout, delete viewer.show, runner.isBlind = true))(window.spinscope)"
+    )
+    notice.click()
+    bare.after(lambda: bare.page.keyboard.press("Control+z"))
+
+
 def test_a_and_b_beside_each_other(bare: Tab) -> None:
     bare.after(lambda: bare.page.click("#pin"))
     bare.slide("logo.pad_px", "PageUp")
@@ -117,6 +169,8 @@ def test_a_and_b_beside_each_other(bare: Tab) -> None:
     assert "logo.pad_px" in text
     witness = r"Witnesses of the combined answer\n.*\npattern\t[\d.]+ ± [\d.]+ rps\t[\d.]+ ± [\d.]+ rps\t[−\d.]+ rps\n"
     assert re.search(witness, text, re.DOTALL)
+    answers = bare.page.locator("#side .answer").all_inner_texts()
+    assert [answer[:3] for answer in answers] == ["A: ", "B: "] and all("whole shot, by " in one for one in answers)
     headings = bare.page.locator("#side tr.heading th").all_inner_texts()
     assert "A" in headings and "B" in headings and "B − A" in headings
     assert re.search(r"\d° apart", bare.page.inner_text("#side details[data-title='Result']"))

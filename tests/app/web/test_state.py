@@ -71,6 +71,12 @@ def test_without_the_viewer_a_preview_follows_the_playhead(bare: Tab) -> None:
     bare.until(f"{shown_ms} > {end_ms - tick_ms}")
     page.keyboard.press("ArrowLeft")
     bare.until(f"{shown_ms} <= {end_ms - tick_ms}")
+    there_us = page.evaluate("window.spinscope.viewer.playhead_us")
+    page.wait_for_url(re.compile(f"t={there_us}"))
+    page.reload()
+    page.wait_for_selector("body[data-done]", state="attached")
+    bare.until(f"{shown_ms} > {end_ms - 3 * tick_ms} && {shown_ms} <= {end_ms - tick_ms}")
+    assert page.get_attribute("#overview svg", "aria-valuenow") == str(there_us)
 
 
 def test_without_the_viewer_a_video_shows_the_previews(bare: Tab) -> None:
