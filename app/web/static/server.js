@@ -325,13 +325,14 @@ export class RunRequests extends EventTarget {
    */
   async #show(picture, isWhole) {
     const { serial } = this;
+    if (!isWhole && !this.#hasLayout) return false; // its layout is of the whole run; meanwhile there is the preview
     this.#latest = picture.id;
     try {
       await this.#rest();
       if (this.#latest !== picture.id || serial !== this.serial) return false;
       const content = await this.connection.bytes(`pictures/${picture.id}`);
       if (this.#latest !== picture.id) return false;
-      if (isWhole || !this.#hasLayout) await this.#fit();
+      if (isWhole) await this.#fit();
       if (!(await this.viewer.show(content, picture.id, picture.opening_us))) return false;
       if (!this.#hasLayout) await this.#laidOut();
       this.#hasLayout = true;

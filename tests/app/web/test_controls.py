@@ -143,18 +143,23 @@ def test_the_results_are_of_the_shot_that_is_seen_at_the_playhead(bare: Tab) -> 
 
 
 def test_a_picture_that_the_viewer_does_not_show_is_said(bare: Tab) -> None:
+    """One of a part of the run is not asked for before there is a layout, which is of the whole run."""
     bare.page.evaluate(
         """(() => {
-            const { runner, viewer } = window.spinscope;
+            const { connection, runner, viewer } = window.spinscope;
             runner.isBlind = false;
             viewer.layout = () => Promise.resolve();
             viewer.show = () => Promise.reject(new Error("it sleeps"));
+            const detail = { serial: runner.serial, state: "partial", picture: { id: "early" } };
+            connection.dispatchEvent(new CustomEvent("run", { detail }));
         })()"""
     )
     bare.slide("logo.pad_px")
     notice = bare.page.locator(".notice", has_text="does not show the newest picture: it sleeps")
     notice.wait_for()
     bare.until("!window.spinscope.runner.isWaiting")
+    pictures = [url for url in bare.requests if "/pictures/" in url]
+    assert pictures and not any(url.endswith("early") for url in pictures)
     bare.page.evaluate(
         "(({ runner, viewer }) => (delete viewer.layout, delete viewer.show, runner.isBlind = true))(window.spinscope)"
     )
