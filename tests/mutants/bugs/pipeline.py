@@ -158,6 +158,18 @@ VALUES = [
         "tests/pipeline/test_track_evidence.py",
     ),
     Mutant(
+        "pipeline/stages/track.py",
+        "contact.path.roughness < SAME_BALL_ROUGHNESS",
+        "contact.path.roughness > 0.0",
+        "tests/pipeline/stages/test_track_contact.py -k continues_its_path",
+    ),
+    Mutant(
+        "pipeline/stages/track_contact.py",
+        "lower.min() < min(costs.min() - LEAST_GAIN, costs.min() / STRAY_RATIO)",
+        "lower.min() < 0.0",
+        "tests/pipeline/stages/test_track_contact.py -k rackets_outline",
+    ),
+    Mutant(
         "pipeline/spin/combined/stage.py",
         "if odds < parameters.odds:",
         "if odds < 1.0:",

@@ -58,9 +58,15 @@ CONTRAST = [
     ),
     Mutant(
         "pipeline/spin/contrast/stage.py",
-        "None if turns_seen and not state.changes else FLOW_METHOD",
+        "None if one_pattern and _may_be_one_of(parameters, answer, normal_flow) else FLOW_METHOD",
         "FLOW_METHOD",
         "tests/pipeline/stages/test_contrast_memory.py -k nothing_turns",
+    ),
+    Mutant(
+        "pipeline/spin/contrast/stage.py",
+        "spins_rps = (answer.spin_rps, *answer.rivals_rps)",
+        "spins_rps = (answer.spin_rps, *answer.rivals_rps + 12.0)",
+        "tests/pipeline/stages/test_contrast_memory.py -k two_spins_open",
     ),
     Mutant(
         "pipeline/spin/contrast/stage.py",
