@@ -105,9 +105,10 @@ def step(
     spins_rps = np.stack([candidate.spins_rps for candidate in candidates])
     bend = by_flight(trajectory, spins_rps)
     logs = {"trajectory": bend}
+    if basis != "flight":
+        logs["normal_flow"] = by_flow(normal_flow.estimate, spins_rps)
     if basis == "pattern":
-        logs = {"trajectory": fallible(bend, BLUNDER["trajectory"])}
-        logs |= {"normal_flow": by_flow(normal_flow.estimate, spins_rps), "rate": by_rate(rate, spins_rps)}
+        logs |= {"trajectory": fallible(bend, BLUNDER["trajectory"]), "rate": by_rate(rate, spins_rps)}
     own = np.array([candidate.log_likelihood for candidate in candidates])
     drawn = np.stack([candidate.log_weights for candidate in candidates])
     # Flow, rhythm and sightings are of the same events as the pattern: they choose among its spins, but make none more

@@ -192,6 +192,9 @@ def test_a_hidden_logo_is_answered_by_rhythm_and_flight_together_only() -> None:
     assert result.summary == "magnitude from the rhythm of the logo's visits, axis from the flight"
     halves = answered(hidden, flight(TOP), rhythm([60.2, 30.1], [0.0, -2.0]))
     assert halves.estimate.status == "refused", "half the rate is not excluded"
+    assert answered(hidden, flight(TOP), rhythm([60.2]), flow(TOP)).estimate.status == "ok"
+    doubted = answered(hidden, flight(TOP), rhythm([60.2]), flow(TOP / 2))
+    assert doubted.estimate.status == "refused", "the normal flow tells of two stamps that come back in turn"
 
 
 def test_it_is_trusted_where_contrast_alone_is_not_or_tells_another_spin() -> None:
