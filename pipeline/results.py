@@ -83,12 +83,15 @@ class SpinEstimate(ReadOnlyArrays):
         """Refusal with its reason."""
         return cls(method, None, None, reason, events, against)
 
-    def up_to(self, max_spin_rps: float) -> SpinEstimate:
-        """The estimate, refused where its magnitude is above the highest spin that is looked for."""
+    def up_to(self, max_spin_rps: float, against: str | None = None) -> SpinEstimate:
+        """The estimate, refused where its magnitude is above the highest spin that is looked for.
+
+        Then nor is the method to be trusted that it is more accurate than, `against`.
+        """
         if self.magnitude_rps is None or self.magnitude_rps <= max_spin_rps:
             return self
         reason = f"the spin is above spin.max_spin_rps = {max_spin_rps:g} rps: {self.magnitude_rps:.4g} rps"
-        return SpinEstimate.refused(self.method, reason, self.events)
+        return SpinEstimate.refused(self.method, reason, self.events, against)
 
     @property
     def status(self) -> Literal["ok", "refused"]:

@@ -48,6 +48,10 @@ def errors(found: dict[str, str]) -> str:
     return f"{mean(found['magnitude error [rps]'])} rps, {mean(found['axis error [deg]'])} degrees"
 
 
+def wrong(found: dict[str, str]) -> str:
+    return "none wrong" if found["wrong"] == "0.00" else f"{100 * float(found['wrong']):.2g} % wrong"
+
+
 def spread(window: str, quantity: str) -> str:
     """Smallest and largest of the paper's means over its balls."""
     found = [
@@ -89,7 +93,7 @@ def expected_table() -> list[str]:
         one for one in rows("detector", "Ball detector by speed", "one ball") if one["stage"] == "refined + kalman"
     ]
     centres = [mean(one["centre [px]"]) for one in speeds]
-    assert scenes["wrong"] == scenes["two spins for one"] == flights["wrong"] == "0.00" and seen["answered"] == "1.00"
+    assert scenes["two spins for one"] == "0.00"
     assert (speeds[0]["speed [m/s]"], speeds[-1]["speed [m/s]"]) == ("4.00", "20.0")
     return [
         f"| ball spinner, 100 ms | {paper_spins('100 ms')} | top and back {errors(long[0])}; side {errors(long[1])}; "
@@ -106,9 +110,10 @@ def expected_table() -> list[str]:
         f"(all) | frame method {errors(frame)}, {percent(frame['success'])}; `best` {errors(event)}, "
         f"{percent(event['success'])} |",
         f"| {scenes['n']} flights in scenes of labs and clubs | - | {percent(scenes['right'])} right, "
-        f"{percent(scenes['refused'])} refused, none wrong, no two spins taken for one |",
+        f"{percent(scenes['refused'])} refused, {wrong(scenes)}, no two spins taken for one |",
         f"| {flights['n']} flights with visible, rim and hidden logos | - | {percent(flights['answered'])} answered, "
-        f"none wrong; with 60 logo events or more all, at {errors(seen).replace(',', ' and')} |",
+        f"{wrong(flights)}; with 60 logo events or more {percent(seen['answered'])}, at "
+        f"{errors(seen).replace(',', ' and')} |",
         f"| ball's centre, 4 to 20 m/s | below 1 px | {min(centres, key=float)} to {max(centres, key=float)} px |",
     ]
 

@@ -202,7 +202,7 @@ def _objective(events: SphereEvents, settings: ContrastSettings, sigma_rad: floa
 def _searched(events: SphereEvents, moving: SphereEvents, starts_rad_s: Floats, settings: ContrastSettings) -> Floats:
     """Spins (k, 3) found among all spins and from the starts, those best for all events first.
 
-    Bursts of few events hardly differ from chance, so the search is made without what stands still and with it.
+    Few events that coincide by chance look as if they stood still, so the search is made without those and with them.
     """
     found = []
     for part in (moving,) if moving is events else (moving, events):

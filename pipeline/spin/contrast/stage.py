@@ -431,7 +431,7 @@ def _result(
     estimate, turns_seen = _judged(parameters, state, answer, count, rate, flow)
     middle_us, half_us = answer.reference_s * 1e6, 0.5e6 * answer.span_s
     return ContrastResult(
-        estimate=estimate.up_to(state.context["spin.max_spin_rps"]),
+        estimate=estimate.up_to(state.context["spin.max_spin_rps"], FLOW_METHOD),
         best_rps=answer.spin_rps.copy(),
         covariance_rps2=answer.covariance_rps2.copy(),
         rivals_rps=answer.rivals_rps.copy(),
