@@ -169,7 +169,7 @@ class Publisher:
 
 
 def _shown(result: Result) -> Hashable:
-    """What a picture of a result shows: equal values, equal pictures."""
+    """Key of what a picture of a result shows: equal keys, equal pictures."""
     session, ticks = result.session, result.ticks
     return session.chain.source.identity, session.parameters, len(ticks), tuple(ticks[0].results)
 
