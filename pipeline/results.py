@@ -86,7 +86,7 @@ class SpinEstimate(ReadOnlyArrays):
     def up_to(self, max_spin_rps: float, against: str | None = None) -> SpinEstimate:
         """The estimate, refused where its magnitude is above the highest spin that is looked for.
 
-        Then nor is the method to be trusted that it is more accurate than, `against`.
+        `against` names a less accurate method that is not to be trusted then either.
         """
         if self.magnitude_rps is None or self.magnitude_rps <= max_spin_rps:
             return self

@@ -25,9 +25,10 @@ from .error_answers import add_error_handlers
 from .folder_routes import add_folder_routes
 from .label_routes import add_label_routes
 from .live_routes import add_live_routes
+from .message_schemas import PreviewMessage
 from .opening import opening, recording_description
 from .publisher import preview_message
-from .schemas import Done, Opening, OpenRequest, PreviewMessage, Reopened, RunRequest
+from .schemas import Done, Opening, OpenRequest, Reopened, RunRequest
 from .security import SecurityMiddleware
 from .tool_routes import add_tool_routes
 from .video_routes import add_video_routes

@@ -10,7 +10,7 @@ from typing import Any, Literal
 from spinscope.pipeline.errors import SpinscopeError
 
 from .message_queue import MessageQueue
-from .schemas import BiasesMessage, BiasSweepMessage, OptimizationMessage, SweepMessage
+from .message_schemas import BiasesMessage, BiasSweepMessage, OptimizationMessage, SweepMessage
 
 STAGE_PACKAGES = ("spinscope.pipeline.stages.", "spinscope.pipeline.spin.")
 JobMessageType = type[SweepMessage] | type[OptimizationMessage] | type[BiasesMessage] | type[BiasSweepMessage]

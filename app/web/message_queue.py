@@ -6,7 +6,8 @@ import asyncio
 import threading
 from collections.abc import AsyncIterator
 
-from .schemas import RunRequest, ServerMessage
+from .message_schemas import ServerMessage
+from .schemas import RunRequest
 
 
 class Superseded(Exception):  # no error: the client wants something newer

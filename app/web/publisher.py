@@ -21,9 +21,10 @@ from spinscope.pipeline.session import Result
 from spinscope.pipeline.tick import Tick
 
 from .message_queue import MessageQueue
+from .message_schemas import Picture, PreviewMessage, RunMessage
 from .open_recording import OpenRecording
 from .presets import differences
-from .schemas import Picture, PreviewMessage, RunMessage, RunRequest
+from .schemas import RunRequest
 
 # A client learns of a run's progress this often, and not at all of one that is over at once: every change of the page
 # has the browser put the whole picture together anew, in the very time in which it is waited for.

@@ -9,8 +9,8 @@ from spinscope.pipeline.registry import Parameters
 
 from .jobs import error_text
 from .message_queue import MessageQueue
+from .message_schemas import ShotsMessage
 from .open_recording import OpenRecording
-from .schemas import ShotsMessage
 
 REPORT_S = 0.3
 

@@ -24,6 +24,7 @@ from .app_state import AppState
 from .client_session import ClientSession
 from .controls import setup_of
 from .jobs import Job
+from .message_schemas import BiasesMessage, BiasSweepMessage, OptimizationMessage, SweepMessage
 from .open_recording import COLUMNS_KEPT, OpenRecording
 
 TUNED_BYTES = 400_000_000  # results kept of all clips that are tuned at once
@@ -86,7 +87,7 @@ def _add_sweeps(app: FastAPI, state: AppState, session_of: SessionOf) -> None:
         def work(job: Job) -> parameter_sweep.ParameterSweep:
             return parameter_sweep.sweep(clip, parameters, request.name, values, job.report, job.check)
 
-        session.start(schemas.SweepMessage, work)
+        session.start(SweepMessage, work)
         return schemas.Done()
 
     @app.post("/api/sessions/{session_id}/optimization", status_code=202)
@@ -108,7 +109,7 @@ def _add_sweeps(app: FastAPI, state: AppState, session_of: SessionOf) -> None:
             found = optimization.optimize(clips, *wanted, report, job.check)
             return dataclasses.replace(found, skipped=skipped)
 
-        session.start(schemas.OptimizationMessage, work)
+        session.start(OptimizationMessage, work)
         return schemas.Done()
 
     @app.post("/api/sessions/{session_id}/cancel")
@@ -197,7 +198,7 @@ def _add_biases(app: FastAPI, state: AppState, session_of: SessionOf) -> None:
         session, live = session_of(session_id), state.live
         if live is not None:
             live.set_biases(request.biases)
-            session.start(schemas.BiasesMessage, lambda job: bias_sweep.Resimulation(1.0, request.biases))
+            session.start(BiasesMessage, lambda job: bias_sweep.Resimulation(1.0, request.biases))
             return schemas.Done()
         recording, biases = session.runner.recording, BiasParameters().with_values(request.biases)
         locked = bias_sweep.bias_state(recording.session.recording).locked
@@ -209,7 +210,7 @@ def _add_biases(app: FastAPI, state: AppState, session_of: SessionOf) -> None:
             session.runner.recording = OpenRecording.open(path, recording.choices, recording.original)
             return bias_sweep.Resimulation(1.0, biases.as_dict())
 
-        session.start(schemas.BiasesMessage, work)
+        session.start(BiasesMessage, work)
         return schemas.Done()
 
     @app.post("/api/sessions/{session_id}/bias_sweep", status_code=202)
@@ -217,7 +218,7 @@ def _add_biases(app: FastAPI, state: AppState, session_of: SessionOf) -> None:
         session, live = session_of(session_id), state.live
         if live is not None:
             name, points = request.name, request.points
-            session.start(schemas.BiasSweepMessage, lambda job: live.sweep_bias(name, points, job.report, job.check))
+            session.start(BiasSweepMessage, lambda job: live.sweep_bias(name, points, job.report, job.check))
             return schemas.Done()
         recording, biases = session.runner.recording, BiasParameters().with_values(request.biases)
         original = recording.original
@@ -232,7 +233,7 @@ def _add_biases(app: FastAPI, state: AppState, session_of: SessionOf) -> None:
             own, parameters = biases if request.is_known else None, recording.session.parameters
             return bias_sweep.measure_folder(original, own, parameters, open_clip, job.report, job.check)
 
-        session.start(schemas.BiasSweepMessage, work)
+        session.start(BiasSweepMessage, work)
         return schemas.Done()
 
     @app.post("/api/biases/read")

@@ -11,10 +11,9 @@ import numpy as np
 
 from ..errors import CameraError, ParameterError
 from ..events import EventBatch
-from .clock import now_s
+from .clock import PACKET_US, Pace
 from .event_camera import CameraPacket, EventCamera
 
-PACKET_US = 1000  # of real time, as of USB packets at millions of events a second
 FAULT_US = 1_000_000  # a fault comes so long after the start, and again after each such time
 STALL_S = 0.5
 BURST_RATE_HZ, BURST_US = 50e6, 20_000  # about what USB 3 carries: a lamp switched on
@@ -66,19 +65,16 @@ class ReplayCamera(EventCamera):
         fault: str | None = None,
         biases: Mapping[str, int] | None = None,
     ) -> None:
-        if not speed > 0.0:
-            raise ParameterError(f"speed = {speed:g} is no speed: give a number above 0, 1 is real time")
         if fault is not None and fault not in FAULTS:
             raise ParameterError(f"there is no fault {fault!r}: there are {', '.join(FAULTS)}")
         self.name, self.serial, self.width_px, self.height_px = name, "replay", width_px, height_px
         self.bias_limits, self.biases = {}, dict(biases or {})
-        self._batches, self._speed, self._loops, self._fault = batches, speed, loops, fault
+        self._batches, self._pace, self._loops, self._fault = batches, Pace(speed), loops, fault
         self._random = np.random.default_rng(0)  # of bursts: the same every time
-        self._begun_s: float | None = None
         self._start_us, self._played_us = 0, -(2**63)
         self._reset_us = 0  # what clock resets have taken off the recording's times
         self._burst_until_us = -1
-        self.can_wait = speed == float("inf")
+        self.can_wait = self._pace.is_unlimited
         self._packet_us = PACKET_US if self.can_wait else max(PACKET_US, round(PACKET_US * speed))
         self._pieces = self._cut()
 
@@ -96,7 +92,7 @@ class ReplayCamera(EventCamera):
         if piece is None:
             return None
         self._played_us = piece.end_us
-        self._wait_until(piece.end_us)
+        self._pace.wait_for(self._start_us, piece.end_us)
         if piece.is_fault:
             self._misbehave(piece)
         events = piece.events
@@ -131,16 +127,8 @@ class ReplayCamera(EventCamera):
             events = EventBatch(np.maximum(events.t_us - self._reset_us, 0), *events.columns[1:])
         return CameraPacket(events, end_us - self._reset_us, outside=outside)
 
-    def _wait_until(self, end_us: int) -> None:
-        if self._begun_s is None:
-            self._begun_s = now_s()
-        if self._speed != float("inf"):
-            wait_s = self._begun_s + (end_us - self._start_us) * 1e-6 / self._speed - now_s()
-            if wait_s > 0.0:  # a sleep of 0 s waits for Python's lock, 5 ms a thread that computes
-                time.sleep(wait_s)
-
     def _cut(self) -> Generator[_Piece, None, None]:
-        """Cut the recording into packets of PACKET_US, round by round."""
+        """Cut the recording into packets of PACKET_US of real time, round by round."""
         shift_us, begun, next_fault_us = 0, False, 0
         while True:
             last_us = None

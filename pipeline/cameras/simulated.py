@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 
-from ..errors import ParameterError
 from ..events import EventBatch
-from .clock import now_s
+from .clock import PACKET_US, Pace
 from .event_camera import CameraPacket, EventCamera, check_biases
-
-PACKET_US = 1000  # as USB packets at millions of events a second
 
 
 class SimulatedCamera(EventCamera):
@@ -46,21 +42,18 @@ class SimulatedCamera(EventCamera):
         biases: Mapping[str, int],
         speed: float = 1.0,
     ) -> None:
-        if not speed > 0.0:
-            raise ParameterError(f"speed = {speed:g} is no speed: give a number above 0, 1 is real time")
+        self._pace = Pace(speed)
         self.width_px, self.height_px = width_px, height_px
         self.bias_limits, self.biases = dict(bias_limits), dict(biases)
         check_biases(self.biases, self)
-        self.can_wait = speed == float("inf")
-        self._simulate, self._round_us, self._speed = simulate, round_us, speed
+        self.can_wait = self._pace.is_unlimited
+        self._simulate, self._round_us = simulate, round_us
         self._end_us = 0
         self._apply_biases(self.biases)
 
     def read(self) -> CameraPacket:
         """The next packet at its time: a scene has no end."""
-        wait_s = self._due_s() - now_s()
-        if wait_s > 0.0:  # a sleep of 0 s waits for Python's lock, 5 ms a thread that computes
-            time.sleep(wait_s)
+        self._pace.wait_for(self._end_us, self._end_us + PACKET_US)
         round_start_us, start_us = self._end_us - self._end_us % self._round_us, self._end_us % self._round_us
         events = self._events.between(start_us, start_us + PACKET_US)
         self._end_us += PACKET_US
@@ -71,11 +64,4 @@ class SimulatedCamera(EventCamera):
 
     def _apply_biases(self, biases: Mapping[str, int]) -> None:
         self._events = self._simulate(biases)
-        self._begun: tuple[float, int] | None = None  # when its clock went on, and what it showed
-
-    def _due_s(self) -> float:
-        """Time at which the next packet is complete."""
-        if self._begun is None:
-            self._begun = now_s(), self._end_us
-        begun_s, begun_us = self._begun
-        return begun_s + (self._end_us + PACKET_US - begun_us) * 1e-6 / self._speed
+        self._pace.pause()

@@ -16,7 +16,7 @@ from numba import njit
 
 from .arrays import Floats
 from .hinged_path import solve
-from .moving_circle import inverse_matrix, product
+from .small_matrices import inverse_matrix, product
 
 # Student's t for the circles: with 4 degrees of freedom one that is 10 sigma off counts for a fifteenth.
 T_FREEDOM = 4.0

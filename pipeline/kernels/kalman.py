@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from .arrays import Floats
-from .moving_circle import inverse_matrix
+from .small_matrices import inverse_matrix
 
 STATES = 5
 OBSERVED = np.array([0, 1, 4])

@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 
 from .arrays import Floats
-from .moving_circle import inverse_matrix, product
 from .rotation import Vector
+from .small_matrices import inverse_matrix, product
 
 # Lift that no ball shows: 60 m/s^2 (150 rps at 30 m/s: 65). It keeps the largest likelihood finite where the circles
 # say nothing.

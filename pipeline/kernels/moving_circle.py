@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 
 from .arrays import Events, Flags, Floats, Integers, Pixels
+from .small_matrices import inverse_matrix
 
 # Parts of an outline: all of it, the half that moves outwards, or the events of both halves as a disc brighter or
 # darker than the ground gives them (ON where a bright one moves outwards and OFF where it moves inwards).
@@ -69,42 +70,6 @@ def residuals(circle: Floats, ellipticity: Floats, tau_s: Floats, x_px: Floats, 
         bulge = (ellipticity[0] * (dx * dx - dy * dy) + ellipticity[1] * 2.0 * dx * dy) / square
         distances[i] = math.sqrt(square) - circle[4] * (1.0 + bulge)
     return distances
-
-
-@njit(cache=True, nogil=True)
-def inverse_matrix(matrix: Floats) -> Floats:
-    """Inverse of a positive definite matrix (n, n), by elimination.
-
-    LAPACK's through NumPy is no faster on 5 x 5 and takes five times as long to compile with the fit.
-    """
-    n = matrix.shape[0]
-    left = matrix.copy()
-    inverse = np.zeros((n, n))
-    for i in range(n):
-        inverse[i, i] = 1.0
-    for i in range(n):
-        pivot = 1.0 / left[i, i]
-        for k in range(n):
-            left[i, k] *= pivot
-            inverse[i, k] *= pivot
-        for j in range(n):
-            if j != i:
-                factor = left[j, i]
-                for k in range(n):
-                    left[j, k] -= factor * left[i, k]
-                    inverse[j, k] -= factor * inverse[i, k]
-    return inverse
-
-
-@njit(cache=True, nogil=True)
-def product(left: Floats, right: Floats) -> Floats:
-    """Product (m, n) of small matrices (m, k) and (k, n): BLAS sums in another order on another processor."""
-    result = np.zeros((left.shape[0], right.shape[1]))
-    for i in range(left.shape[0]):
-        for j in range(left.shape[1]):
-            for k in range(right.shape[1]):
-                result[i, k] += left[i, j] * right[j, k]
-    return result
 
 
 @njit(cache=True, nogil=True)

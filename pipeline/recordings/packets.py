@@ -21,7 +21,7 @@ def foreign_errors(path: Path, kind: str) -> Iterator[None]:
             yield
         except SpinscopeError:
             raise
-        except Exception as error:
+        except Exception as error:  # of any class: a package knows its own
             raise RuntimeError(str(error)) from error
 
 

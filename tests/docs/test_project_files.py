@@ -69,3 +69,9 @@ def test_links_and_paths_exist(page: Path) -> None:
 def test_notes_of_the_version_are_in_the_changelog() -> None:
     version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
     assert f"## [{version}]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_no_file_stands_where_compiled_code_is_kept() -> None:
+    """Python and numba could keep none there: every start would compile anew."""
+    folders = [path for name in ("app", "pipeline", "tests", "docs") for path in (ROOT / name).rglob("__pycache__")]
+    assert all(path.is_dir() for path in folders)

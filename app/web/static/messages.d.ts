@@ -1,4 +1,4 @@
-// Generated from app/web/schemas.py by `python -m tests.app.web.message_types`: do not edit.
+// Generated from the schemas in app/web by `python -m tests.app.web.message_types`: do not edit.
 /** Work in the background: recordings done of all, those that cannot be read, and what happened to a camera. */
 export type AnalysisState = { total: number; done: number; is_working: boolean; failures: Record<string, string>; camera_notice: CameraNotice | null };
 /** Declaration of one bias. */

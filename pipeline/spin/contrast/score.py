@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 
 from ...kernels.arrays import Flags, Floats, Integers
 from ...kernels.rotation import axis_and_length, orthonormal_axes, rotate
+from ...kernels.small_matrices import product
 from .events import EventColumns, ScoreWindow, SphereEvents, segment_starts, shifted_normals, take_columns
 
 TURN = 2.0 * math.pi
@@ -82,7 +83,10 @@ def _pole(points: Floats) -> tuple[float, float, float]:
     Their mean, multiplied by the eighth power of their second moments: the first axis of these, nearly. A thousandth of
     the unit matrix keeps it a direction where they cancel.
     """
-    moments, squared, mean = 1e-3 * np.eye(3), np.empty((3, 3)), np.array([0.0, 0.0, 1e-9])
+    moments, mean = np.zeros((3, 3)), np.zeros(3)
+    mean[2] = 1e-9
+    for i in range(3):
+        moments[i, i] = 1e-3
     used = points[:, :: max(1, points.shape[1] // POLE_EVENTS)]
     for k in range(used.shape[1]):
         for i in range(3):
@@ -90,12 +94,7 @@ def _pole(points: Floats) -> tuple[float, float, float]:
             for j in range(3):
                 moments[i, j] += used[i, k] * used[j, k] / used.shape[1]
     for _ in range(3):
-        for i in range(3):
-            for j in range(3):
-                squared[i, j] = 0.0
-                for k in range(3):
-                    squared[i, j] += moments[i, k] * moments[k, j]
-        moments[:] = squared
+        moments = product(moments, moments)
     x = moments[0, 0] * mean[0] + moments[0, 1] * mean[1] + moments[0, 2] * mean[2]
     y = moments[1, 0] * mean[0] + moments[1, 1] * mean[1] + moments[1, 2] * mean[2]
     z = moments[2, 0] * mean[0] + moments[2, 1] * mean[1] + moments[2, 2] * mean[2]

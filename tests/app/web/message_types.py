@@ -14,11 +14,11 @@ from spinscope.app.web.app_state import AppState
 from spinscope.app.web.application import application
 from spinscope.app.web.coach_application import SESSION as COACH
 from spinscope.app.web.coach_application import CoachState, coach_application
-from spinscope.app.web.schemas import ServerMessage
+from spinscope.app.web.message_schemas import ServerMessage
 from spinscope.pipeline.session import DEFAULT_SAMPLE, Choices
 
 TARGET = Path(__file__).parents[3] / "app/web/static/messages.d.ts"
-HEAD = "// Generated from app/web/schemas.py by `python -m tests.app.web.message_types`: do not edit."
+HEAD = "// Generated from the schemas in app/web by `python -m tests.app.web.message_types`: do not edit."
 SESSION = "/api/sessions/{session_id}/"
 SIMPLE = {"string": "string", "integer": "number", "number": "number", "boolean": "boolean", "null": "null"}
 Schema = dict[str, Any]

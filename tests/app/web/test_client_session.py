@@ -15,9 +15,10 @@ from spinscope.app.viewer.drawing_cache import DrawingCache
 from spinscope.app.web.client_session import ClientSession
 from spinscope.app.web.jobs import Job, error_text
 from spinscope.app.web.message_queue import MessageQueue, RequestQueue, Superseded
+from spinscope.app.web.message_schemas import BiasesMessage, Picture, RunMessage, ServerMessage, ShotsMessage
 from spinscope.app.web.open_recording import OpenRecording
 from spinscope.app.web.publisher import PICTURES_LEAST
-from spinscope.app.web.schemas import BiasesMessage, Picture, RunMessage, RunRequest, ServerMessage, ShotsMessage
+from spinscope.app.web.schemas import RunRequest
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.session import Choices
 

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from . import app, pipeline, recordings, spin
+from . import app, pipeline, recordings, spin, stages
 
-MUTANTS = [*pipeline.MUTANTS, *spin.MUTANTS, *recordings.MUTANTS, *app.MUTANTS]
+MUTANTS = [*pipeline.MUTANTS, *stages.MUTANTS, *spin.MUTANTS, *recordings.MUTANTS, *app.MUTANTS]

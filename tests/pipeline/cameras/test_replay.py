@@ -61,8 +61,8 @@ def test_a_loop_goes_on_behind_its_end() -> None:
 
 def test_it_takes_as_long_as_the_recording_at_its_speed(monkeypatch: pytest.MonkeyPatch) -> None:
     slept: list[float] = []
-    monkeypatch.setattr("spinscope.pipeline.cameras.replay.time.sleep", slept.append)
-    monkeypatch.setattr("spinscope.pipeline.cameras.replay.now_s", lambda: sum(slept))
+    monkeypatch.setattr("spinscope.pipeline.cameras.clock.time.sleep", slept.append)
+    monkeypatch.setattr("spinscope.pipeline.cameras.clock.now_s", lambda: sum(slept))
     played(recorded(0.4), speed=2.0)
     assert sum(slept) == pytest.approx(0.2, abs=0.01)
 
@@ -71,14 +71,14 @@ def test_one_that_is_late_does_not_sleep(monkeypatch: pytest.MonkeyPatch) -> Non
     """Not even for 0 s: other threads would take Python's lock for many times the length of a packet."""
     slept: list[float] = []
     times = itertools.chain([0.0], itertools.repeat(100.0))
-    monkeypatch.setattr("spinscope.pipeline.cameras.replay.time.sleep", slept.append)
-    monkeypatch.setattr("spinscope.pipeline.cameras.replay.now_s", lambda: next(times))
+    monkeypatch.setattr("spinscope.pipeline.cameras.clock.time.sleep", slept.append)
+    monkeypatch.setattr("spinscope.pipeline.cameras.clock.now_s", lambda: next(times))
     assert sum(len(packet.events) for packet in played(recorded(0.1), speed=1.0)) == 2000 and not slept
 
 
 def test_a_stall_comes_every_second(monkeypatch: pytest.MonkeyPatch) -> None:
     slept: list[float] = []
-    monkeypatch.setattr("spinscope.pipeline.cameras.replay.time.sleep", slept.append)
+    monkeypatch.setattr("spinscope.pipeline.cameras.clock.time.sleep", slept.append)
     played(recorded(2.5), fault="stall")
     assert slept == [0.5, 0.5]
 

@@ -50,8 +50,8 @@ def test_biases_act_on_all_later_events_and_the_clock_stands_still_meanwhile() -
 def test_it_keeps_to_its_pace_and_does_not_hurry_after_a_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
     slept: list[float] = []
     clock = [100.0]
-    monkeypatch.setattr("spinscope.pipeline.cameras.simulated.time.sleep", slept.append)
-    monkeypatch.setattr("spinscope.pipeline.cameras.simulated.now_s", lambda: clock[0] + sum(slept))
+    monkeypatch.setattr("spinscope.pipeline.cameras.clock.time.sleep", slept.append)
+    monkeypatch.setattr("spinscope.pipeline.cameras.clock.now_s", lambda: clock[0] + sum(slept))
     made = camera(speed=0.5)
     for _ in range(3):
         made.read()

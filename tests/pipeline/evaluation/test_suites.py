@@ -66,8 +66,9 @@ def test_thrower_and_the_frame_camera_beside_it(cache: Path) -> None:
     rows = run("thrower", cache).rows
     best = where(rows, method="best", visible=True)
     assert len(best) == len(errors(best, "axis_error_deg")) == 4
-    magnitude, axis = worst(best)
-    assert magnitude < 0.2 and axis < 2.5
+    for by, rps in (("thrower", 0.12), ("people", 0.2)):  # the latter is slow
+        magnitude, axis = worst(where(best, by=by))
+        assert magnitude < rps and axis < 2.5
     for row in best:
         assert float(str(row["axis_error_deg"])) < 3 * float(str(row["axis_std_deg"])) < 12
         assert 0.8 < float(str(row["tracked_ms"])) / float(str(row["duration_ms"])) <= 1.0

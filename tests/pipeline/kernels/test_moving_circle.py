@@ -118,13 +118,6 @@ def test_fit_equals_the_twin(seed: int, rounds: int, held: list[float]) -> None:
     assert np.allclose(fitted, reference.fit_circle(*args), atol=np.array([1e-4, 1e-4, 0.1, 0.1, 1e-4]), rtol=0)
 
 
-@given(n=st.integers(1, 6), seed=st.integers(0, 2**32 - 1))
-def test_inverse_equals_numpys(n: int, seed: int) -> None:
-    root = np.random.default_rng(seed).normal(size=(n, n + 2))
-    matrix = root @ root.T + 0.01 * np.eye(n)
-    assert np.allclose(moving_circle.inverse_matrix(matrix) @ matrix, np.eye(n), atol=1e-8)
-
-
 @given(seed=st.integers(0, 2**32 - 1), ahead_only=st.booleans())
 def test_fit_finds_the_ring_and_knows_how_well(seed: int, ahead_only: bool) -> None:
     rng = np.random.default_rng(seed)
