@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from . import entities as at
 from . import panes
 from .ball_projections import sphere
+from .derotated_logo import bounds as logo_bounds
 from .image import ball_places
 from .png import png
 from .rerun_api import Chunk, columns_at, once, strips, styled
@@ -45,11 +46,12 @@ def note_without_a(run: ViewedRun) -> list[Chunk]:
     """Text of the comparison while nothing is pinned, and a hint in each pane that has nothing to show without A."""
     text = "## Nothing to compare yet\n\nPress **Pin as A** above the viewer, then change parameters: that is B."
     look: dict[str, Any] = {"labels": HOW_TO_PIN, "colors": at.OTHERS_COLOUR, "radii": -0.1, "show_labels": True}
-    flat = [A + at.SURFACE, at.SURFACE_DIFFERENCE, A + at.DEROTATED_LOGO]
+    ball = np.zeros(2)  # a close-up's origin
+    flat = {A + at.SURFACE: ball, at.SURFACE_DIFFERENCE: ball, A + at.DEROTATED_LOGO: logo_bounds().mean(axis=1)}
     return [
         *_note(run, text),
         once(A + at.BALL_PLACE, rr.Transform3D(translation=[0.0, 0.0, 0.0])),  # the close-up's origin
-        *(once(entity, rr.Points2D([[0.0, 0.0]], **look)) for entity in flat),
+        *(once(entity, rr.Points2D([middle], **look)) for entity, middle in flat.items()),
         once(f"{at.COMPARED_AXES}/angle", rr.Points3D([[0.0, 0.0, 0.0]], **look)),
     ]
 

@@ -154,6 +154,12 @@ def _graticule() -> Chunk:
 
 
 @cache
+def bounds() -> Floats:
+    """Extent of the two discs' picture, (2, 2), px: x and y, from and to."""
+    height, width = disc_mask().shape
+    return np.array([[0.0, width], [0.0, height]])
+
+
 def _blanks() -> tuple[Bytes, Bytes, Bytes]:
     """Texture, discs and map without events, (height, width, 3) each."""
     discs = np.full((*disc_mask().shape, 3), at.BACKGROUND, np.uint8)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from . import entities as at
 from .ball import EYE, path_bounds_m
+from .derotated_logo import bounds as logo_bounds
 from .run import ViewedRun
 from .witnesses import bounds as witness_bounds
 
@@ -67,7 +68,7 @@ def flow(run: ViewedRun) -> rrb.View:
 
 def derotated_logo(name: str = "Derotated logo", prefix: str = "") -> rrb.View:
     """The logo with the spin taken out, both halves of the ball."""
-    return picture(prefix + at.DEROTATED_LOGO, name)
+    return picture(prefix + at.DEROTATED_LOGO, name, bounds=logo_bounds())
 
 
 def score_over_magnitude() -> rrb.View:

@@ -175,7 +175,7 @@ def _frame() -> list[Chunk]:
     scale = [np.array([[x, BARS_TOP_PX], [x, bottom]]) for x in _bar_x(marks)]
     rims = [rim, rim + np.array([2 * DISC_RADIUS_PX + GAP_PX, 0.0])]
     numbers = [*(f"{mark:.0f}" for mark in marks[:-1]), f"{marks[-1]:.0f} rps"]
-    labels = [(number, (x, bottom + 16)) for number, x in zip(numbers, _bar_x(marks), strict=True)]
+    labels = [(number, (x, bottom - 8)) for number, x in zip(numbers, _bar_x(marks), strict=True)]
     labels += [("towards", (DISC_RADIUS_PX, -16.0)), ("away", (3 * DISC_RADIUS_PX + GAP_PX, -16.0))]
     labels.append(("odds over the next", (ODDS_X_PX, BARS_TOP_PX - 18.0)))
     names = [*("Logo seen or not" if name == SIGHTINGS else STAGES[name].label for name in NAMES), "Truth"]
@@ -198,5 +198,5 @@ def _frame() -> list[Chunk]:
 
 def bounds() -> Floats:
     """Visible part of the picture, (2, 2), px: x and y, from and to."""
-    bottom = BARS_TOP_PX + ROW_PX * (len(NAMES) + 1) + 36.0
+    bottom = BARS_TOP_PX + ROW_PX * (len(NAMES) + 1) + 44.0
     return np.array([[-MARGIN_PX, WIDTH_PX + ODDS_MARGIN_PX], [-36.0, bottom]])

@@ -263,6 +263,7 @@ export class Viewer extends EventTarget {
   }
 
   bringToFront(/** @type {string} */ title) {
+    if (this.#shown === null) this.#turned(title); // the first recording is shown there
     return this.#next(async () => {
       if (this.#shown === null) return;
       const blueprint = await this.#layout();

@@ -73,6 +73,10 @@ def test_without_the_viewer_a_preview_follows_the_playhead(bare: Tab) -> None:
     bare.until(f"{shown_ms} <= {end_ms - tick_ms}")
     there_us = page.evaluate("window.spinscope.viewer.playhead_us")
     page.wait_for_url(re.compile(f"t={there_us}"))
+    page.keyboard.press("2")  # a tab that the viewer is to show when it comes
+    page.wait_for_url(re.compile("tab=Tracker"))
+    page.keyboard.press("1")
+    page.wait_for_url(re.compile("^((?!tab=Tracker).)*$"))
     page.reload()
     page.wait_for_selector("body[data-done]", state="attached")
     bare.until(f"{shown_ms} > {end_ms - 3 * tick_ms} && {shown_ms} <= {end_ms - tick_ms}")
