@@ -1,4 +1,4 @@
-"""The house rules that tools can check: style, types and the arrows between the rooms."""
+"""Checks of the whole tree by tools (style, types, import layers), and of the files at its top."""
 
 from __future__ import annotations
 
