@@ -24,6 +24,7 @@ from .surface import SurfaceResult
 from .track_background import SHAKING_US, background_moves
 from .track_ball import Measuring, TrackedBall
 from .track_contact import Contact, find_contact
+from .track_continuation import CONTACT_UNCERTAIN, ended_at
 from .track_hough import hough_near
 from .track_initiation import begin_tracks, is_search_due
 from .track_limits import Limits
@@ -35,16 +36,10 @@ from .track_search import SearchMemory
 from .track_state import Earlier, TrackState, ball_track, follow_path, is_beyond
 
 # What speaks against one free flight, in words for people.
-CONTACT_UNCERTAIN = "the camera shakes so much that it is uncertain when, and whether, the ball touched something"
 MAY_ROLL = "the ball is slow and was seen for too short a time to tell whether it flies or rolls"
 # Circles measured after a contact until it is announced; fewer would not tell when it was. At a shot's end, the one
 # there is.
 AFTER_CONTACT, AFTER_CONTACT_AT_END = 3, 1
-# Two paths are one ball's where a hinge joins them so nearly: variance of the circles about it over that on clean
-# scenes. One ball's have 1 to 3, those of two balls that pass each other by a radius more than 1000.
-SAME_BALL_ROUGHNESS = 10.0
-# How much of the second path is taken: the change test looks for a hinge between the last circles.
-CONTINUED_US = 20_000
 
 
 def start(parameters: TrackParameters, context: Context) -> TrackState:
@@ -107,19 +102,20 @@ def _step_flying(
     for ball in state.balls:
         ball.filter.predict((packet.end_us - packet.start_us) * 1e-6)
     hough = _hough_near(state, state.balls[0], surface) if state.balls else None
-    lost, ended = None, []
+    lost: str | None = None
+    ended: list[ShotEnd] = []
     for ball in tuple(state.balls):
         lost, end = _follow(parameters, state, ball, packet)
         if end is not None:
-            _let_go(state, ball)
+            state.let_go(ball)
             ended.append(end)
     for ball in _doubles(state.balls):
-        _let_go(state, ball)
+        state.let_go(ball)
         ended.append(ShotEnd(ball.shot, packet.start_us, "lost"))
     waiting = None
     earlier: Earlier = {}
     if is_search_due(state, packet):
-        anywhere, waiting = begin_tracks(parameters, state, packet, surface, earlier)
+        anywhere, waiting = begin_tracks(parameters, state, packet, surface, earlier, ended)
         hough = hough or anywhere
     if _is_shaking(parameters, state, packet.end_us):
         for ball in state.balls:
@@ -173,45 +169,15 @@ def _follow(
     return None, None
 
 
-def _let_go(state: TrackState, ball: TrackedBall) -> None:
-    """Follow a ball no longer."""
-    state.balls.remove(ball)
-    state.past.gone.append(ball)
-
-
 def _doubles(balls: list[TrackedBall]) -> list[TrackedBall]:
     """The balls that follow the same outline as one found before them."""
     return [ball for place, ball in enumerate(balls) if any(ball.shares_outline(other) for other in balls[:place])]
 
 
 def _end(parameters: TrackParameters, state: TrackState, ball: TrackedBall, end_us: int, ended_by: EndedBy) -> ShotEnd:
-    """End of a shot, at a contact if one came so late that the ball was hardly seen after it, or found anew."""
+    """End of a shot, at a contact if one came so late that the ball was hardly seen after it."""
     contact = _contact(parameters, state, ball.path, AFTER_CONTACT_AT_END)
-    if contact is None and ended_by == "lost":
-        contact = _contact_before_found(parameters, state, ball)
-    return ShotEnd(ball.shot, end_us, ended_by) if contact is None else _end_at(contact, ball)
-
-
-def _contact_before_found(parameters: TrackParameters, state: TrackState, ball: TrackedBall) -> Contact | None:
-    """The contact that a lost ball had before it was found as another one; None where no ball's path continues its own.
-
-    A racket's outline on the old path can be taken for the ball's until the ball that it sent back is found elsewhere.
-    """
-    for other in state.balls:
-        first_us = other.path[0].end_us
-        if other is ball or other.began_by != "found" or not ball.path[0].end_us < first_us <= ball.path[-1].end_us:
-            continue
-        path = [point for point in ball.path if point.end_us < first_us]
-        path += [point for point in other.path if point.end_us <= first_us + CONTINUED_US]
-        contact = _contact(parameters, state, path, AFTER_CONTACT_AT_END)
-        if contact is not None and contact.path.roughness < SAME_BALL_ROUGHNESS:
-            return contact
-    return None
-
-
-def _end_at(contact: Contact, ball: TrackedBall) -> ShotEnd:
-    doubt = None if contact.is_certain else CONTACT_UNCERTAIN
-    return ShotEnd(ball.shot, contact.earliest_us, contact.kind, doubt)
+    return ShotEnd(ball.shot, end_us, ended_by) if contact is None else ended_at(contact, ball)
 
 
 def _contact(
@@ -233,7 +199,7 @@ def _announce_contacts(parameters: TrackParameters, state: TrackState, earlier: 
         contact = _contact(parameters, state, ball.path, AFTER_CONTACT)
         if contact is None:
             continue
-        ended.append(_end_at(contact, ball))
+        ended.append(ended_at(contact, ball))
         after = ball.after(contact, state.measuring, state.shots)
         after.doubt = ended[-1].doubt
         path = [replace(point, circle=None) if point.end_us == contact.stray_us else point for point in ball.path]

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..results import Circle, Packet
 from .surface import SurfaceResult
 from .track_ball import TrackedBall
+from .track_continuation import continued, ended_at
 from .track_outline import Sighting
 from .track_parameters import TrackParameters
-from .track_result import BeganBy
+from .track_result import BeganBy, ShotEnd
 from .track_search import (
     MOST_CANDIDATES,
     MOST_RIVALS,
@@ -43,11 +46,16 @@ def is_search_due(state: TrackState, packet: Packet) -> bool:
 
 
 def begin_tracks(
-    parameters: TrackParameters, state: TrackState, packet: Packet, surface: SurfaceResult, earlier: Earlier
+    parameters: TrackParameters,
+    state: TrackState,
+    packet: Packet,
+    surface: SurfaceResult,
+    earlier: Earlier,
+    ended: list[ShotEnd],
 ) -> tuple[Circle | None, Sighting | None]:
     """Begin tracks of sightings that are trusted, or promising for long enough; the best circle and what must wait.
 
-    Adds what comes before this tick of the shots that begin to `earlier`.
+    Adds what comes before this tick of the shots that begin to `earlier`, and the shots that end with them to `ended`.
     """
     state.looked_us = packet.end_us
     measured = [ball.filter.mean for ball in state.balls if ball.measured is not None]
@@ -74,7 +82,7 @@ def begin_tracks(
         if packet.end_us - since[0] < _wait_us(parameters, state, sighting):
             state.pending.append(since)
         else:
-            _begin(parameters, state, packet, sighting, earlier)
+            _begin(parameters, state, packet, sighting, earlier, ended)
             hough = circle
     state.pending += [one for one in pending if packet.end_us - one[0] < HELD_US]
     return hough, state.pending[0][1] if state.pending else None
@@ -97,11 +105,17 @@ def _wait_us(parameters: TrackParameters, state: TrackState, sighting: Sighting)
 
 
 def _begin(
-    parameters: TrackParameters, state: TrackState, packet: Packet, sighting: Sighting, earlier: Earlier
+    parameters: TrackParameters,
+    state: TrackState,
+    packet: Packet,
+    sighting: Sighting,
+    earlier: Earlier,
+    ended: list[ShotEnd],
 ) -> None:
     """Follow a sighting: as the ball out of sight whose path it meets, else as a new shot.
 
-    The new shot begins with the first tick in which its ball is measured; the states since then are in `earlier`.
+    The new shot begins at the contact where its path continues another ball's, which then ends there, else with the
+    first tick in which its ball is measured; the states since then are in `earlier`.
     """
     for ball in state.balls:
         if ball.measured is None and ball.is_found(sighting, packet.end_us):
@@ -110,11 +124,23 @@ def _begin(
     ball = TrackedBall.at(sighting, state.measuring, state.shots, packet, "found")
     path, first = state.past.path_before(ball, state.balls, state.measuring, parameters.coast_us)
     tick = state.past.ticks[-len(path)]
-    if len(path) > 1:
-        ball = ball.extended(path, tick.start_us, first, state.measuring)
-    ball.began_by = _began_by(state, tick, first)
-    if len(path) > 1:
-        earlier[ball.shot] = follow_path(parameters, ball, path, tick.end_us)
+    continuation = continued(parameters, state, sighting, path, first)
+    if continuation is not None:
+        other, contact = continuation
+        state.let_go(other)
+        ended.append(ended_at(contact, other))
+        # What was measured on the old path since is not the ball.
+        since = [replace(point, circle=None) for point in other.path if contact.latest_us < point.end_us]
+        path = [*(point for point in since if point.end_us < path[0].end_us), *path]
+        ball = replace(ball, path=path).after(contact, state.measuring, state.shots)
+        ball.doubt = ended[-1].doubt
+        earlier[ball.shot] = follow_path(parameters, ball, path, ball.start_us + parameters.contour_us)
+    else:
+        if len(path) > 1:
+            ball = ball.extended(path, tick.start_us, first, state.measuring)
+        ball.began_by = _began_by(state, tick, first)
+        if len(path) > 1:
+            earlier[ball.shot] = follow_path(parameters, ball, path, tick.end_us)
     state.balls.append(ball)
     state.shots += 1
 

@@ -41,6 +41,11 @@ class TrackState:
     shots: int = 0
     excluded: str | None = None  # the setting that excluded a circle since the last ball, in words
 
+    def let_go(self, ball: TrackedBall) -> None:
+        """Follow a ball no longer."""
+        self.balls.remove(ball)
+        self.past.gone.append(ball)
+
 
 def follow_path(
     parameters: TrackParameters, ball: TrackedBall, path: list[PathPoint], own_us: int

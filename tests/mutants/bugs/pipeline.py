@@ -158,10 +158,10 @@ VALUES = [
         "tests/pipeline/test_track_evidence.py",
     ),
     Mutant(
-        "pipeline/stages/track.py",
-        "contact.path.roughness < SAME_BALL_ROUGHNESS",
-        "contact.path.roughness > 0.0",
-        "tests/pipeline/stages/test_track_contact.py -k continues_its_path",
+        "pipeline/stages/track_continuation.py",
+        "if missed_px < SAME_PLACE * first[4]:",
+        "if missed_px >= 0.0:",
+        "tests/pipeline/stages/test_track_contact.py -k continues_anothers_path",
     ),
     Mutant(
         "pipeline/stages/track_contact.py",

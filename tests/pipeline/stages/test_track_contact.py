@@ -9,15 +9,19 @@ import numpy as np
 import pytest
 
 from spinscope.pipeline.camera import Camera, CameraParameters
-from spinscope.pipeline.results import Circle
+from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.results import Circle, Packet
 from spinscope.pipeline.simulator import Ball, Flight, Scene, flight
 from spinscope.pipeline.simulator.motion import Trajectory, trajectory, triple
 from spinscope.pipeline.stage import Context
-from spinscope.pipeline.stages import track, track_contact
+from spinscope.pipeline.stages import track, track_contact, track_initiation
 from spinscope.pipeline.stages.track_ball import TrackedBall
 from spinscope.pipeline.stages.track_contact import Contact, find_contact
+from spinscope.pipeline.stages.track_outline import Sighting
 from spinscope.pipeline.stages.track_parameters import TrackParameters
 from spinscope.pipeline.stages.track_path import PathPoint
+from spinscope.pipeline.stages.track_result import ShotEnd
+from spinscope.pipeline.stages.track_state import Earlier
 
 ABOVE = Camera.of(CameraParameters(), 1280, 720)
 SIDE = Camera.of(CameraParameters(up=(0.0, -1.0, 0.0)), 1280, 720)
@@ -269,29 +273,47 @@ def test_a_rackets_outline_on_the_old_path_does_not_delay_a_hit(seed: int) -> No
 
 
 @pytest.mark.parametrize("aside_px", [0.0, 20.0])
+@pytest.mark.parametrize("strays", [1, 2])
 @pytest.mark.parametrize("seed", range(5320, 5325))
-def test_a_lost_ball_was_hit_where_a_ball_that_was_found_continues_its_path(seed: int, aside_px: float) -> None:
-    """And not where that one passes by at a radius."""
+def test_a_ball_found_where_it_continues_anothers_path_begins_with_the_hit(
+    seed: int, strays: int, aside_px: float
+) -> None:
+    """The other's shot ends there, whatever was measured on its old path since; not where it passes by at a radius."""
     way, camera = hit(seed)
     at_us, circles = contact_s(way) * 1e6, path_of(way, camera, rng_of(seed))
-    lost, first = with_stray(circles, at_us, 1)
-    found = [
-        replace(point, circle=replace(point.circle, y_px=point.circle.y_px + aside_px))
-        for point in circles[first + 1 :]
-        if point.circle is not None
-    ]
-    state = track.start(TrackParameters(), Context(camera, 0.02, {"filter.contour_mode": "plain"}))
-    ring = np.array([640.0, 360.0, 4000.0, 0.0, 18.0])
-    filters = [state.measuring.filter_at(ring, np.eye(5)) for _ in range(2)]
-    ball = TrackedBall(0, circles[0].end_us, "start", filters[0], lost[first].end_us, ring, lost[: first + 1])
-    other = TrackedBall(1, found[0].end_us, "found", filters[1], found[-1].end_us, ring, found)
-    ball.coast(found[-1].end_us)
-    state.balls = [ball, other]
-    end = track._end(TrackParameters(), state, ball, ball.seen_us, "lost")
+    path, first = with_stray(circles, at_us, strays)
+    found = circles[first + strays - 1]
+    assert found.circle is not None
+    (x, y, _), (later_x, later_y, _) = (
+        np.ravel(camera.silhouette(way.at(np.array([us * 1e-6])).position_m, 0.02))
+        for us in (found.end_us, found.end_us + 1)
+    )
+    velocity_px_s = 1e6 * np.array([later_x - x, later_y - y]) + rng_of(seed).normal(0.0, 50.0, 2)
+    ring = np.array([found.circle.x_px, found.circle.y_px + aside_px, *velocity_px_s, found.circle.radius_px])
+    group = TrackParameters(outline_px=0.0, lag_px=0.0)
+    state = track.start(group, Context(camera, 0.02, {"filter.contour_mode": "plain"}))
+    packet = Packet(0, found.end_us - TICK_US, found.end_us, EventBatch.empty())
+    state.past.add(packet)
+    known = state.measuring.filter_at(ring, np.eye(5))
+    old = TrackedBall(0, 0, "start", known, found.end_us, ring, path[: first + strays])
+    state.balls, state.shots = [old], 1
+    spread = np.diag([0.01, 0.01, 100.0**2, 100.0**2, 0.01])
+    sighting = Sighting(ring, spread, 0.1, 80, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0)
+    earlier: Earlier = {}
+    ended: list[ShotEnd] = []
+    track_initiation._begin(group, state, packet, sighting, earlier, ended)
     if aside_px:
-        assert end.ended_by == "lost" and end.end_us == ball.seen_us
-    else:
-        assert end.ended_by == "hit" and abs(end.end_us - at_us) < 500
+        assert not ended and [ball.began_by for ball in state.balls] == ["start", "start"]
+        return
+    ((end,), (ball,)) = ended, state.balls
+    assert (end.shot, end.ended_by, ball.shot, ball.began_by, ball.start_us) == (0, "hit", 1, "hit", end.end_us)
+    assert abs(end.end_us - at_us) < 500
+    states = (*earlier[1], ball.track(found.end_us, group.latency_us, 0.0, ()))
+    ends_us = np.array([one.t_us + one.latency_us for one in states])
+    assert ends_us.tolist() == [point.end_us for point in path[first : first + strays]]
+    true = np.stack(camera.silhouette(way.at(ends_us * 1e-6).position_m, 0.02), axis=1)
+    assert np.abs(np.array([one.mean[[0, 1, 4]] for one in states]) - true).max() < 1.5
+    assert [one.measured for one in earlier[1]] == [None] * (strays - 1)
 
 
 def test_a_short_path_tells_nothing() -> None:

@@ -329,7 +329,7 @@ def test_a_new_track_begins_with_the_sightings_spread_and_room_for_acceleration(
     state.shots = 4
     state.past.add(packet_to(10_000))
     earlier: track_state.Earlier = {}
-    track_initiation._begin(TrackParameters(), state, packet_to(10_000), sighting(), earlier)
+    track_initiation._begin(TrackParameters(), state, packet_to(10_000), sighting(), earlier, [])
     (ball,) = state.balls
     assert not earlier, "no tick came before"
     speed_std_px_s = 0.2 * 17.0 / 0.02
