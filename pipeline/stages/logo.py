@@ -96,6 +96,9 @@ class LogoResult(ReadOnlyArrays):
         The event may well be the moving ball's own outline, see `_of_outline`.
     turning : TurningEvents
         What is left of them without those, and the rim's that are not the outline's either: `_logo_events`.
+    is_bright : bool
+        Whether the outline is that of a moving ball brighter than all of the ground; what its pixels report late, with
+        the ball over them, is ON.
     position_std_px : float
         1 sigma of the centre across one axis, NaN without a ball.
     radius_std_px : float
@@ -115,6 +118,7 @@ class LogoResult(ReadOnlyArrays):
     normals: NDArray[np.float64]
     of_outline: NDArray[np.bool_]
     turning: TurningEvents
+    is_bright: bool
     position_std_px: float
     radius_std_px: float
     velocity_std_px_s: float
@@ -130,7 +134,7 @@ def absent(parameters: LogoParameters, reason: str) -> LogoResult:
     none, nowhere, no = np.empty(0), np.empty((0, 3)), np.empty(0, np.bool_)
     empty = (EventBatch.empty(), none, none, none, none)
     return LogoResult(
-        *empty, math.nan, parameters.pad_px, nowhere, nowhere, no, TurningEvents.empty(), *(math.nan,) * 3
+        *empty, math.nan, parameters.pad_px, nowhere, nowhere, no, TurningEvents.empty(), False, *(math.nan,) * 3
     )
 
 
@@ -148,7 +152,7 @@ def step(
     pad_px = parameters.pad_px if moving else parameters.fixed_pad_px
     rim_pad_px = parameters.rim_pad_px if moving else parameters.fixed_rim_pad_px
     own = filtered.logo_events.between(packet.start_us, packet.end_us)  # none from before the shot
-    events, inside = _logo_events(own, ball, radius_px - pad_px, radius_px - rim_pad_px)
+    events, inside, is_bright = _logo_events(own, ball, radius_px - pad_px, radius_px - rim_pad_px)
     centre_x, centre_y = ball.centre_px(events.t_us.astype(np.float64) - parameters.delay_us)
     camera = state.camera
     rays = camera.rays(events.x_px, events.y_px)
@@ -170,6 +174,7 @@ def step(
         normals=normals[rows],
         of_outline=of_outline[rows],
         turning=TurningEvents(events.t_us, events.on, normals, centre_x, centre_y)[turning],
+        is_bright=is_bright,
         position_std_px=math.sqrt(0.5 * (ball.covariance[0, 0] + ball.covariance[1, 1])),
         radius_std_px=math.sqrt(ball.covariance[4, 4]),
         velocity_std_px_s=math.sqrt(0.5 * (ball.covariance[2, 2] + ball.covariance[3, 3])),
@@ -178,8 +183,10 @@ def step(
 
 def _logo_events(
     events: EventBatch, ball: BallTrack, mask_px: float, rim_px: float
-) -> tuple[EventBatch, NDArray[np.bool_]]:
+) -> tuple[EventBatch, NDArray[np.bool_], bool]:
     """The events inside the mask and those of the rim that are not the outline's; which (n,) are inside the mask.
+
+    And whether the outline is that of a moving ball brighter than all of the ground.
 
     A bright ball over a darker ground turns pixels ON ahead and OFF behind, whatever its logo does: on simulated
     flights 3 in 100,000 of its events are of the other polarity, and nearly all OFF events ahead and ON events behind
@@ -195,9 +202,10 @@ def _logo_events(
         rim_px,
         (radius_px - OUTLINE_INSIDE_PX, radius_px + OUTLINE_OUTSIDE_PX),
     )
-    if (vx or vy) and others > MIXED_OUTLINE * likes:
+    is_moving, is_mixed = bool(vx or vy), others > MIXED_OUTLINE * likes
+    if is_moving and is_mixed:
         rows, inside = rows[inside], inside[inside]
-    return EventBatch(*take_events(rows, events.columns)), inside
+    return EventBatch(*take_events(rows, events.columns)), inside, is_moving and not is_mixed
 
 
 def _of_outline(x_px: Floats, y_px: Floats, on: NDArray[np.bool_], ball: BallTrack) -> NDArray[np.bool_]:

@@ -100,7 +100,8 @@ def step(
     witnesses = _witnesses(rate, normal_flow.estimate, contrast, trajectory)
     if basis is None or contrast.changes:
         reason = contrast.estimate.reason or "the logo is not seen"
-        against = "trajectory" if contrast.changes else None  # which is of two flights as well
+        # The flight is of two flights as well, or tells to a third what a logo in view would tell to a hundredth.
+        against = "trajectory" if contrast.changes or contrast.may_be_outline else None
         return CombinedResult(SpinEstimate.refused(METHOD, reason, against=against), witnesses)
     spins_rps = np.stack([candidate.spins_rps for candidate in candidates])
     bend = by_flight(trajectory, spins_rps)
@@ -152,9 +153,10 @@ def _candidates(
         return "pattern", pattern_candidates(contrast)
     if candidates := rhythm_candidates(rate, trajectory, gyro_std_deg):
         return "rhythm", candidates
-    if candidates := flight_candidates(trajectory, gyro_std_deg, context["spin.max_spin_rps"]):
-        return "flight", candidates
-    return None, []
+    if contrast.may_be_outline:
+        return None, []
+    candidates = flight_candidates(trajectory, gyro_std_deg, context["spin.max_spin_rps"])
+    return ("flight" if candidates else None), candidates
 
 
 def _estimate(

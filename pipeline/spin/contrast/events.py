@@ -235,6 +235,9 @@ class ContrastResult(ReadOnlyArrays):
         Score an event less that of permuted times; 0 = nothing turns with the spin.
     turns_seen : bool
         Whether the contrast is enough to tell a pattern that turns from chance; without it no spin is likelier.
+    may_be_outline : bool
+        Whether the sharp pattern may be what a slow sensor reports of the ball's outline: then the logo may be in view
+        or not, and its events tell neither its motion nor when it was seen.
     changes : bool
         Whether the spin changes within the flight: a contact was missed, and no estimate from all of it holds.
     full : bool
@@ -257,6 +260,7 @@ class ContrastResult(ReadOnlyArrays):
     offsets_px: Floats
     contrast: float
     turns_seen: bool
+    may_be_outline: bool
     changes: bool
     full: bool
     magnitudes_rps: Floats
@@ -280,6 +284,7 @@ class ContrastResult(ReadOnlyArrays):
             offsets_px=np.zeros(3),
             contrast=0.0,
             turns_seen=False,
+            may_be_outline=False,
             changes=False,
             full=False,
             **ScoreMap.empty()._asdict(),

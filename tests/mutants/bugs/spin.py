@@ -6,6 +6,18 @@ from tests.mutants.mutation import Mutant
 
 METHODS = [
     Mutant(
+        "pipeline/spin/contrast/stage.py",
+        "(on < LEAST_OF_POLARITY and not all(state.is_bright))",
+        "on < LEAST_OF_POLARITY",
+        "tests/pipeline/spin/test_contrast_trust.py",
+    ),
+    Mutant(
+        "pipeline/spin/combined/stage.py",
+        "if contrast.may_be_outline:\n        return None, []",
+        "if False:\n        return None, []",
+        "tests/pipeline/spin/test_combined.py",
+    ),
+    Mutant(
         "pipeline/spin/triplet.py",
         "np.cov(spins.T) / len(spins)",
         "np.cov(spins.T)",

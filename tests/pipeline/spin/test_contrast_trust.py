@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from spinscope.pipeline.registry import trusted_method
+from spinscope.pipeline.results import SpinEstimate
 from spinscope.pipeline.spin.contrast import ContrastParameters, stage
 from spinscope.pipeline.spin.contrast.events import ContrastEstimate
 from spinscope.pipeline.stages import rate
@@ -93,8 +95,36 @@ def test_an_answer_has_one_of_the_rhythms_magnitudes(told: RateResult, misses: b
     assert stage.misses_rhythm(told, SURE) == misses
 
 
-@pytest.mark.parametrize(("off", "share"), [(0, 0.0), (3, 0.03), (50, 0.5), (98, 0.02)])
-def test_the_rarer_polarity_is_that_of_fewer_events(off: int, share: float) -> None:
+@pytest.mark.parametrize(
+    ("off", "is_bright", "expected"),
+    [
+        (3, True, True),  # ON of a bright ball's leading outline
+        (7, True, False),
+        (97, True, False),  # OFF of a print that came: the trailing outline is reported behind the ball
+        (97, False, True),  # or of a dark ball's leading outline
+        (93, False, False),
+        (3, False, True),
+    ],
+)
+def test_one_polarity_may_be_a_leading_outline(off: int, is_bright: bool, expected: bool) -> None:
     ball = dotted_ball(SPIN, duration_s=0.02, events=100)
-    state = stage.ContrastState({}, parts=[(0, replace(ball, polarity=(np.arange(100) >= off).astype(np.int64)))])  # type: ignore[arg-type]
-    assert stage._rarer_polarity(state) == pytest.approx(share)
+    parts = [(0, replace(ball, polarity=(np.arange(100) >= off).astype(np.int64)))]
+    state = stage.ContrastState({}, parts=parts, is_bright=[True, is_bright])  # type: ignore[arg-type]
+    assert stage._are_one_polarity(state) == expected
+
+
+@pytest.mark.parametrize("events", ["on", "off"])
+def test_what_may_be_outline_is_trusted_neither_to_the_pattern_nor_to_its_flow(events: str) -> None:
+    """A pattern that turned by 0.4 turns, of one polarity."""
+    ball = dotted_ball(SPIN, duration_s=0.02, events=600)
+    polarity = np.full(600, int(events == "on"))
+    state = stage.ContrastState({}, parts=[(0, replace(ball, polarity=polarity))], is_bright=[True])  # type: ignore[arg-type]
+    flow = SpinEstimate("normal_flow", SPIN, np.eye(3), None)
+    answer = replace(SURE, span_s=0.4 / float(np.linalg.norm(SPIN)))
+    estimate, turns_seen, may_be_outline = stage._judged(PARAMETERS, state, answer, 600, rhythm(sigmas=0.0), flow)
+    if events == "on":
+        assert (estimate.reason, estimate.against) == (stage.OUTLINE, "normal_flow")
+        assert trusted_method({"normal_flow": flow, "contrast": estimate}) is None
+    else:
+        assert estimate.status == "ok"
+    assert (turns_seen, may_be_outline) == ((False, True) if events == "on" else (True, False))

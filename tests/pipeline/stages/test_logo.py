@@ -140,7 +140,7 @@ def test_at_the_rim_only_the_polarity_turns_that_the_outline_has_not() -> None:
     sure[inner] = ~result.of_outline
     expected = packet.events.t_us[sure | (rim & ~of_bright_ball[kept])]
     np.testing.assert_array_equal(result.turning.t_us, expected)
-    assert np.sum(rim & ~of_bright_ball[kept]) > 50
+    assert np.sum(rim & ~of_bright_ball[kept]) > 50 and result.is_bright
     np.testing.assert_allclose(np.linalg.norm(result.turning.normals, axis=1), 1.0)
 
 
@@ -148,6 +148,7 @@ def test_over_a_ground_brighter_than_the_ball_nothing_at_the_rim_is_sure() -> No
     track = known_ball(10_000, **FLIGHT)
     result = logo_of(around(track, 5000, 10_000), track)  # half of the events at the outline are of either polarity
     np.testing.assert_array_equal(result.turning.t_us, result.events.t_us[~result.of_outline])
+    assert not result.is_bright
 
 
 def test_a_fixed_balls_outline_is_silent() -> None:
@@ -158,7 +159,7 @@ def test_a_fixed_balls_outline_is_silent() -> None:
     near = np.hypot(packet.events.x_px - x, packet.events.y_px - y) < track.mean[4] + 2.0
     np.testing.assert_array_equal(result.turning.t_us, packet.events.t_us[near])
     np.testing.assert_allclose(np.linalg.norm(result.turning.normals, axis=1), 1.0)
-    assert len(result.turning) > len(result.events)
+    assert len(result.turning) > len(result.events) and not result.is_bright
 
 
 @pytest.mark.parametrize("name", ["flight_back", "flight_two_balls", "own/shot_slow_top"])
