@@ -49,6 +49,9 @@ STEP_US, FINE_STEP_US, REFINED_US = 2000, 250, 8000
 # A circle beside the hinge is a racket's or an arm's outline on the old path where the others, without it, are so many
 # times nearer to theirs (in chi^2) and gain as much as by a contact. Before or after a bounce none is.
 STRAY_RATIO = 4.0
+# And off their path by so many radii, 2 mm: drag that is turned round with the ball (20 m/s^2 and more) bends by up to
+# 1 mm what the others tell of it, and after a hit the outline is seen 0.1 px elsewhere than before.
+STRAY_RADII = 0.1
 # Circles that must be left on either side of it.
 CIRCLES_ASIDE = 2
 # The instant is good to so much, and what else it may have been lies within a cost so much higher (3 sigma).
@@ -142,9 +145,19 @@ def _places(
             continue
         without = Places.of(others, straddling_us, camera, ball_radius_m)
         lower = without.costs(times_us)
-        if lower.min() < min(costs.min() - LEAST_GAIN, costs.min() / STRAY_RATIO):
+        if not lower.min() < min(costs.min() - LEAST_GAIN, costs.min() / STRAY_RATIO):
+            continue
+        path = HingedPath(without, float(times_us[np.argmin(lower)]), camera, ball_radius_m)
+        if _off_radii(points[stray], path) > STRAY_RADII:
             places, costs, stray_us = without, lower, points[stray].end_us
     return places, costs, stray_us
+
+
+def _off_radii(point: PathPoint, path: HingedPath) -> float:
+    """Distance of a point's circle from a path, in radii."""
+    x, y, _, _, radius = path.state(point.end_us)
+    assert point.circle is not None
+    return math.hypot(point.circle.x_px - x, point.circle.y_px - y) / float(radius)
 
 
 def _is_certain(points: list[PathPoint], camera: Camera, ball_radius_m: float) -> bool:

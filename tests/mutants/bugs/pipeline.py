@@ -170,6 +170,12 @@ VALUES = [
         "tests/pipeline/stages/test_track_contact.py -k rackets_outline",
     ),
     Mutant(
+        "pipeline/stages/track_contact.py",
+        "if _off_radii(points[stray], path) > STRAY_RADII:",
+        "if _off_radii(points[stray], path) > 0.0:",
+        "tests/pipeline/stages/test_track_contact.py -k taken_for_a_rackets",
+    ),
+    Mutant(
         "pipeline/spin/combined/stage.py",
         "if odds < parameters.odds:",
         "if odds < 1.0:",
