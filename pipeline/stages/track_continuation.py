@@ -29,11 +29,12 @@ SAME_PLACE = 0.3
 def continued(
     parameters: TrackParameters,
     state: TrackState,
+    balls: list[TrackedBall],
     sighting: Sighting,
     path: list[PathPoint],
     first: NDArray[np.float64],
 ) -> tuple[TrackedBall, Contact] | None:
-    """The followed ball whose path that of a ball sighted now continues, and the contact between; None without one.
+    """The one of these balls whose path that of a ball sighted now continues, and the contact between; None without.
 
     Parameters
     ----------
@@ -44,13 +45,13 @@ def continued(
     """
     camera, ball_radius_m = state.context.camera, state.context.ball_radius_m
     ahead = _place_ahead(path[-1], state.measuring.edge.ball(sighting.ring), state.measuring)
-    for ball in state.balls:
+    for ball in balls:
         if not ball.has_size(sighting) or not ball.path[0].end_us < path[0].end_us <= ball.path[-1].end_us:
             continue
         before = [point for point in ball.path if point.end_us < path[0].end_us]
         contact = find_contact([*before, *path, ahead], camera, ball_radius_m, parameters.contour_us, 1)
-        if contact is None:
-            continue
+        if contact is None or contact.latest_us >= path[-1].end_us:
+            continue  # or that would be after the sighting
         left_px = first[:2] - (path[0].end_us - contact.time_us) * 1e-6 * first[2:4]
         missed_px = np.hypot(*(left_px - contact.path.state(contact.time_us - 1.0)[:2]))
         if missed_px < SAME_PLACE * first[4]:

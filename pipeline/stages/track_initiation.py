@@ -124,7 +124,8 @@ def _begin(
     ball = TrackedBall.at(sighting, state.measuring, state.shots, packet, "found")
     path, first = state.past.path_before(ball, state.balls, state.measuring, parameters.coast_us)
     tick = state.past.ticks[-len(path)]
-    continuation = continued(parameters, state, sighting, path, first)
+    known = [other for other in state.balls if other.shot not in earlier]
+    continuation = continued(parameters, state, known, sighting, path, first)
     if continuation is not None:
         other, contact = continuation
         state.let_go(other)
