@@ -14,7 +14,7 @@ from spinscope.pipeline.results import Packet
 from spinscope.pipeline.stages.track_result import BallTrack
 
 from ..tuning.bias_sweep import MOST_POINTS, BiasSweep, BiasSweepPoint, SweptBias
-from .event_rates import EventRateMeter
+from .event_rates import MARGIN_US, EventRateMeter
 
 SETTLE_US = 300_000  # after a change: pixels that are out of balance, and packets that were on their way
 MEASURED_S = 2.0
@@ -104,13 +104,12 @@ class CameraSweep:
         if self.done.is_set():
             return
         if self._from_us is None or packet.end_us < self._last_us:  # another clock: the value is measured anew
-            self._meter.take()
             self._from_us = self._set(self._left[0]) + SETTLE_US
         self._last_us = packet.end_us
-        if packet.start_us < self._from_us:
-            return
         self._meter.add(packet, balls)
-        if packet.end_us >= self._from_us + self._measured_us:
+        if packet.start_us < self._from_us:
+            self._meter.restart()
+        elif packet.end_us >= self._from_us + self._measured_us + MARGIN_US:
             self._end_value()
 
     def end(self) -> None:
@@ -121,8 +120,8 @@ class CameraSweep:
 
     def _end_value(self) -> None:
         rates = self._meter.take()
-        assert rates is not None
-        self._points.append(BiasSweepPoint(value=self._left.pop(0), **asdict(rates)))
+        known = {} if rates is None else asdict(rates)  # none where balls came and went all the time
+        self._points.append(BiasSweepPoint(value=self._left.pop(0), **known))
         self._from_us = None
         self._on_point(self.sweep)
         if not self._left:
@@ -141,7 +140,9 @@ def proposed_value(sweep: BiasSweep) -> int | None:
     has_ball = any(point.ball_on_hz for point in sweep.points)
     best, most_hz = None, 0.0
     for point in sweep.points:
-        noise_hz = (point.noise_on_hz or 0.0) + (point.noise_off_hz or 0.0)
+        if point.noise_on_hz is None or point.noise_off_hz is None:
+            continue
+        noise_hz = point.noise_on_hz + point.noise_off_hz
         on_hz, off_hz = point.ball_on_hz or 0.0, point.ball_off_hz or 0.0
         is_equal = not has_ball or max(on_hz, off_hz) <= MOST_UNEQUAL * min(on_hz, off_hz)
         gain_hz = on_hz + off_hz if has_ball else noise_hz

@@ -179,6 +179,7 @@ class EventStream:
                     break
                 self._mind_silence(packet, now_s() - asked_s)
                 self._take(packet)
+            self._obey()  # what was asked for before the end: a sweep's former biases
         except Exception as error:  # noqa: BLE001  handed to the thread that takes the ticks
             self._error = error
         finally:

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from click.testing import CliRunner
 from spinscope.app.cli import cli
 from spinscope.app.live import headless
 from spinscope.app.live.camera_sweep import CameraSweep, proposal_words, proposed_value
-from spinscope.app.live.event_rates import EventRateMeter, EventRates
+from spinscope.app.live.event_rates import MARGIN_US, EventRateMeter, EventRates
 from spinscope.app.tuning.bias_sweep import BiasSweep, BiasSweepPoint
 from spinscope.pipeline.cameras import CameraPacket, EventCamera, ReplayCamera
 from spinscope.pipeline.errors import CameraError, ParameterError
@@ -70,6 +71,7 @@ def point(value: int, noise: float, on: float | None = None, off: float | None =
         ([point(0, 1e6, 9e5, 9e5), point(40, 9e4, 5e5, 4e5), point(80, 1e4, 1e5, 1e5)], 40),
         ([point(0, 1e4, 9e5, 1e5), point(40, 1e4, 5e5, 4e5)], 40),  # ON and OFF part
         ([point(0, 1e6), point(40, 5e5)], None),
+        ([BiasSweepPoint(value=0), point(40, 9e4), point(80, 1e4)], 40),  # of 0 nothing is known
     ],
 )
 def test_the_supplement_s_trade_off(points: list[BiasSweepPoint], value: int | None) -> None:
@@ -93,7 +95,7 @@ def test_the_sweep_waits_for_the_camera_and_begins_a_value_anew_with_another_clo
         t_us = np.full(10, start_us)
         events = EventBatch(t_us, np.zeros(10, np.uint16), np.zeros(10, np.uint16), np.arange(10) < 3)
         sweep.add(Packet(start_us // 5000, start_us, start_us + 5000, events), ())
-    assert asked == [(0, 5000), (0, 5000), (4, 360_000), (2, 710_000)]
+    assert asked == [(0, 5000), (0, 5000), (4, 410_000), (2, 810_000)]
     assert sweep.done.is_set()
     assert [one.value for one in sweep.sweep.points] == [0, 4]
     for one in sweep.sweep.points:
@@ -115,13 +117,49 @@ def test_what_is_no_sweep(options: dict[str, Any], error: type[Exception], said:
         CameraSweep(**{**given, "points": 2, **options})
 
 
+def ball(shot: int = 0, x_px: float = 80.0) -> Any:
+    """A ball of 8 px at rest."""
+    return SimpleNamespace(
+        shot=shot, mean=[x_px, 60.0, 0.0, 0.0, 8.0], centre_px=lambda t_us: (np.full(len(t_us), x_px), 60.0)
+    )
+
+
+def tick(index: int, *, noise: int = 0, first: int = 0, second: int = 0) -> Packet:
+    """A tick with OFF events at the border, and ON events of two balls."""
+    x_px = np.repeat([1, 80, 120], [noise, first, second]).astype(np.uint16)
+    t_us, y_px = np.full(len(x_px), 5000 * index), np.where(x_px > 1, 60, 1).astype(np.uint16)
+    return Packet(index, 5000 * index, 5000 * (index + 1), EventBatch(t_us, x_px, y_px, x_px > 1))
+
+
 def test_rates_of_ball_and_noise() -> None:
     meter = EventRateMeter()
     assert meter.take() is None
     events = EventBatch.checked([0, 1, 2], [1, 2, 3], [1, 1, 1], [True, False, False], width_px=4, height_px=4)
     meter.add(Packet(0, 0, 5000, events), ())
     meter.add(Packet(1, 5000, 10_000, EventBatch.empty()), ())
+    assert meter.take() is None  # a ball may be found yet in the next ticks
+    meter.add(Packet(2, 10_000, 10_000 + MARGIN_US, EventBatch.empty()), ())
     assert meter.take() == EventRates(100.0, 200.0)
+
+
+def test_events_of_a_ball_that_is_not_tracked_yet_or_any_more_are_no_noise() -> None:
+    """It is in view in ticks 40 to 79, and tracked in 46 to 74; the noise is two events a tick throughout."""
+    meter = EventRateMeter()
+    for index in range(120):
+        balls = (ball(),) if 46 <= index < 75 else ()
+        meter.add(tick(index, noise=2, first=30 if 40 <= index < 80 else 0), balls)
+    assert meter.take() == EventRates(0.0, 400.0, 6000.0, 0.0)
+
+
+def test_a_second_ball_leaves_out_ticks_around_its_own_track() -> None:
+    """Its events before it is tracked are no noise beside the first one's; and another clock has no earlier tick."""
+    meter = EventRateMeter()
+    for index in range(160):
+        balls = (ball(), ball(1, 120.0)) if 80 <= index < 120 else (ball(),)
+        meter.add(tick(index, noise=2, first=1, second=9 if 76 <= index < 125 else 0), balls)
+    meter.add(tick(0, noise=500), (ball(2),))
+    alone, both = 70 + 20, 20  # ticks that are counted
+    assert meter.take() == EventRates(0.0, 400.0, pytest.approx((alone + 10 * both) / (alone + both) * 200.0), 0.0)
 
 
 def test_a_sweep_without_a_page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

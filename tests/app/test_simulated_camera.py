@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from spinscope.app.cli import cli
-from spinscope.app.live import camera_sweep, opening
+from spinscope.app.live import camera_sweep, event_rates, opening
 from spinscope.app.live.camera_sweep import CameraSweep, proposed_value
 from spinscope.pipeline.biases import BiasParameters
 from spinscope.pipeline.cameras import SimulatedCamera
@@ -27,6 +27,8 @@ def camera(monkeypatch: pytest.MonkeyPatch) -> SimulatedCamera:
     monkeypatch.setattr(opening, "SIMULATED_SIZE_PX", (96, 72))
     monkeypatch.setattr(opening, "SIMULATED_ROUND_S", ROUND_PACKETS * 1e-3)
     monkeypatch.setattr(camera_sweep, "SETTLE_US", 0)
+    for module in (camera_sweep, event_rates):
+        monkeypatch.setattr(module, "MARGIN_US", 0)  # the ball here comes and goes with each packet
     return opening.simulated_camera(Choices(), BiasParameters(), float("inf"))
 
 
@@ -45,7 +47,7 @@ def test_the_sweep_proposes_a_value_and_gives_the_former_ones_back(
 ) -> None:
     """With a ball in each packet of many events, as large as the image: the tracker has tests of its own."""
     monkeypatch.setattr(camera_sweep, "MOST_NOISE_HZ", 20_000.0)  # of few pixels
-    ball: Any = SimpleNamespace(centre_px=lambda t_us: (48.0, 36.0), mean=[0.0, 0.0, 0.0, 0.0, 100.0])
+    ball: Any = SimpleNamespace(shot=0, centre_px=lambda t_us: (48.0, 36.0), mean=[0.0, 0.0, 0.0, 0.0, 100.0])
     end_us, before = 0, dict(camera.biases)
 
     def set_biases(biases: Mapping[str, int]) -> int:

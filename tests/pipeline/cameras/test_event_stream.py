@@ -198,3 +198,19 @@ def test_biases_are_set_by_the_reading_thread() -> None:
     stream.join()
     assert camera.applied == [{"diff_on": 5}]
     assert "diff_on = 11 is out of range for toy: -10 to 10" in notices[0] and "no bias 'diff'" in notices[1]
+
+
+def test_biases_asked_for_before_the_end_are_set() -> None:
+    """A sweep gives its former ones back and the run is stopped, while the reading thread waits for events."""
+
+    class Stopped(ListedPackets):
+        def read(self) -> CameraPacket | None:
+            stream.set_biases({"diff_on": 7})
+            stream.stop()
+            return super().read()
+
+    camera = Stopped([CameraPacket(at(100), 100)])
+    stream = EventStream(camera, TICK_US)
+    stream.start()
+    stream.join()
+    assert camera.applied == [{"diff_on": 7}] and camera.closed == 1
