@@ -26,7 +26,7 @@ from .chain import Chain
 from .errors import CameraError, ParameterError
 from .event_source import EventsInMemory
 from .events import EventBatch
-from .live_outputs import LiveBall, LiveNotice, LiveOutput, LiveStatus
+from .live_outputs import LiveBall, LiveNotice, LiveOutput, LiveShot, LiveStatus
 from .live_spins import SWITCH_S, SegmentStart, SpinRun, TrackedTick, load_stages
 from .recordings.formats.prophesee_raw.writer import RawWriter
 from .recordings.in_memory import RecordingInMemory
@@ -151,7 +151,8 @@ class LiveRun:
         self.parameters = parameters
         self._with_balls, self._on_tick = with_balls, on_tick
         spin_run = SpinRun(method_targets(method), with_balls, self.stream.width_px, self.stream.height_px)
-        self._spins = SpinProcess(spin_run, self._outputs.put)
+        self._spins = SpinProcess(spin_run, self._put)
+        self._untaken: deque[LiveShot] = deque()  # which the consumer of the outputs has not done with yet
         self._latencies_ms: deque[float] = deque()
         self._events_before = 0
         self._abandoned = threading.Event()
@@ -168,21 +169,26 @@ class LiveRun:
         gc.freeze()
         self.stream.start()
         tracker.start()
-        next_status_s = now_s() + STATUS_S
+        last_status_s = now_s()
+        next_status_s = last_status_s + STATUS_S
         try:
             while True:
+                if (now := now_s()) >= next_status_s:  # also when outputs wait: their consumer may be slow
+                    yield self._status(now - last_status_s)
+                    last_status_s = now
+                    next_status_s += STATUS_S * (1 + (now - next_status_s) // STATUS_S)
                 output: LiveOutput | BaseException | None = None
                 try:
                     output = self._outputs.get(timeout=max(next_status_s - now_s(), 0.0))
                 except queue.Empty:
-                    next_status_s += STATUS_S
-                    yield self._status(STATUS_S)
                     continue
                 if output is None:
                     break
                 if isinstance(output, BaseException):
                     raise output
                 yield output
+                if isinstance(output, LiveShot):
+                    self._untaken.popleft()
         finally:
             self.stop()
             if sys.exc_info()[0] is not None:  # nobody takes the rest
@@ -194,16 +200,27 @@ class LiveRun:
             if not was_frozen:  # what the program has frozen itself stays so
                 gc.unfreeze()
             sys.setswitchinterval(switch_s)
-        yield self._status(STATUS_S - max(next_status_s - now_s(), 0.0))
+        yield self._status(now_s() - last_status_s)
 
     def stop(self) -> None:
         """Have the run end after what has come so far."""
         self.stream.stop()
 
     @property
-    def unanswered(self) -> TrackedTick | None:
-        """The oldest tracked tick whose spins are not final yet."""
-        return self._spins.unanswered
+    def needed_since(self) -> tuple[int, int] | None:
+        """Clock and time from which on shots are without their final spin, or not taken from the outputs yet."""
+        times = list[tuple[int, int]]()
+        if (tick := self._spins.unanswered) is not None:
+            times.append((tick.clock, tick.tick.packet.start_us))
+        with suppress(IndexError):
+            times.append((self._untaken[0].clock, self._untaken[0].shot.start_us))
+        return min(times, default=None)
+
+    def _put(self, output: LiveOutput | BaseException | None) -> None:
+        """Hand over an output of the spins."""
+        if isinstance(output, LiveShot):
+            self._untaken.append(output)
+        self._outputs.put(output)
 
     def take_parameters(self, parameters: Parameters) -> None:
         """Have the run go on with other parameters from its next tick on; a shot in flight ends there.

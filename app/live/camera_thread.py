@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import threading
-from abc import abstractmethod
 from collections.abc import Callable
 
 from .headless import LiveObserver, OpenLive
 
 
 class CameraObserver(LiveObserver):
-    """Observer of a live run behind a page, which knows the run once it has begun."""
+    """Observer of a live run behind a page, which knows the run once it has begun.
+
+    Attributes
+    ----------
+    has_begun : threading.Event
+        Set when the camera runs, or could not be opened.
+    """
 
     def __init__(self) -> None:
+        self.has_begun = threading.Event()
         self._open: OpenLive | None = None
 
     @property
@@ -29,10 +35,11 @@ class CameraObserver(LiveObserver):
     def begin(self, live: OpenLive) -> None:
         """Take the run before it starts."""
         self._open = live
+        self.has_begun.set()
 
-    @abstractmethod
     def end(self, error: Exception | None) -> None:
         """Take note that the run has ended, by an error or as it should."""
+        self.has_begun.set()
 
 
 class CameraThread(threading.Thread):

@@ -76,8 +76,8 @@ class CameraView(CameraObserver):
 
     def begin(self, live: OpenLive) -> None:
         """Take the run before it starts."""
-        super().begin(live)
         self._biases = dict(live.camera.biases)
+        super().begin(live)
 
     def add_tick(self, arrived: ArrivedTick, tick: Tick) -> None:
         """Take a tick."""
@@ -119,6 +119,7 @@ class CameraView(CameraObserver):
             self._notices.append(str(error))
         self._is_running = False
         self.has_events.set()
+        super().end(error)
 
     def _add_second(self, status: LiveStatus) -> None:
         rates = self._meter.take()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import threading
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -43,18 +42,12 @@ class LiveSession(CameraObserver):
     ----------
     session : ShotSession
         What the shots are added to.
-
-    Attributes
-    ----------
-    has_begun : threading.Event
-        Set when the camera runs, or could not be opened.
     """
 
     kept_us = KEPT_US
 
     def __init__(self, session: ShotSession) -> None:
         super().__init__()
-        self.has_begun = threading.Event()
         self._session, self._version = session, program_version()
         self._notice: CameraNotice | None = None
         self._ball_s = -math.inf  # when a ball was last in flight
@@ -65,8 +58,8 @@ class LiveSession(CameraObserver):
 
     def begin(self, live: OpenLive) -> None:
         """Take the run before it starts."""
+        load_stages()  # before the first shot, rather than beside it
         super().begin(live)
-        self.has_begun.set()
 
     def is_playing(self) -> bool:
         """Whether a ball is in flight, or was less than REST_S ago."""
@@ -95,7 +88,7 @@ class LiveSession(CameraObserver):
     def end(self, error: Exception | None) -> None:
         """Take note that the run has ended."""
         self._notice = CameraNotice(kind="ended", text="the camera has ended" if error is None else str(error))
-        self.has_begun.set()
+        super().end(error)
 
 
 def run_with_coach(
@@ -118,7 +111,6 @@ def run_with_coach(
     table, observer = session.folder / TABLE, LiveSession(session)
     folder: Path = events_folder(table)
     work = CameraThread(lambda: run_headless(chosen, choices, method, replace(to, table=table), observer), observer)
-    load_stages()  # before the first shot, rather than beside it
     work.start()
     try:
         observer.has_begun.wait()

@@ -84,7 +84,9 @@ class EventRateMeter:
         (*noise, length_us), (*ball, ball_us) = counts.tolist()
         if not length_us:
             return None
-        return EventRates(*(n * 1e6 / length_us for n in noise), *((n * 1e6 / ball_us for n in ball) if ball_us else ()))
+        return EventRates(
+            *(n * 1e6 / length_us for n in noise), *((n * 1e6 / ball_us for n in ball) if ball_us else ())
+        )
 
 
 def _counted(packet: Packet, balls: Sequence[BallTrack]) -> _CountedTick:

@@ -169,8 +169,8 @@ def run_headless(
             return EventStream(camera, tick_us, reopen=opened_anew, sinks=tuple(sinks), on_notice=on_notice)
 
         def on_tick(arrived: ArrivedTick, tick: Tick, latency_ms: float) -> None:
-            if (behind := run.unanswered) is not None:
-                recent.keep_from(behind.clock, behind.tick.packet.start_us)
+            if (since := run.needed_since) is not None:
+                recent.keep_from(*since)
             if sweep is not None:
                 sweep.add(arrived.packet, tick.track.balls)
             if observer is not None:

@@ -45,7 +45,9 @@ def run_with_page(
         work = CameraThread(lambda: run_headless(chosen, choices, method, replace(to, table=table), view), view)
         work.start()
         try:
-            note("the page opens as soon as events have come")
+            view.has_begun.wait()
+            if view.is_open:
+                note("the page opens as soon as events have come")
             view.has_events.wait()
             if view.is_open and view.opened.recent.span_us is not None:
                 if sys.platform == "linux":

@@ -8,6 +8,8 @@ import json
 import os
 from collections.abc import Iterator
 from datetime import UTC, datetime
+from itertools import chain as joined
+from itertools import count
 from pathlib import Path
 
 from spinscope.pipeline.cameras import RecentEvents
@@ -39,7 +41,7 @@ class ShotTable:
     Parameters
     ----------
     path : Path
-        The table. Events are saved in the folder NAME_shots beside it.
+        The table. Events are saved in the folder NAME_shots beside it, where those of another table of this name stay.
     method : str
         Name of the spin method that is run, or "all".
 
@@ -84,9 +86,11 @@ class ShotTable:
     def _save_events(self, number: int, shot: LiveShot, session: Session, recent: RecentEvents) -> Path:
         """Save a shot's events, as far as they are kept; raises RecordingError."""
         start_us, end_us = max(shot.shot.start_us - MARGIN_US, 0), shot.shot.end_us + MARGIN_US
-        events, saved = recent.between(shot.clock, start_us, end_us), self.folder / f"shot_{number:05d}.h5"
+        events = recent.between(shot.clock, start_us, end_us)
         if not len(events):
             raise RecordingError("they are no longer in memory: the spins are too far behind")
+        names = (f"shot_{number:05d}{again}.h5" for again in joined([""], (f"-{n}" for n in count(2))))
+        saved = next(path for path in map(self.folder.joinpath, names) if not path.exists())
         camera = {f"camera.{name}": value for name, value in session.parameters.camera.as_dict().items()}
         attributes = {name: value for name, value in camera.items() if isinstance(value, str | float)}
         attributes |= {SHOT_START: float(shot.shot.start_us), SHOT_END: float(shot.shot.end_us)}

@@ -204,7 +204,8 @@ def open_camera(
             missing.append(str(error))
         except CameraError as error:
             problems.append(str(error))
-    raise CameraError("; ".join(problems) or f"{_without_driver(missing)}; --replay FILE and --simulate need none")
+    said = "; ".join(problems) or _without_driver(missing)
+    raise CameraError(f"{said}; without a camera there are --replay FILE and --simulate")
 
 
 def listed_cameras() -> list[ListedCamera]:

@@ -115,6 +115,20 @@ def test_a_table_goes_on_after_a_crash(bounce: Session, tmp_path: Path, suffix: 
     assert (saved.width_px, saved.height_px) == (1280, 720)
 
 
+def test_events_of_another_table_of_this_name_stay(bounce: Session, tmp_path: Path) -> None:
+    """As of day.csv and day.parquet, or of a table that somebody has removed."""
+    recent = RecentEvents()
+    recent(0, bounce.source.between(0, 10**9))
+    shots = [LiveShot(shot, 0, 0, 12.5) for shot in bounce.estimate("triplet").shots]
+    rows = [
+        ShotTable(tmp_path / f"day{suffix}").append(shots[n], bounce, recent)
+        for n, suffix in enumerate((".csv", ".jsonl"))
+    ]
+    assert [row["events_file"] for row in rows] == ["day_shots/shot_00001.h5", "day_shots/shot_00001-2.h5"]
+    starts_us = [int(open_recording(tmp_path / str(row["events_file"])).read().t_us[0]) for row in rows]
+    assert starts_us[0] < 5000 < shots[1].shot.start_us - 20_000 <= starts_us[1]
+
+
 def test_a_shot_whose_events_cannot_be_saved_has_its_row(
     bounce: Session, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -289,7 +303,7 @@ def test_a_camera_that_cannot_be_opened_opens_no_page(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(headless, "open_live", open_live)
     result = run("live", "--no-browser")
-    assert "no camera is plugged in" in str(result.exception)
+    assert "no camera is plugged in" in str(result.exception) and not result.stderr  # no page is announced
 
 
 def test_a_table_of_others_is_refused(bounce: Session, tmp_path: Path) -> None:

@@ -56,6 +56,24 @@ def test_shots_are_those_of_the_recording(samples: Path, name: str) -> None:
     assert status.events == session.source.event_count and status.skipped == status.late == status.outside == 0
 
 
+def test_a_slow_consumer_is_told_the_state_and_its_shots_are_needed_until_it_has_done_with_them(
+    samples: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A second passes with each output, so that there is always another one."""
+    monkeypatch.setattr("spinscope.pipeline.live.STATUS_S", 1e-9)
+    session = Session.open(samples / "own/bounce.h5")
+    recording = session.recording
+    camera = ReplayCamera(recording.chunks, recording.width_px, recording.height_px, speed=float("inf"))  # type: ignore[union-attr]
+    run = LiveRun(lambda tick_us, on_notice: EventStream(camera, tick_us), session.parameters, QUICK)
+    is_after_status = False
+    for one in run.outputs():
+        assert isinstance(one, LiveStatus) or is_after_status
+        is_after_status = isinstance(one, LiveStatus)
+        if isinstance(one, LiveShot):
+            assert run.needed_since is not None and run.needed_since <= (one.clock, one.shot.start_us)
+    assert run.needed_since is None
+
+
 def test_ticks_without_a_ball_go_with_events_where_a_shot_found_later_begins_in_them() -> None:
     """In order, and 50 ms later at the latest; the tick in which a shot ends goes at once, and whole."""
 
