@@ -42,13 +42,13 @@ class _CountedTick(NamedTuple):
 class EventRateMeter:
     """Counts events of balls and of all else, tick by tick; from any thread.
 
-    Ticks less than MARGIN_US before the first or after the last one of a track are left out: a tick counts when the
-    balls in view have been the same for so long on either side of it.
+    Ticks less than MARGIN_US before the first or after the last one of a track are left out. A contact ends no track
+    here: the ball stays in view.
     """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._shots: tuple[int, ...] | None = None  # of the newest tick; None before the first one
+        self._shots = frozenset[int]()  # of the newest tick
         self._left_out_us = self._end_us = 0  # end of the ticks to be left out, and of the newest tick
         self._restart()
 
@@ -63,13 +63,16 @@ class EventRateMeter:
 
     def add(self, packet: Packet, balls: Sequence[BallTrack]) -> None:
         """Count a tick's events."""
-        tick, shots = _counted(packet, balls), tuple(ball.shot for ball in balls)
+        tick, shots = _counted(packet, balls), frozenset(ball.shot for ball in balls)
         with self._lock:
             if packet.start_us < self._end_us:  # another clock
-                self._shots, self._left_out_us = None, 0
+                self._shots, self._left_out_us = shots, 0
                 self._held.clear()
-            if shots != self._shots and self._shots is not None:
+            new = [ball.began_by for ball in balls if ball.shot not in self._shots]
+            contacts = sum(began_by in ("bounce", "hit") for began_by in new)
+            if len(new) > contacts:
                 self._held.clear()
+            if len(self._shots - shots) > contacts:
                 self._left_out_us = packet.start_us + MARGIN_US
             self._shots, self._end_us = shots, packet.end_us
             if packet.start_us >= self._left_out_us:

@@ -117,10 +117,11 @@ def test_what_is_no_sweep(options: dict[str, Any], error: type[Exception], said:
         CameraSweep(**{**given, "points": 2, **options})
 
 
-def ball(shot: int = 0, x_px: float = 80.0) -> Any:
+def ball(shot: int = 0, x_px: float = 80.0, began_by: str = "entered") -> Any:
     """A ball of 8 px at rest."""
+    mean = [x_px, 60.0, 0.0, 0.0, 8.0]
     return SimpleNamespace(
-        shot=shot, mean=[x_px, 60.0, 0.0, 0.0, 8.0], centre_px=lambda t_us: (np.full(len(t_us), x_px), 60.0)
+        shot=shot, mean=mean, began_by=began_by, centre_px=lambda t_us: (np.full(len(t_us), x_px), 60.0)
     )
 
 
@@ -158,8 +159,18 @@ def test_a_second_ball_leaves_out_ticks_around_its_own_track() -> None:
         balls = (ball(), ball(1, 120.0)) if 80 <= index < 120 else (ball(),)
         meter.add(tick(index, noise=2, first=1, second=9 if 76 <= index < 125 else 0), balls)
     meter.add(tick(0, noise=500), (ball(2),))
-    alone, both = 70 + 20, 20  # ticks that are counted
+    alone, both = 70 + 20, 40  # ticks that are counted
     assert meter.take() == EventRates(0.0, 400.0, pytest.approx((alone + 10 * both) / (alone + both) * 200.0), 0.0)
+
+
+def test_a_short_flight_is_counted_whole_also_with_a_contact() -> None:
+    """60 ms, of which the last 30 follow a bounce."""
+    meter = EventRateMeter()
+    for index in range(60):
+        balls = (ball(),) if 20 <= index < 26 else (ball(1, began_by="bounce"),) if 26 <= index < 32 else ()
+        meter.add(tick(index, noise=2, first=30 + index if balls else 0), balls)
+    of_ball = sum(30 + index for index in range(20, 32))
+    assert meter.take() == EventRates(0.0, 400.0, pytest.approx(of_ball / (12 * 5e-3)), 0.0)
 
 
 def test_a_sweep_without_a_page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

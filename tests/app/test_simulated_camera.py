@@ -47,7 +47,9 @@ def test_the_sweep_proposes_a_value_and_gives_the_former_ones_back(
 ) -> None:
     """With a ball in each packet of many events, as large as the image: the tracker has tests of its own."""
     monkeypatch.setattr(camera_sweep, "MOST_NOISE_HZ", 20_000.0)  # of few pixels
-    ball: Any = SimpleNamespace(shot=0, centre_px=lambda t_us: (48.0, 36.0), mean=[0.0, 0.0, 0.0, 0.0, 100.0])
+    ball: Any = SimpleNamespace(
+        shot=0, began_by="entered", centre_px=lambda t_us: (48.0, 36.0), mean=[0.0, 0.0, 0.0, 0.0, 100.0]
+    )
     end_us, before = 0, dict(camera.biases)
 
     def set_biases(biases: Mapping[str, int]) -> int:

@@ -157,7 +157,7 @@ function listen() {
   });
   connection.on("shots", ({ share, shots, error }) => {
     if (error) notice(error);
-    const found = `${shots.length} shots: click one`;
+    const found = shots.length ? `${shots.length} shots: click one` : "no shot found";
     app.overview.show(settings.clip, shots, share < 1 ? `searching for shots, ${Math.round(100 * share)} %` : found);
   });
   connection.addEventListener("lost", () => {
