@@ -18,7 +18,7 @@ from .commands.evaluate import evaluate
 from .commands.info import info
 from .commands.label import label
 from .commands.live import live, watch
-from .commands.options import join_fixed_ball
+from .commands.options import CommandGroup, join_fixed_ball
 from .commands.settings import settings
 from .commands.simulate import simulate
 from .commands.split import split
@@ -36,6 +36,7 @@ from .terminal import (
 
 
 @click.group(
+    cls=CommandGroup,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
@@ -54,8 +55,8 @@ def cli(context: click.Context) -> None:
 
 
 COMMANDS = (
-    info, analyze, view, coach, convert, tune, settings, simulate, evaluate, calibrate, label, split, live, watch,
-    cameras,
+    tune, view, analyze, info, coach, live, watch, cameras, convert, split, simulate, evaluate, calibrate, label,
+    settings,
 )  # fmt: skip
 
 for _command in COMMANDS:

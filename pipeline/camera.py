@@ -26,10 +26,10 @@ class CameraParameters(ParameterGroup):
     focal_length_mm: float = tunable(8.0, 0.5, 1000.0, 0.1, "mm", "focal length of the lens")
     pixel_um: float = tunable(4.86, 0.5, 100.0, 0.01, "um", "pitch of the pixels (IMX636: 4.86 um)")
     principal_x_px: float | None = tunable(
-        None, -10000.0, 10000.0, 0.5, "px", "column of the principal point; none = middle of the image"
+        None, -10000.0, 10000.0, 0.5, "px", "column of the principal point; auto = middle of the image"
     )
     principal_y_px: float | None = tunable(
-        None, -10000.0, 10000.0, 0.5, "px", "row of the principal point; none = middle of the image"
+        None, -10000.0, 10000.0, 0.5, "px", "row of the principal point; auto = middle of the image"
     )
     distortion: tuple[float, ...] = tunable(
         (0.0, 0.0, 0.0, 0.0, 0.0), -100.0, 100.0, 0.01, "", "OpenCV's lens distortion k1, k2, p1, p2, k3"

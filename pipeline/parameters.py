@@ -36,7 +36,7 @@ class Tunable:
     def kind(self) -> str:
         """number, whole number, switch, choice, or numbers (a fixed-length list of numbers).
 
-        A number whose default is None may be left out ("none"): the program then finds it itself.
+        A number whose default is None may be left out ("auto"): the program then finds it itself.
         """
         if self.choices:
             return "choice"
@@ -285,7 +285,7 @@ def _parsed(text: str) -> Any:
         return True
     if lowered in ("false", "off", "no"):
         return False
-    if lowered == "none":
+    if lowered in ("auto", "none"):
         return None
     if "," in text:
         return [_parsed(item.strip()) for item in text.strip("[]()").split(",")]

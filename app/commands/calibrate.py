@@ -10,7 +10,7 @@ import click
 from spinscope.pipeline.recordings import ReadingOptions
 
 from ..terminal import ProgressBar, note
-from .options import RECORDING, FixedBall, reading_options
+from .options import RECORDING, CommandGroup, FixedBall, reading_options
 
 if TYPE_CHECKING:
     from spinscope.pipeline.calibration.board import Pattern
@@ -29,7 +29,7 @@ class BoardSize(click.ParamType[tuple[int, int]]):
         return int(columns), int(rows)
 
 
-@click.group()
+@click.group(cls=CommandGroup)
 def calibrate() -> None:
     """Calibrate the camera, a frame camera beside it, the pixels' latency and outline, and the table's pose."""
 

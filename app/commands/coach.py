@@ -12,10 +12,10 @@ from spinscope.pipeline.session import Choices
 
 from ..terminal import note
 from .live import run_camera, source_options
-from .options import page_options, session_options
+from .options import CommandGroup, page_options, session_options
 
 
-class DefaultCommandGroup(click.Group):
+class DefaultCommandGroup(CommandGroup):
     """Group that takes anything but the name of one of its commands as the arguments of `open`."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:

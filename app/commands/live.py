@@ -11,7 +11,7 @@ import click
 from spinscope.pipeline.cameras import FAULTS, CameraOptions
 from spinscope.pipeline.session import Choices, check_method
 
-from .options import RECORDING, session_options
+from .options import RECORDING, page_options, session_options
 
 SOURCE_OPTIONS = (
     click.option("--camera", "serial", metavar="SERIAL", help="Serial number; the only camera by default."),
@@ -45,11 +45,10 @@ def source_options(command: Callable[..., None]) -> Callable[..., None]:
 @click.command()
 @click.option("--headless", is_flag=True, help="Without a page: lines of JSON.")
 @click.option("--jsonl", "lines", metavar="OUT", help="File or pipe of the lines; - for standard output.")
-@click.option("--page-port", type=click.IntRange(0, 65535), help="Port of the page; another free one if it is busy.")
 @click.option(
     "--keep-s", type=click.FloatRange(1, 120), default=30.0, show_default=True, help="Last seconds that can be seen."
 )
-@click.option("--no-browser", is_flag=True, help="Only print the page's address.")
+@page_options
 @click.option("--sweep", metavar="BIAS", help="With --headless: step through a bias, measure, propose a value, end.")
 @click.option("--sweep-points", type=int, default=9, show_default=True, help="Values of the bias.")
 @click.option("--sweep-s", type=float, default=2.0, show_default=True, help="Time for each of them.")
@@ -59,9 +58,8 @@ def source_options(command: Callable[..., None]) -> Callable[..., None]:
 def live(
     headless: bool,
     lines: str | None,
-    page_port: int | None,
     keep_s: float,
-    no_browser: bool,
+    page: dict[str, Any],
     sweep: str | None,
     sweep_points: int,
     sweep_s: float,
@@ -79,7 +77,7 @@ def live(
         swept = {"name": sweep, "points": sweep_points, "measured_s": sweep_s, "figure": sweep_figure}
         run_camera(lines=lines or "-", sweep=None if sweep is None else swept, **options)
     else:
-        run_camera(lines=lines, page={"port": page_port, "open_browser": not no_browser, "kept_s": keep_s}, **options)
+        run_camera(lines=lines, page={**page, "kept_s": keep_s}, **options)
 
 
 @click.command()

@@ -72,6 +72,20 @@ class RegisteredName(click.ParamType[str]):
         return click.Choice(self._names()).get_metavar(param, ctx)
 
 
+class CommandGroup(click.Group):
+    """Group of commands whose help lists them in their order, each with its whole first sentence."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names of the commands, in the order in which they were added."""
+        return list(self.commands)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the list; click's own cuts the sentences off."""
+        with formatter.section("Commands"):
+            paragraphs = {name: (command.help or "").split("\n\n")[0] for name, command in self.commands.items()}
+            formatter.write_dl([(name, " ".join(text.split())) for name, text in paragraphs.items()])
+
+
 class ListingCommand(click.Command):
     """Command whose help ends with a list of entries, read when the help is shown.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -31,9 +32,10 @@ def run_with_page(
     *,
     port: int | None,
     open_browser: bool,
+    hosts: Collection[str] = (),
     kept_s: float = KEPT_S,
 ) -> None:
-    """Run a camera in a thread, and serve the page on it from its first half second on until Ctrl-C.
+    """Run a camera in a thread, and serve the page on it (see `serve`) from its first half second on until Ctrl-C.
 
     The last `kept_s` seconds can be looked at. The recordings go with the program. Raises SpinscopeError.
     """
@@ -53,7 +55,7 @@ def run_with_page(
                 if sys.platform == "linux":
                     os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), PAGE_NICENESS)
                 first = view.save_window(kept_s)
-                serve(first, choices.for_others, port, open_browser=open_browser, live=view)
+                serve(first, choices.for_others, port, open_browser=open_browser, hosts=hosts, live=view)
         except KeyboardInterrupt:
             pass
         finally:

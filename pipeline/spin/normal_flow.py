@@ -265,7 +265,7 @@ class NormalFlowSpin:
         if fit.share < FEWEST_SHARE:
             return self._doubted(f"only {100 * fit.share:.0f} % of the events move like one turning ball")
         if fit.scale > DOUBT:
-            return self._doubted(f"the events scatter {fit.scale:.1f} times more than one turning ball's")
+            return self._doubted(f"the flow is not that of one turning ball: it scatters {fit.scale:.1f} times as much")
         covariance = self._covariance(fit)
         if covariance is None:
             return self._doubted("the logo's place leaves a part of the spin open")

@@ -39,12 +39,19 @@ class LogoParameters(ParameterGroup):
     pad_px: float = tunable(2.5, 0.0, 100.0, 0.1, "px", "distance kept from the outline (pad of the paper)")
     # A ball that stays leaves no outline, only what its logo does: three more of 24 simulated spinners are answered
     # than with 2.5 px, those whose logo keeps to the rim, and the others' axes are a fifth better.
-    fixed_pad_px: float = tunable(1.0, 0.0, 100.0, 0.1, "px", "the same of a fixed ball, whose outline stays dark")
+    fixed_pad_px: float = tunable(1.0, 0.0, 100.0, 0.1, "px", "pad of a fixed ball, whose outline makes no events")
     rim_pad_px: float = tunable(
-        0.5, 0.0, 100.0, 0.1, "px", "that of events the outline cannot have made, for contrast alone"
+        0.5,
+        0.0,
+        100.0,
+        0.1,
+        "px",
+        "pad of events of the polarity that the moving outline does not make; for contrast alone",
     )
     # A mounted ball's place is known to a third or half of a pixel; a logo at its rim may seem to lie outside.
-    fixed_rim_pad_px: float = tunable(-1.0, -10.0, 100.0, 0.1, "px", "that of a fixed ball, for contrast alone")
+    fixed_rim_pad_px: float = tunable(
+        -1.0, -10.0, 100.0, 0.1, "px", "pad of a fixed ball for contrast alone; below 0: outside of the outline"
+    )
     # The outline is the stronger step and is seen by its first events. On two simulators' flights the axes are best
     # with 30 to 80 us; without it they lean against the flight by a degree.
     delay_us: float = tunable(50.0, 0.0, 10_000.0, 5.0, "us", "how much later than the outline the logo is reported")

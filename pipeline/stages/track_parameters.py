@@ -14,10 +14,10 @@ class TrackParameters(ParameterGroup):
     ball: str = choice("flying", ("flying", "fixed"), "flying ball, or a ball spinner's ball that stays in place")
     tick_us: int = tunable(5000, 200, 100_000, 100, "us", "time between two steps of the pipeline (200 Hz)")
     radius_min_px: float | None = tunable(
-        None, 2.0, 500.0, 0.5, "px", "smallest radius looked for; none = a ball 6 m away"
+        None, 2.0, 500.0, 0.5, "px", "smallest radius looked for; auto = a ball 6 m away"
     )
     radius_max_px: float | None = tunable(
-        None, 3.0, 500.0, 0.5, "px", "largest radius looked for; none = a ball 0.3 m away"
+        None, 3.0, 500.0, 0.5, "px", "largest radius looked for; auto = a ball 0.3 m away"
     )
     speed_min_m_s: float = tunable(1.0, 0.0, 100.0, 0.1, "m/s", "slowest ball that counts as a shot")
     speed_max_m_s: float = tunable(25.0, 1.0, 200.0, 1.0, "m/s", "fastest ball looked for")

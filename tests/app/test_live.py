@@ -170,7 +170,7 @@ def test_the_page_opens_on_the_running_camera(bounce: Session, monkeypatch: pyte
         _check_view(live, bounce)
 
     monkeypatch.setattr(page, "serve", serve)
-    result = run("live", "--replay", bounce.recording.path, *QUICK, "--no-browser", "--page-port", 0)
+    result = run("live", "--replay", bounce.recording.path, *QUICK, "--no-browser", "--port", 0)
     assert result.exit_code == 0, result.output
     (path,) = served
     assert path.suffix == ".raw" and not path.exists()  # goes with the program

@@ -21,7 +21,7 @@ REPLAY = ("--replay", "sample_recordings/own/rally.h5", "--loop", "--method", "t
 PAGES = {
     "tune": ("tune", "sample_recordings/spinner_ball2_side.h5", "--no-browser", "--port", "0"),
     "view": ("view", "sample_recordings/spinner_ball2_side.h5", "--no-browser", "--port", "0"),
-    "live": ("live", *REPLAY, "--no-browser", "--page-port", "0"),
+    "live": ("live", *REPLAY, "--no-browser", "--port", "0"),
     "coach": ("coach", "live", *REPLAY, "--no-browser", "--port", "0", "--session", "{folder}/day"),
 }
 

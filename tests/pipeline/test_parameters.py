@@ -27,7 +27,8 @@ def test_assignments_reach_every_kind() -> None:
     assert changed.track.tick_us == 1000
     assert changed.camera.principal_x_px == 600.0
     assert changed.camera.up == (0.0, 1.0, 0.0)
-    assert changed.with_assignments(["camera.principal_x_px=none"]).camera.principal_x_px is None
+    for word in ("auto", "none"):
+        assert changed.with_assignments([f"camera.principal_x_px={word}"]).camera.principal_x_px is None
     assert DEFAULT.logo.pad_px != 3.5
 
 

@@ -34,7 +34,7 @@ function plotly() {
  * @property {"linear" | "logarithmic" | "cubic" | "none"} [scale] of the x axis
  * @property {string[] | null} [categories] of the x axis
  * @property {any} [present] value of x that is in use
- * @property {{x: any, reason: string}[]} [refused]
+ * @property {{x: any, value?: any, reason: string}[]} [refused]
  * @property {boolean} [fromZero] whether the y axis begins at zero
  * @property {boolean} [isLogarithmic] whether the y axis does
  * @property {(value: any) => void} [onpick] takes the value of a point
@@ -129,7 +129,7 @@ function trace({ name, colour, points, lines = true }, at, range, canPick) {
 }
 
 /**
- * @param {{x: any, reason: string}[]} refused
+ * @param {{x: any, value?: any, reason: string}[]} refused
  * @param {(x: any) => any} at
  * @param {[number, number] | null} range
  * @param {ChartSpec} spec
@@ -141,7 +141,7 @@ function refusals(refused, at, range, { series }) {
     name: "refused",
     x: refused.map(({ x }) => at(x)),
     y: refused.map(() => y),
-    customdata: refused.map(({ x }) => x),
+    customdata: refused.map(({ x, value }) => value ?? x),
     text: refused.map(({ reason }) => reason.replace(/(.{40}\S*) /g, "$1<br>")),
     hoverinfo: "text+name",
     showlegend: false,

@@ -109,7 +109,7 @@ function applied(/** @type {Opening} */ { presets, renamed }, /** @type {string[
     try {
       values[group][name] = JSON.parse(value);
     } catch {
-      // A mangled link: the value stays as it was.
+      notice(`The address sets ${text.slice(0, 80)}, which is no value: it is left out.`, "warning");
     }
   }
   return values;

@@ -121,7 +121,7 @@ export class Sweep {
         const reasons = error ? [error] : this.opening.methods
           .filter((method) => spin[method.name]?.reason)
           .map((method) => `${method.label}: ${spin[method.name].reason}`);
-        return reasons.map((reason) => ({ x: x(value), reason }));
+        return reasons.map((reason) => ({ x: x(value), value, reason }));
       });
       const y = own;
       this.#chart(label, { ...common, y, series, refused, fromZero: metric !== "magnitude_rps" });
@@ -130,7 +130,8 @@ export class Sweep {
       const factor = own === "%" ? 100 : 1;
       const value = (/** @type {any} */ point) => point[metric] === null ? null : factor * point[metric];
       const series = [{ colour: this.opening.colours.plain, points: good.map((one) => at(one, { y: value(one) })) }];
-      const refused = points.filter(({ error }) => error).map((one) => ({ x: x(one.value), reason: one.error ?? "" }));
+      const refused = points.filter(({ error }) => error)
+        .map((one) => ({ x: x(one.value), value: one.value, reason: one.error ?? "" }));
       this.#chart(label, { ...common, y: own, series, refused, fromZero: true });
     }
   }

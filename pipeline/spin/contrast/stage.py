@@ -310,8 +310,8 @@ def doubt(parameters: ContrastParameters, answer: ContrastEstimate) -> str | Non
         return f"the logo was not seen: {answer.events} logo events, {parameters.fewest_events} are needed"
     if answer.contrast < parameters.min_gain:
         return (
-            f"no pattern turns with the ball: the best spin gains {answer.contrast:.2f} an event over chance, "
-            f"{parameters.min_gain:g} are needed"
+            f"no pattern turns with the ball: the best spin hardly sharpens the logo ({answer.contrast:.2f} in log "
+            f"likelihood an event, {parameters.min_gain:g} are needed)"
         )
     if answer.patch_rad < parameters.smallest_patch_rad:
         return (

@@ -315,7 +315,7 @@ def axis_known_to(std_deg: float) -> np.ndarray:
     ("good", "bad", "reason"),
     [
         ({"share": 0.41}, {"share": 0.39}, "only 39 % of the events move like one turning ball"),
-        ({"scale": 1.59}, {"scale": 1.61}, "scatter 1.6 times more"),
+        ({"scale": 1.59}, {"scale": 1.61}, "scatters 1.6 times as much"),
     ],
 )
 def test_a_fit_that_does_not_move_like_one_ball_is_doubted(
