@@ -1,10 +1,11 @@
-"""State of the web application: the open recordings of one folder and the sessions of its clients."""
+"""State of the web application: the open recordings of some folders and the sessions of its clients."""
 
 from __future__ import annotations
 
 import threading
 import time
 from collections import OrderedDict
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -18,7 +19,7 @@ from spinscope.pipeline.session import Choices, Progress
 from .client_session import ClientSession
 from .live_schemas import LiveSource
 from .open_recording import VIEW_FRAMES_BYTES, OpenRecording
-from .recording_folder import RecordingFolder
+from .recording_folder import RecordingFolders
 from .recording_summary import summarize
 from .schemas import RecordingSummary
 from .shot_detection_job import ShotDetectionJob
@@ -34,9 +35,12 @@ class AppState:
     Parameters
     ----------
     path : Path
-        Recording that was asked for; others of its folder and below may be opened from the page.
+        Recording that was asked for.
     choices : Choices
         What was chosen on the command line.
+    folders : sequence of Path
+        Folders whose recordings, and those below, may be opened from the page; the recording lies in one of them. By
+        default its own.
     tools : bool
         Whether the page shows its tools (`tune`), or the viewer alone (`view`).
     layout : str
@@ -50,7 +54,7 @@ class AppState:
 
     Attributes
     ----------
-    folder : RecordingFolder
+    folders : RecordingFolders
         Recordings that may be opened.
     sessions : dict
         Open sessions by id.
@@ -61,6 +65,7 @@ class AppState:
         path: Path,
         choices: Choices,
         *,
+        folders: Sequence[Path] = (),
         tools: bool = True,
         layout: str = "all",
         followed: int | None = None,
@@ -68,7 +73,7 @@ class AppState:
         labels: Path | None = None,
     ) -> None:
         self.path = path.absolute()
-        self.folder = RecordingFolder(self.path.parent)
+        self.folders = RecordingFolders([folder.absolute() for folder in folders] or [self.path.parent])
         self.tools, self.layout, self.followed, self.live = tools, layout, followed, live
         self.labels = labels
         self.drawings = DrawingCache()
@@ -83,8 +88,8 @@ class AppState:
         self._lock = threading.Lock()
 
     def recording(self, name: str | None = None, on_progress: Progress | None = None) -> OpenRecording:
-        """The recording of that name in the folder, opened when it is not yet; raises SpinscopeError."""
-        path = self.path if name is None else self.folder.path(name)
+        """The recording of that name in the folders, opened when it is not yet; raises SpinscopeError."""
+        path = self.path if name is None else self.folders.path(name)
         with self._lock:
             recording = self._recordings.pop(path, None)
             if recording is None:
@@ -99,8 +104,8 @@ class AppState:
             return recording
 
     def summary(self, name: str) -> RecordingSummary:
-        """Summary of a recording of the folder, one at a time and once for each content; raises RecordingError."""
-        path = self.folder.path(name)
+        """Summary of a recording of the folders, one at a time and once for each content; raises RecordingError."""
+        path = self.folders.path(name)
         with self._summarizing:
             identity = file_identity(path)
             if identity not in self._summaries:
@@ -177,7 +182,7 @@ class AppState:
         for session in sessions:
             session.join(2.0)
         self.drawings.close()
-        self.folder.close()
+        self.folders.close()
         if self._scratch is not None:
             self._scratch.cleanup()
             self._scratch = None

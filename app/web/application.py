@@ -110,7 +110,7 @@ def _add_session_routes(app: FastAPI, state: AppState, session_of: SessionOf) ->
     @app.get("/api/sessions/{session_id}/recording")
     async def recording(session_id: str) -> Reopened:
         opened = session_of(session_id).runner.recording
-        info = await run_in_threadpool(recording_description, opened, state.folder.name_of(opened.original))
+        info = await run_in_threadpool(recording_description, opened, state.folders.name_of(opened.original))
         return Reopened(recording=info, biases=bias_state(opened.session.recording))
 
     @app.post("/api/sessions/{session_id}/run", status_code=202)

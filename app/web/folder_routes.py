@@ -20,7 +20,7 @@ def add_folder_routes(app: FastAPI, state: AppState) -> None:
 
     @app.get("/api/folder")
     async def listing(folder: Name = "") -> FolderListing:
-        return await run_in_threadpool(state.folder.listing, folder)
+        return await run_in_threadpool(state.folders.listing, folder)
 
     @app.get("/api/summary")
     async def summary(name: Name) -> RecordingSummary:
@@ -29,7 +29,7 @@ def add_folder_routes(app: FastAPI, state: AppState) -> None:
     @app.post(DROP_PATH)
     async def drop(name: Name, request: Request) -> Dropped:
         try:
-            path = await state.folder.drop(name, request.stream())
+            path = await state.folders.drop(name, request.stream())
         except ClientDisconnect:
             raise HTTPException(408, f"the rest of {name} did not come") from None
-        return Dropped(name=state.folder.name_of(path))
+        return Dropped(name=state.folders.name_of(path))

@@ -33,7 +33,7 @@ def opening(state: AppState, session: ClientSession) -> Opening:
         tools=state.tools,
         tab=VIEWS[state.layout].label,
         followed=state.followed,
-        recording=recording_description(recording, state.folder.name_of(recording.original)),
+        recording=recording_description(recording, state.folders.name_of(recording.original)),
         sections=sections(),
         stages=[
             *(Choice(name=stage.name, label=stage.label, help=stage.help) for stage in STAGES if stage.name in run),

@@ -10,9 +10,10 @@ import socket
 import sys
 import threading
 import webbrowser
-from collections.abc import Callable, Collection, Generator
+from collections.abc import Callable, Collection, Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
@@ -63,6 +64,7 @@ def serve(
     *,
     open_browser: bool = True,
     hosts: Collection[str] = (),
+    folders: Sequence[Path] = (),
     tools: bool = True,
     layout: str = "all",
     followed: int | None = None,
@@ -79,7 +81,7 @@ def serve(
         Whether to open the page where there is a browser; the address is printed in any case.
     hosts : collection of str
         Names besides 127.0.0.1 and localhost by which the page may be reached.
-    tools, layout, followed, live, labels
+    folders, tools, layout, followed, live, labels
         See AppState.
 
     Raises
@@ -87,7 +89,8 @@ def serve(
     SpinscopeError
         For a recording or choices that cannot be used, or when no port can be opened.
     """
-    state = AppState(path, choices, tools=tools, layout=layout, followed=followed, live=live, labels=labels)
+    shown: dict[str, Any] = {"tools": tools, "layout": layout, "followed": followed, "live": live, "labels": labels}
+    state = AppState(path, choices, folders=folders, **shown)
     with ProgressBar() as bar:
         recording = state.recording(on_progress=bar)
     # While the browser loads the page and the viewer, which takes longer.

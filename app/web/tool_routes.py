@@ -140,7 +140,7 @@ def _tuned_clips(
         for start_us, end_us in request.clips_us
     ]
     for name in request.recordings:
-        path = state.folder.path(name)
+        path = state.folders.path(name)
         if path == recording.original:
             clips.append(shown)
             continue

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,7 +18,7 @@ from click.testing import CliRunner
 
 from spinscope.app.cli import cli
 from spinscope.app.web.server import listening_socket, show_in_browser
-from spinscope.pipeline.errors import ParameterError
+from spinscope.pipeline.errors import ParameterError, RecordingError
 from spinscope.pipeline.session import DEFAULT_SAMPLE, Choices
 
 
@@ -35,13 +36,31 @@ def test_without_a_command_the_default_sample_is_tuned(asked: list[Any]) -> None
     assert DEFAULT_SAMPLE.is_file()
 
 
-def test_the_options_of_tune_are_handed_on(asked: list[Any]) -> None:
-    arguments = ["tune", "shot.h5", "--port", "0", "--no-browser", "--set", "logo.pad_px=3", "--window", "5", "9"]
+def test_the_options_of_tune_are_handed_on(asked: list[Any], tmp_path: Path) -> None:
+    shot = tmp_path / "shot.h5"
+    shot.touch()
+    arguments = ["tune", str(shot), "--port", "0", "--no-browser", "--set", "logo.pad_px=3", "--window", "5", "9"]
     arguments += ["--allow-host", "lab.example", "--allow-host", "proxy.example"]
     assert CliRunner().invoke(cli, arguments).exit_code == 0
     choices = Choices(assignments=("logo.pad_px=3",), window_us=(5, 9))
     page = {"port": 0, "open_browser": False, "hosts": ("lab.example", "proxy.example")}
-    assert asked == [((Path("shot.h5"), choices), page)]
+    assert asked == [((shot, choices), {**page, "folders": [tmp_path]})]
+
+
+def test_tune_takes_folders_and_opens_the_first_recording_that_can_be_read(
+    asked: list[Any], samples: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "day/early").mkdir(parents=True)
+    (tmp_path / "day/a.h5").write_bytes(b"damaged")
+    shutil.copy(samples / "flight_back.h5", tmp_path / "day/early/shot.h5")
+    folders = [tmp_path / "day", samples]
+    assert CliRunner().invoke(cli, ["tune", *map(str, folders)]).exit_code == 0
+    (shown, _), options = asked[0]
+    assert shown == tmp_path / "day/early/shot.h5" and options["folders"] == folders
+    for wrong, said in ((tmp_path / "none", "there is no such"), (tmp_path / "empty", "no recording that can be read")):
+        (tmp_path / "empty").mkdir(exist_ok=True)
+        result = CliRunner().invoke(cli, ["tune", str(wrong)])
+        assert isinstance(result.exception, RecordingError) and said in str(result.exception)
 
 
 def test_view_serves_the_page_without_tools(asked: list[Any]) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import httpx
 import pytest
 
-from spinscope.app.web.recording_folder import RecordingFolder
+from spinscope.app.web.recording_folder import RecordingFolders
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.simulated_recordings import simulate_to_file
 
@@ -50,6 +50,22 @@ def test_a_folder_lists_its_recordings_and_folders(own: Served, folder: Path) ->
     assert own.open("more/other.h5").opening["recording"]["name"] == "more/other.h5"
 
 
+def test_several_folders_are_listed_by_their_names(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "more").mkdir()
+    shutil.copy(folder / "spinner.h5", tmp_path / "more/third.h5")
+    folders = RecordingFolders([folder, folder / "more", tmp_path / "more"])
+    names = [folder.name, "more", "more-2"]
+    assert folders.listing().folders == names and folders.listing().recordings == []
+    assert [one.name for one in folders.listing("more-2").recordings] == ["more-2/third.h5"]
+    assert folders.path("more-2/third.h5") == tmp_path / "more/third.h5"
+    assert folders.name_of(tmp_path / "more/third.h5") == "more-2/third.h5"
+    for name in ("third.h5", "none/third.h5", "more/../spinner.h5", str(tmp_path / "more/third.h5")):
+        with pytest.raises(RecordingError):
+            folders.path(name)
+    with pytest.raises(RecordingError):
+        folders.listing("..")
+
+
 @pytest.mark.parametrize("name", ["..", "../x", "more/../..", "/", "/etc", "a\\b", "none", "\0"])
 def test_nothing_outside_of_the_folder_is_listed_or_opened(own: Served, name: str) -> None:
     assert httpx.get(f"{own.address}api/folder", params={"folder": name}).status_code == 400
@@ -77,7 +93,7 @@ def test_a_dropped_file_is_opened_and_goes_with_the_program(folder: Path) -> Non
         assert own.open("dropped:mine.h5").opening["recording"]["events"] > 0
         listed = [one["name"] for one in httpx.get(f"{own.address}api/folder").json()["recordings"]]
         assert listed[:2] == ["dropped:mine-2.h5", "dropped:mine.h5"]
-        kept = own.state.folder.path("dropped:mine.h5")
+        kept = own.state.folders.path("dropped:mine.h5")
         assert kept.read_bytes() == content
     finally:
         own.stop()
@@ -93,7 +109,7 @@ async def chunks(count: int, *, breaks: bool = False) -> AsyncIterator[bytes]:
 
 
 def test_too_much_and_what_breaks_off_leaves_nothing(tmp_path: Path) -> None:
-    folder = RecordingFolder(tmp_path, dropped_bytes=100)
+    folder = RecordingFolders([tmp_path], dropped_bytes=100)
     kept = asyncio.run(folder.drop("first.h5", chunks(6)))
     with pytest.raises(RecordingError, match="too large"):
         asyncio.run(folder.drop("second.h5", chunks(5)))

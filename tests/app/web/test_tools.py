@@ -327,7 +327,7 @@ def test_the_window_of_the_opened_recording_is_not_asked_of_the_folders_others(s
     tuner = served(tmp_path / "flight_back.h5", choices=Choices(window_us=(97_000, 113_000)))
     try:
         page = tuner.open()
-        listed = [one.name for one in tuner.state.folder.listing().recordings]
+        listed = [one.name for one in tuner.state.folders.listing().recordings]
         assert listed == ["flight_back.h5", "flight_fast_top.h5"]
         page.post("bias_sweep", biases={}, name="diff_on")
         done = page.wait("bias_sweep", lambda m: m["state"] == "done")
