@@ -132,9 +132,8 @@ def first_recording(folder: Path, reading: ReadingOptions) -> Path:
 def _recordings_in(folder: Path) -> Iterator[Path]:
     for place, folders, files in os.walk(folder):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
-        yield from (
-            path for name in sorted(files) if not name.startswith(".") and is_recording(path := Path(place, name))
-        )
+        paths = [Path(place, name) for name in sorted(files) if not name.startswith(".")]
+        yield from filter(is_recording, paths)
 
 
 def _named(roots: Iterable[Path]) -> dict[str, Path]:
