@@ -211,14 +211,15 @@ def _witness(witness: Witness) -> WitnessMetrics:
 
 
 def coach_sentence(estimate: SpinEstimate | None, kind: Kind | None, velocity_m_s: Floats | None) -> str:
-    """Describe a shot: `Topspin 54 ±2 rps (3240 rpm), 32 km/h, axis tilted 12° from pure topspin`."""
+    """Describe a shot: `Topspin 54 ± 2 rps (3240 rpm), 32 km/h, axis tilted 12° from pure topspin`."""
     speed = [] if velocity_m_s is None else [f"{km_h(float(np.linalg.norm(velocity_m_s))):.0f} km/h"]
     if estimate is None or kind is None or estimate.magnitude_rps is None:
         return ", ".join(["Spin not known", *speed])
     magnitude, std = estimate.magnitude_rps, estimate.magnitude_std_rps
-    # A coach does not read hundredths: a tenth at least.
-    margin = "" if std is None else f" ±{max(std, 0.1):.1f}" if std < 1 else f" ±{std:.0f}"
-    spin = f"{magnitude:.0f}{margin} rps ({rpm(magnitude):.0f} rpm)"
+    # A coach does not read hundredths: a tenth at least, and no finer than it is known.
+    digits = 1 if std is not None and std < 1 else 0
+    margin = "" if std is None else f" ± {max(std, 0.1):.{digits}f}"
+    spin = f"{magnitude:.{digits}f}{margin} rps ({rpm(magnitude):.0f} rpm)"
     if kind.parts_rps:
         return ", ".join(
             [f"{kind.name.capitalize()} {spin}", *speed, f"axis tilted {kind.off_deg:.0f}° from pure {kind.name}"]

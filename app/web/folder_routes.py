@@ -9,7 +9,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect
 
 from .app_state import AppState
-from .schemas import Dropped, FolderListing, RecordingSummary
+from .schemas import Done, Dropped, FolderListing, RecordingSummary
 from .security import DROP_PATH
 
 Name = Annotated[str, Query(max_length=1000)]
@@ -25,6 +25,11 @@ def add_folder_routes(app: FastAPI, state: AppState) -> None:
     @app.get("/api/summary")
     async def summary(name: Name) -> RecordingSummary:
         return await run_in_threadpool(state.summary, name)
+
+    @app.get("/api/openable")
+    async def openable(name: Name) -> Done:
+        await run_in_threadpool(state.recording, name)
+        return Done()
 
     @app.post(DROP_PATH)
     async def drop(name: Name, request: Request) -> Dropped:

@@ -58,7 +58,9 @@ def test_the_coach_is_told_in_one_sentence() -> None:
     spin = 54.0 * np.array([0.0, -np.cos(np.radians(12)), np.sin(np.radians(12))])
     estimate = SpinEstimate("contrast", spin, 4.0 * np.eye(3), None)
     said = coach_sentence(estimate, kind_of_spin(spin, forward, up), forward)
-    assert said == "Topspin 54 ±2 rps (3240 rpm), 32 km/h, axis tilted 12° from pure topspin"
+    assert said == "Topspin 54 ± 2 rps (3240 rpm), 32 km/h, axis tilted 12° from pure topspin"
     in_place = coach_sentence(estimate, kind_of_spin(spin, None, up), None)
-    assert in_place == "Spin 54 ±2 rps (3240 rpm), axis up the image, tilted by 12°"
+    assert in_place == "Spin 54 ± 2 rps (3240 rpm), axis up the image, tilted by 12°"
+    sure = SpinEstimate("contrast", spin, 0.01 * np.eye(3), None)
+    assert coach_sentence(sure, kind_of_spin(spin, None, up), None).startswith("Spin 54.0 ± 0.1 rps")
     assert coach_sentence(None, None, forward) == "Spin not known, 32 km/h"

@@ -21,7 +21,7 @@ import { Preview } from "./preview.js";
 import { Recordings } from "./recordings.js";
 import { Results } from "./results.js";
 import { Saving } from "./saving.js";
-import { Connection, Refused, RunRequests } from "./server.js";
+import { Connection, get, Refused, RunRequests } from "./server.js";
 import { Settings } from "./settings.js";
 import { shortcuts } from "./shortcuts.js";
 import { Sweep } from "./sweep.js";
@@ -92,17 +92,32 @@ function snapshot(/** @type {ReturnType<typeof linked>} */ { parameters, pinned,
   };
 }
 
-// Another link: pasted, or of the browser's way back.
-function follow() {
+// Another link: pasted, or of the browser's way back. A recording that cannot be opened leaves the page as it is.
+async function follow() {
   clearTimeout(later);
   remembered = null; // what comes is no new step
   const next = linked();
-  const isOther = next.recording !== null && next.recording !== connection.recording;
-  if (isOther || app.biases?.agrees(next.biases) === false) return location.reload();
+  if (next.recording !== null && next.recording !== connection.recording) {
+    return await isOpenable(next.recording) ? location.reload() : remember();
+  }
+  if (app.biases?.agrees(next.biases) === false) return location.reload();
   settings.restore(snapshot(next));
   if (next.tab !== null) viewer.bringToFront(next.tab);
   if (next.time_us !== null) viewer.place(next.time_us);
   app.runner.follow(next.followed ?? app.opening.followed);
+}
+
+async function isOpenable(/** @type {string} */ name) {
+  const note = notice(`Opening ${name} ...`, "info", 0);
+  try {
+    await get("/api/openable", { name });
+    return true;
+  } catch (error) {
+    notice(/** @type {Error} */ (error).message);
+    return false;
+  } finally {
+    note.remove();
+  }
 }
 
 // The recording of the link, or where that cannot be opened the one the program was started with.

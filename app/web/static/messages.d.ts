@@ -203,6 +203,7 @@ export interface Posts {
 export interface Gets {
   "/api/folder": { sent: null; answered: FolderListing };
   "/api/live/view": { sent: null; answered: LiveView };
+  "/api/openable": { sent: null; answered: Done };
   "/api/summary": { sent: null; answered: RecordingSummary };
 }
 /** POST requests of a session: what is sent and answered. */

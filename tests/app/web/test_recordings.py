@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import shutil
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
@@ -169,9 +170,11 @@ def test_a_file_is_dropped_onto_the_page(bare: Tab, folder: Path) -> None:
         files.items.add(new File([content], name));
         document.dispatchEvent(new DragEvent("drop", { dataTransfer: files, bubbles: true, cancelable: true }));
     }"""
+    page.evaluate("window.isSamePage = true")
     page.evaluate(drop, ["nonsense.h5", "", 10])
     page.locator(".notice.error", has_text="nonsense.h5").wait_for()
-    opened(bare, "spinner.h5")  # what was open before
+    page.wait_for_url(re.compile("recording=spinner"))
+    assert page.evaluate("window.isSamePage")  # as it was
     # One of the folder is opened there, by its name and size; nothing is copied.
     page.evaluate(drop, ["damaged.h5", "", (folder / "damaged.h5").stat().st_size])
     page.locator(".notice.error", has_text="damaged.h5").wait_for()
