@@ -103,8 +103,8 @@ class RunMetrics:
 
     Attributes
     ----------
-    tracked_share : float
-        Share of the ticks in which a circle was measured.
+    tracked_share : float or None
+        Share of the ticks in which a circle was measured; None for a fixed ball, whose circle is given.
     residual_px : float or None
         RMS distance of the measured circles from the filter's, centre and radius together.
     jitter_px : float or None
@@ -116,7 +116,7 @@ class RunMetrics:
     """
 
     ticks: int
-    tracked_share: float = _metric("Ticks tracked", "%", "Share of the ticks in which a circle was measured.")
+    tracked_share: float | None = _metric("Ticks tracked", "%", "Share of the ticks in which a circle was measured.")
     residual_px: float | None = _metric(
         "Residual of the circle",
         "px",
@@ -138,7 +138,7 @@ class RunMetrics:
         session, ticks, up = result.session, result.ticks, measured_up(result)
         return cls(
             ticks=len(ticks),
-            tracked_share=sum(tick.track.measured is not None for tick in ticks) / max(len(ticks), 1),
+            tracked_share=None if session.parameters.track.ball == "fixed" else _measured_share(ticks),
             residual_px=_residual_px(ticks),
             jitter_px=_jitter_px(ticks),
             logo_events=sum(len(tick.logo.events) for tick in ticks),
@@ -151,6 +151,10 @@ class RunMetrics:
     def main_shot(self) -> ShotMetrics | None:
         """Shot with the most logo events; None when there is none."""
         return max(self.shots, key=lambda shot: shot.logo_events, default=None)
+
+
+def _measured_share(ticks: Sequence[Tick]) -> float:
+    return sum(tick.track.measured is not None for tick in ticks) / max(len(ticks), 1)
 
 
 def _residual_px(ticks: Sequence[Tick]) -> float | None:

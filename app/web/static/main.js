@@ -98,7 +98,10 @@ async function follow() {
   remembered = null; // what comes is no new step
   const next = linked();
   if (next.recording !== null && next.recording !== connection.recording) {
-    return await isOpenable(next.recording) ? location.reload() : remember();
+    isLeaving = true;
+    if (await isOpenable(next.recording)) return location.reload();
+    isLeaving = false;
+    return remember();
   }
   if (app.biases?.agrees(next.biases) === false) return location.reload();
   settings.restore(snapshot(next));
@@ -317,8 +320,9 @@ function rememberLater(/** @type {number} */ wait_ms) {
 
 /** @type {string | null} what the address said last */
 let remembered = null;
+let isLeaving = false; // for another recording: the address tells of that one already
 function remember() {
-  if (app.runner.isWaiting) return; // what comes then is remembered
+  if (app.runner.isWaiting || isLeaving) return; // what comes then is remembered
   const link = linkOf(app);
   const isStep = remembered !== null && settingsOf(remembered) !== settingsOf(link);
   if (link !== location.hash) history[isStep ? "pushState" : "replaceState"](null, "", link);

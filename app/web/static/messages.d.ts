@@ -114,7 +114,7 @@ export type Resimulation = { share: number; biases: Record<string, number> };
 /** Progress or result of a run request. */
 export type RunMessage = { kind: "run"; serial: number; state: "loading" | "computing" | "drawing" | "partial" | "done" | "failed"; share: number; stages_ms: Record<string, number>; total_ms: number; error: string | null; picture: Picture | null; metrics: RunMetrics | null; costs_ms: Record<string, number> | null; pinned_metrics: RunMetrics | null; pinned_costs_ms: Record<string, number> | null; differences: [string, any, any][]; highs: Record<string, number> };
 /** Metrics of a run over all its shots. */
-export type RunMetrics = { ticks: number; tracked_share: number; residual_px: number | null; jitter_px: number | null; logo_events: number; shots: ShotMetrics[]; no_shot_reason: string | null; up_doubt: string | null };
+export type RunMetrics = { ticks: number; tracked_share: number | null; residual_px: number | null; jitter_px: number | null; logo_events: number; shots: ShotMetrics[]; no_shot_reason: string | null; up_doubt: string | null };
 /** Run a clip with `parameters`, beside those pinned as A; the request with the highest serial is the newest. */
 export type RunRequest = { serial: number; parameters: Record<string, Record<string, any>>; pinned?: Record<string, Record<string, any>> | null; start_us: number; end_us: number; playhead_us?: number | null; interactive?: boolean; has_preview?: boolean; followed?: number | null };
 /** A group of controls; `terms` of the glossary explain it, `is_open` where it is unfolded at first. */

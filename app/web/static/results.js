@@ -1,6 +1,7 @@
 // Results in numbers of the shot that is seen: B alone, or A and B beside each other with what differs. Event: `shown`.
 
 /** @import { EstimateMetrics, MetricInfo, Opening, RunMessage, RunMetrics, ShotMetrics } from "./messages.d.ts" */
+/** @import { Settings } from "./settings.js" */
 /** @import { Viewer } from "./viewer.js" */
 
 import { element, milliseconds, number } from "./elements.js";
@@ -22,10 +23,11 @@ export class Results extends EventTarget {
 
   /**
    * @param {any} parent
-   * @param {{opening: Opening, viewer: Viewer}} app
+   * @param {{opening: Opening, viewer: Viewer, settings: Settings}} app
    */
-  constructor(parent, { opening, viewer }) {
+  constructor(parent, { opening, viewer, settings }) {
     super();
+    this.settings = settings;
     this.parent = parent;
     this.opening = opening;
     this.viewer = viewer;
@@ -70,6 +72,9 @@ export class Results extends EventTarget {
     parts.push(this.#table(both, shots, counts, all_ms));
     for (const reason of new Set(both.map((one) => one.no_shot_reason ?? "").filter(Boolean))) {
       parts.push(element("p.note", {}, sentence(reason)));
+      if (this.settings.parameters.track.ball === "flying") {
+        parts.push(element("p.note", {}, "A ball on a ball spinner: state its circle in the panel Fixed ball."));
+      }
     }
     for (const doubt of new Set(both.map((one) => one.up_doubt).filter(Boolean))) {
       parts.push(element("p.note", {}, `Warning: ${doubt}`));

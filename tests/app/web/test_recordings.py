@@ -151,6 +151,16 @@ def test_the_list_opens_recordings_and_says_what_is_wrong_with_others(bare: Tab)
     page.locator("#recordings img").first.wait_for()
     assert page.locator("#recordings [aria-current]").inner_text() == "spinner.h5"
     page.get_by_role("button", name="more").click()
+    # The playhead moves while the server opens the recording.
+    page.evaluate("""() => {
+        const ask = window.fetch, { viewer } = window.spinscope;
+        window.fetch = async (...request) => {
+            if (!String(request[0]).includes("openable")) return ask(...request);
+            viewer.dispatchEvent(new CustomEvent("moved", { detail: 5000 }));
+            await new Promise((resolve) => setTimeout(resolve, 500));
+            return ask(...request);
+        };
+    }""")
     page.get_by_role("button", name="other.h5").click()
     opened(bare, "more/other.h5")
     page.keyboard.press("o")
