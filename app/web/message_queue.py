@@ -46,6 +46,12 @@ class RequestQueue:
         if self._closed or request.serial != self._newest:
             raise Superseded
 
+    def rest(self, request: RunRequest, seconds: float) -> None:
+        """Wait for so long whether a newer request comes in; raises Superseded where one does."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._closed or request.serial != self._newest, seconds)
+        self.check(request)
+
     def close(self) -> None:
         """Supersede everything: the client left."""
         with self._changed:

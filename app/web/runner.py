@@ -23,6 +23,9 @@ from .schemas import RunRequest
 IDLE_S, REQUESTS_MOST = 1.0, 10
 # The rest of a clip is waited for when it takes no longer than this: drawing a part of it first takes its time, too.
 REST_WORTH_WAITING_S = 0.5
+# A slider whose preview is seen for so long without another request rests: the picture of it is drawn, which takes
+# longer than a preview. A page asks again a tenth of a second after a preview, without a graphics card too.
+DRAG_REST_S = 0.15
 TIMED_TICKS = 5  # from fewer it cannot be told how long the rest takes
 
 
@@ -92,7 +95,7 @@ class Runner:
         """Run a clip to its end, the slow stages in a thread of their own behind the others.
 
         Where that takes long it shows, beside A if there is one, first what is there at the playhead. For a dragged
-        slider it shows all but the slow stages, which have to wait that long.
+        slider it shows a preview, and once that rests all but the slow stages, which have to wait that long.
         """
         parameters, chain, session = request.parameters, clip.chain, _with(clip, request.parameters)
         count, began_s, playhead_us = chain.tick_count(parameters), time.perf_counter(), request.playhead_us
@@ -107,7 +110,9 @@ class Runner:
             ticks.append(tick)
             if not is_previewed and playhead_us is not None and tick.packet.end_us >= playhead_us:
                 is_previewed = True
-                report.show(ticks)
+                self._preview(ticks, request, report)
+            if request.interactive:
+                continue
             if playhead_us is not None and tick.packet.end_us >= playhead_us and len(ticks) >= TIMED_TICKS:
                 playhead_us = None
                 rest_s = (time.perf_counter() - began_s) / len(ticks) * (count - len(ticks))
@@ -116,12 +121,19 @@ class Runner:
         early = Result.of(session, ticks)
         if not is_previewed:
             opening_us = ViewedRun.of(early, request.followed).opening_us
-            report.show([tick for tick in ticks if tick.packet.end_us <= opening_us] or ticks[:1])
+            seen = [tick for tick in ticks if tick.packet.end_us <= opening_us] or ticks[:1]
+            self._preview(seen, request, report)
         if is_fast_first:
             self._show(early, a, request, report, partial=True)
         else:
             self._publisher.drawings.begin(ViewedRun.of(early, request.followed), chain.keys(parameters))
         return Result.of(session, self._whole(clip, request, report) if whole is None else whole.result())
+
+    def _preview(self, ticks: list[Tick], request: RunRequest, report: RunReport) -> None:
+        """Show a preview; of a dragged slider nothing more while it moves on."""
+        report.show(ticks)
+        if request.interactive:
+            self._requests.rest(request, DRAG_REST_S)
 
     def _whole(self, clip: Session, request: RunRequest, report: RunReport) -> list[Tick]:
         """All ticks with the results of all stages."""

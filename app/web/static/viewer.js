@@ -137,6 +137,8 @@ export class Viewer extends EventTarget {
       while (before !== null && await root() === before && performance.now() < until) {
         await pause(POLL_MS);
       }
+      // It was asked for before somebody turned to another tab.
+      if (before !== null && this.front !== null) await this.#bring(this.front);
     });
   }
 
@@ -265,14 +267,17 @@ export class Viewer extends EventTarget {
   bringToFront(/** @type {string} */ title) {
     if (this.#shown === null) this.#turned(title); // the first recording is shown there
     return this.#next(async () => {
-      if (this.#shown === null) return;
-      const blueprint = await this.#layout();
-      const tab = tabs(blueprint).find((one) => one.title === title);
-      if (!tab || tab.front) return;
-      rootOf(blueprint).active_tab = tab.path;
-      await this.#take(blueprint);
-      this.#turned(title);
+      if (this.#shown !== null) await this.#bring(title);
     });
+  }
+
+  async #bring(/** @type {string} */ title) {
+    const blueprint = await this.#layout();
+    const tab = tabs(blueprint).find((one) => one.title === title);
+    if (!tab || tab.front) return;
+    rootOf(blueprint).active_tab = tab.path;
+    await this.#take(blueprint);
+    this.#turned(title);
   }
 
   /**

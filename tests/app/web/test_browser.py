@@ -184,6 +184,22 @@ def test_a_pasted_link_turns_to_its_tab_and_time_and_back_leads_back(tab: Tab) -
     assert page.evaluate("window.isSamePage")
 
 
+def test_a_layout_that_was_asked_for_before_another_tab_was_chosen_leaves_that_in_front(tab: Tab) -> None:
+    front = tab.page.evaluate(
+        """(async () => {
+            const { connection, viewer } = window.spinscope;
+            await viewer.bringToFront("Tracker");
+            const layout = await connection.bytes("layout?tab=Tracker&width_px=500&height_px=300");
+            await viewer.bringToFront("Coach");
+            await viewer.layout(layout);
+            const front = await viewer.tab();
+            await viewer.bringToFront("Tracker");
+            return front;
+        })()"""
+    )
+    assert front == "Coach"
+
+
 def test_the_panes_follow_a_ball_that_is_fixed_and_flies_again(tab: Tab) -> None:
     """The layout is made anew for the mode, and the tab stays."""
     tab.settled("shown")

@@ -190,6 +190,18 @@ def test_a_dragged_slider_gets_a_picture_without_the_slowest_stage_first(
     assert not [m for m in told if m["state"] == "partial"]
 
 
+def test_a_slider_that_is_dragged_on_has_previews_and_no_pictures_drawn(
+    client: Client, told: list[dict[str, Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("spinscope.app.web.runner.DRAG_REST_S", 60.0)
+    for pad_px in (3.41, 3.42, 3.41):  # the last one is known
+        request = client.request({"logo": {"pad_px": pad_px}}, interactive=True)
+        client.http.post(client.path("run"), json=request)
+        client.wait("preview", lambda m, request=request: m["serial"] == request["serial"])
+    done = client.run({"logo": {"pad_px": 3.43}})  # let go of
+    assert {m["serial"] for m in told if m["picture"]} == {done["serial"]}
+
+
 def test_the_way_back_finds_the_picture_that_was_made(
     client: Client, tuner: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
