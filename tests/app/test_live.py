@@ -162,15 +162,18 @@ def test_the_page_opens_on_the_running_camera(bounce: Session, monkeypatch: pyte
     monkeypatch.setattr(camera_view, "FIRST_WINDOW_US", 50_000)
     served: list[Path] = []
 
-    def serve(path: Path, choices: object, port: int | None, *, open_browser: bool, live: CameraView) -> None:
-        assert not open_browser and port == 0
+    def serve(
+        path: Path, choices: object, port: int | None, *, open_browser: bool, hosts: tuple[str, ...], live: CameraView
+    ) -> None:
+        assert not open_browser and port == 0 and hosts == ("lab.example",)
         served.append(path)
         while live.view().is_running:
             time.sleep(0.01)
         _check_view(live, bounce)
 
     monkeypatch.setattr(page, "serve", serve)
-    result = run("live", "--replay", bounce.recording.path, *QUICK, "--no-browser", "--port", 0)
+    options = ("--no-browser", "--port", 0, "--allow-host", "lab.example")
+    result = run("live", "--replay", bounce.recording.path, *QUICK, *options)
     assert result.exit_code == 0, result.output
     (path,) = served
     assert path.suffix == ".raw" and not path.exists()  # goes with the program
