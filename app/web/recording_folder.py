@@ -49,11 +49,13 @@ class RecordingFolders:
 
     def path(self, name: str) -> Path:
         """Path of the recording of a name; raises RecordingError where there is none."""
+        own = name
         if name.startswith(DROPPED) and self._dropped is not None:
-            path: Path | None = Path(self._dropped.name, name.removeprefix(DROPPED))
+            own = name.removeprefix(DROPPED)
+            path: Path | None = Path(self._dropped.name, own)
         else:
             path = self._below(name)
-        if path is None or not _is_inside(name) or not path.is_file():
+        if path is None or not _is_inside(own) or not path.is_file():
             raise RecordingError(f"there is no recording {name!r} in the opened folder: choose one of its files")
         return path
 

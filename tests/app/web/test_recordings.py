@@ -95,6 +95,9 @@ def test_a_dropped_file_is_opened_and_goes_with_the_program(folder: Path) -> Non
         listed = [one["name"] for one in httpx.get(f"{own.address}api/folder").json()["recordings"]]
         assert listed[:2] == ["dropped:mine-2.h5", "dropped:mine.h5"]
         kept = own.state.folders.path("dropped:mine.h5")
+        for name in (f"dropped:{folder / 'spinner.h5'}", "dropped:../spinner.h5", "dropped:"):
+            with pytest.raises(RecordingError):
+                own.state.folders.path(name)
         assert kept.read_bytes() == content
     finally:
         own.stop()
