@@ -34,19 +34,64 @@ def near_outline(
     is_whole, is_half, of_bright = part == WHOLE, part == HALF_AHEAD, part == OF_BRIGHT
     inner = max(circle[4] - gate_px, 0.0) ** 2
     outer = (circle[4] + gate_px) ** 2
-    near = np.empty(t_us.size, np.bool_)
-    # Times as int32, which the processor converts several at once, and chosen in a loop of its own: 2.5 x faster.
-    for n in range(t_us.size):
-        i = np.uint64(n)
+    chosen = _around_circle(circle, events, reference_us, circle[4] + gate_px)
+    m = 0
+    for n in range(chosen.size):
+        i = np.uint64(chosen[n])
         tau = np.int32(t_us[i] - reference_us) * 1e-6
         dx, dy = x_px[i] - (x0 + vx * tau), y_px[i] - (y0 + vy * tau)
         square = dx * dx + dy * dy
         outwards = dx * vx + dy * vy >= 0.0
         is_part = is_whole | (outwards if is_half else ((outwards == on[i]) == of_bright))
-        near[i] = (inner <= square) & (square <= outer) & is_part
-    chosen = _set_rows(near)
-    stride = max(1, -(-chosen.size // max(most_events, 1))) | 1  # odd: symmetric motion brings events in pairs
-    return chosen[::stride].copy()
+        chosen[m] = i  # stays only if counted: no branch to mispredict
+        m += (inner <= square) & (square <= outer) & is_part
+    stride = max(1, -(-m // max(most_events, 1))) | 1  # odd: symmetric motion brings events in pairs
+    return chosen[:m:stride].copy()
+
+
+@njit(cache=True, nogil=True)
+def _around_circle(circle: Floats, events: Events, reference_us: int, reach_px: float) -> Integers:
+    """Indices (m,) int64 of events in the columns and rows that a moving circle of this radius passes, and some more.
+
+    The processor compares 16 whole numbers at once: in clutter 3 x faster than the distances of all events.
+    """
+    t_us, x_px, y_px, _ = events
+    if t_us.size == 0:
+        return np.empty(0, np.int64)
+    first_s, last_s = (t_us[0] - reference_us) * 1e-6, (t_us[-1] - reference_us) * 1e-6
+    first_x, last_x = circle[0] + circle[2] * first_s, circle[0] + circle[2] * last_s
+    first_y, last_y = circle[1] + circle[3] * first_s, circle[1] + circle[3] * last_s
+    reach_px += 1.0  # more than any rounding
+    return _in_box(
+        x_px,
+        y_px,
+        min(first_x, last_x) - reach_px,
+        max(first_x, last_x) + reach_px,
+        min(first_y, last_y) - reach_px,
+        max(first_y, last_y) + reach_px,
+    )
+
+
+@njit(cache=True, nogil=True)
+def _in_box(x_px: Pixels, y_px: Pixels, left_px: float, right_px: float, top_px: float, bottom_px: float) -> Integers:
+    """Indices (m,) int64 of events in these columns and rows, the limits included."""
+    left, top = math.ceil(_pixel(left_px)), math.ceil(_pixel(top_px))
+    width, height = math.floor(_pixel(right_px)) - left, math.floor(_pixel(bottom_px)) - top
+    if right_px < 0.0 or bottom_px < 0.0 or width < 0 or height < 0:
+        return np.empty(0, np.int64)
+    first_x, first_y, columns, rows = np.uint16(left), np.uint16(top), np.uint16(width), np.uint16(height)
+    inside = np.empty(x_px.size, np.bool_)
+    for n in range(x_px.size):
+        i = np.uint64(n)
+        # What lies before the first one wraps to large numbers: one comparison an axis.
+        inside[i] = (np.uint16(x_px[i] - first_x) <= columns) & (np.uint16(y_px[i] - first_y) <= rows)
+    return _set_rows(inside)
+
+
+@njit(cache=True, nogil=True)
+def _pixel(place_px: float) -> float:
+    """Place within what a pixel's number can be."""
+    return min(max(place_px, 0.0), 65535.0)
 
 
 @njit(cache=True, nogil=True)
@@ -54,9 +99,9 @@ def _set_rows(flags: Flags) -> Integers:
     """Indices (m,) int64 of the flags that are set."""
     rows = np.empty(flags.size, np.int64)
     m = 0
-    for i in range(flags.size):
-        rows[m] = i  # stays only if counted: no branch to mispredict
-        m += flags[i]
+    for n in range(flags.size):
+        rows[m] = n  # stays only if counted: no branch to mispredict
+        m += flags[np.uint64(n)]
     return rows[:m].copy()
 
 
@@ -72,38 +117,46 @@ def residuals(circle: Floats, ellipticity: Floats, tau_s: Floats, x_px: Floats, 
     return distances
 
 
-@njit(cache=True, nogil=True)
-def _normal_equations(
-    information: Floats,
-    gradient: Floats,
-    circle: Floats,
-    ellipticity: Floats,
-    tau_s: Floats,
-    x_px: Floats,
-    y_px: Floats,
-    gate_px: float,
-) -> tuple[float, float]:
-    """Write J^T W J (5, 5) and J^T W e (5,) of the outline's distances (velocity in px/ms); sums of w and w e^2.
+@njit(cache=True, nogil=True, error_model="numpy")
+def _derivatives(
+    terms: Floats, circle: Floats, ellipticity: Floats, tau_s: Floats, x_px: Floats, y_px: Floats, gate_px: float
+) -> None:
+    """Write a, b, c, error and weight of each event (n,) into the rows of terms (5, n).
 
-    Each sum in a variable of its own, not in the arrays: twice as fast.
+    A move of the circle by (dx, dy) and a radius larger by dr take a dx + b dy + c dr off the error, the distance from
+    the outline.
     """
     x0, y0, vx, vy, radius = circle[0], circle[1], circle[2], circle[3], circle[4]
+    cosine, sine = ellipticity[0], ellipticity[1]
+    for n in range(tau_s.size):
+        i = np.uint64(n)
+        dx = x_px[i] - (x0 + vx * tau_s[i])
+        dy = y_px[i] - (y0 + vy * tau_s[i])
+        distance = math.sqrt(dx * dx + dy * dy) + 1e-9
+        a, b = dx / distance, dy / distance
+        c = 1.0 + cosine * (a * a - b * b) + sine * 2.0 * a * b
+        error = distance - radius * c
+        share = error / gate_px
+        rest = 1.0 - share * share
+        terms[0, i], terms[1, i], terms[2, i], terms[3, i] = a, b, c, error
+        terms[4, i] = rest * rest if rest > 0.0 else 0.0
+
+
+@njit(cache=True, nogil=True)
+def _normal_equations(information: Floats, gradient: Floats, terms: Floats, tau_s: Floats) -> tuple[float, float]:
+    """Write J^T W J (5, 5) and J^T W e (5,) of `_derivatives` (velocity in px/ms); sums of w and w e^2.
+
+    Each sum in a variable of its own, not in the arrays: twice as fast. The derivatives in a loop before, which takes
+    several events at once: 1.6 x as fast.
+    """
     weights, squares = 1e-9, 0.0
     ga, gb, gat, gbt, gc = 0.0, 0.0, 0.0, 0.0, 0.0
     aa, ab, bb, ac, bc, cc = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     aat, abt, bbt, act, bct = 0.0, 0.0, 0.0, 0.0, 0.0
     aatt, abtt, bbtt = 0.0, 0.0, 0.0
-    for i in range(tau_s.size):
-        dx = x_px[i] - (x0 + vx * tau_s[i])
-        dy = y_px[i] - (y0 + vy * tau_s[i])
-        distance = math.sqrt(dx * dx + dy * dy) + 1e-9
-        a, b = dx / distance, dy / distance
-        c = 1.0 + ellipticity[0] * (a * a - b * b) + ellipticity[1] * 2.0 * a * b
-        error = distance - radius * c
-        share = error / gate_px
-        if share * share >= 1.0:
-            continue
-        weight = (1.0 - share * share) ** 2
+    for n in range(tau_s.size):
+        i = np.uint64(n)
+        a, b, c, error, weight = terms[0, i], terms[1, i], terms[2, i], terms[3, i], terms[4, i]
         weights += weight
         squares += weight * error * error
         t = tau_s[i] * 1e3
@@ -173,13 +226,14 @@ def fit_circle(
         Sum of the weights, about the number of events used.
     """
     circle = start.copy()
-    information, gradient = np.zeros((5, 5)), np.zeros(5)
+    information, gradient, terms = np.zeros((5, 5)), np.zeros(5), np.empty((5, tau_s.size))
     gate, scatter, weight_sum = gate_px, gate_px, 0.0
     # The velocity is fitted in px/ms, so that all unknowns are of the same size.
     scale = np.ones(5)
     scale[2] = scale[3] = 1e3
     for _ in range(most_rounds):
-        weight_sum, squares = _normal_equations(information, gradient, circle, ellipticity, tau_s, x_px, y_px, gate)
+        _derivatives(terms, circle, ellipticity, tau_s, x_px, y_px, gate)
+        weight_sum, squares = _normal_equations(information, gradient, terms, tau_s)
         for k in range(5):
             firm = (scale[k] / max(prior_std[k], 1e-9)) ** 2 + 1e-9
             information[k, k] += firm
@@ -205,29 +259,27 @@ def fit_circle(
 
 
 @njit(cache=True, nogil=True)
-def outside_circles(circles: Floats, events: Events, reference_us: int, margins_px: Floats) -> Integers:
-    """Indices (k,) int64 of events outside moving circles (m, 5) by more than their margins (m,)."""
+def inside_circles(circles: Floats, events: Events, reference_us: int, margins_px: Floats) -> Integers:
+    """Rising indices (k,) int64 of events inside one of the moving circles (m, 5), or beyond by its margin (m,)."""
     t_us, x_px, y_px, _ = events
-    outside = np.ones(t_us.size, np.bool_)
+    inside = np.zeros(t_us.size, np.bool_)
     for m in range(margins_px.size):
         x0, y0, vx, vy = circles[m, 0], circles[m, 1], circles[m, 2], circles[m, 3]
-        reach = (circles[m, 4] + margins_px[m]) ** 2
-        for n in range(t_us.size):
-            i = np.uint64(n)
+        reach_px = circles[m, 4] + margins_px[m]
+        for row in _around_circle(circles[m], events, reference_us, reach_px):
+            i = np.uint64(row)
             tau = np.int32(t_us[i] - reference_us) * 1e-6
             dx, dy = x_px[i] - (x0 + vx * tau), y_px[i] - (y0 + vy * tau)
-            outside[i] &= dx * dx + dy * dy > reach
-    return _set_rows(outside)
+            inside[i] |= dx * dx + dy * dy <= reach_px**2
+    return _set_rows(inside)
 
 
 @njit(cache=True, nogil=True)
 def in_square(x_px: Pixels, y_px: Pixels, centre_x_px: float, centre_y_px: float, reach_px: float) -> Integers:
     """Indices (m,) int64 of events within reach_px of a place, in both columns and rows."""
-    inside = np.empty(x_px.size, np.bool_)
-    for n in range(x_px.size):
-        i = np.uint64(n)
-        inside[i] = (abs(x_px[i] - centre_x_px) <= reach_px) & (abs(y_px[i] - centre_y_px) <= reach_px)
-    return _set_rows(inside)
+    return _in_box(
+        x_px, y_px, centre_x_px - reach_px, centre_x_px + reach_px, centre_y_px - reach_px, centre_y_px + reach_px
+    )
 
 
 @njit(cache=True, nogil=True)

@@ -47,9 +47,9 @@ def hough_near(
     x1, y1 = min(width, round(x_px) + margin + 1), min(height, round(y_px) + margin + 1)
     if x0 >= x1 or y0 >= y1:
         return None
-    window = surface.cleaned(x0, y0, x1, y1)
+    window = surface.cleaned_levels(x0, y0, x1, y1)
     corner = round(x_px) - reach_px, round(y_px) - reach_px
-    columns, rows = kernels.bright_pixels(window, EDGE_LEVEL, MOST_PIXELS)
+    columns, rows = kernels.bright_pixels(window, surface.level_of(EDGE_LEVEL), MOST_PIXELS)
     found = kernels.best_circle(columns + x0, rows + y0, *corner, 2 * reach_px + 1, first_radius, radii)
     return Circle(*found) if found[3] > 0.0 else None
 

@@ -156,14 +156,22 @@ class Sighting:
         return (
             min(self.ahead, self.behind) >= LEAST_ARC
             and self.clutter <= MOST_OUTSIDE
-            and self.covariance[4, 4] <= (MOST_RADIUS_ERROR * self.ring[4]) ** 2
-            and self._is_velocity_known
+            and _is_fixed_by_arcs(self.ring, self.covariance)
         )
 
     @property
     def _is_velocity_known(self) -> bool:
-        """Whether the speed is known to a tenth."""
-        return bool(self.covariance[2, 2] + self.covariance[3, 3] <= (0.1 * self.speed_px_s) ** 2)
+        return _is_velocity_known(self.ring, self.covariance)
+
+
+def _is_velocity_known(ring: Floats, covariance: Floats) -> bool:
+    """Whether the speed of a ring (5,) with this covariance is known to a tenth."""
+    return bool(covariance[2, 2] + covariance[3, 3] <= (0.1 * math.hypot(ring[2], ring[3])) ** 2)
+
+
+def _is_fixed_by_arcs(ring: Floats, covariance: Floats) -> bool:
+    """Whether a ring (5,) with this covariance is known well enough where only arcs of it show."""
+    return bool(covariance[4, 4] <= (MOST_RADIUS_ERROR * ring[4]) ** 2) and _is_velocity_known(ring, covariance)
 
 
 def disc_share(ring: Floats, events: EventBatch, end_us: int) -> float:
@@ -217,13 +225,18 @@ def measure(
         camera.width_px,
         camera.height_px,
     )
-    if math.isnan(ring[0]):
-        return None
+    return None if math.isnan(ring[0]) else _sighting(ring, covariance, scatter, found, behind_px, part)
+
+
+def _sighting(
+    ring: Floats, covariance: Floats, scatter_px: float, found: Floats, behind_px: float, part: int
+) -> Sighting:
+    """The outline of a fit, with its support as `kernels.outline.support` gives it."""
     events_on, ahead_on, behind_on, ahead, behind, visible, outside, _ = found.tolist()
     return Sighting(
         ring,
         covariance,
-        scatter,
+        scatter_px,
         int(events_on),
         ahead,
         behind,
@@ -266,10 +279,19 @@ def sight_arcs(
     ring, gate = _voted(recent, end_us, circle, fastest_radii_s, signed=True)
     if math.isnan(ring[0]):
         return None
+    columns, size = events.columns, (camera.width_px, camera.height_px)
+    oval = oval_of(camera, ring[0], ring[1])
     for part in (OF_DARK, OF_BRIGHT):
-        first = measure(recent, end_us, camera, ring, 1.5 * gate, FREE, part)
-        sighting = None if first is None else measure(events, end_us, camera, first.ring, 3.0, FREE, part)
-        if sighting is not None and sighting.in_arcs:
+        first, _, _ = kernels.fit_part(ring, FREE, oval, recent.columns, end_us, 1.5 * gate, part)
+        if math.isnan(first[0]):
+            continue
+        first_oval = oval_of(camera, first[0], first[1])
+        fitted, covariance, scatter_px = kernels.fit_part(first, FREE, first_oval, columns, end_us, 3.0, part)
+        if math.isnan(fitted[0]) or not _is_fixed_by_arcs(fitted, covariance):
+            continue  # before its support is counted, which takes as long as the fit
+        found, behind_px = kernels.evidence(fitted, first_oval, columns, end_us, *size)
+        sighting = _sighting(fitted, covariance, scatter_px, found, behind_px, part)
+        if sighting.in_arcs:
             return sighting
     return None
 

@@ -13,7 +13,7 @@ from ..camera import Camera
 from ..events import EventBatch
 from ..kernels import eros, neighbour_support
 from ..kernels import moving_circle as kernels
-from ..kernels.take_events import take_events
+from ..kernels.take_events import take_events, take_others
 from ..results import Circle, Packet
 from ..stage import Context
 from .filter import STC_MODES
@@ -215,8 +215,8 @@ def outside_balls(events: EventBatch, rings: list[NDArray[np.float64]], end_us: 
     if not rings:
         return events
     circles = np.array(rings)
-    rows = kernels.outside_circles(circles, events.columns, end_us, 0.3 * circles[:, 4] + 2.0)  # margins for trails
-    return EventBatch(*take_events(rows, events.columns))
+    rows = kernels.inside_circles(circles, events.columns, end_us, 0.3 * circles[:, 4] + 2.0)  # margins for trails
+    return EventBatch(*take_others(rows, events.columns)) if rows.size else events
 
 
 def moved(ring: NDArray[np.float64], by_us: int) -> NDArray[np.float64]:

@@ -210,10 +210,10 @@ def distance_behind(
     return math.nan if error.size < least else float(np.sort(error)[error.size // 2])
 
 
-def outside_circles(circles: Floats, tau_s: Floats, x_px: Floats, y_px: Floats, margins_px: Floats) -> Ints:
-    """Indices of the events farther out than every circle and its margin."""
-    outside = [
-        np.hypot(*from_centre(circle, tau_s, x_px, y_px)) > circle[4] + margin_px
+def inside_circles(circles: Floats, tau_s: Floats, x_px: Floats, y_px: Floats, margins_px: Floats) -> Ints:
+    """Indices of the events within any circle and its margin."""
+    inside = [
+        np.hypot(*from_centre(circle, tau_s, x_px, y_px)) <= circle[4] + margin_px
         for circle, margin_px in zip(circles, margins_px, strict=True)
     ]
-    return np.flatnonzero(np.all(outside, axis=0))
+    return np.flatnonzero(np.any(inside, axis=0))
