@@ -82,6 +82,38 @@ def update(
 
 
 @njit(cache=True, nogil=True)
+def observation_noise(covariance: Floats, scatter_px2: float, times: float) -> Floats:
+    """Covariance (3, 3) of an observation from that of a state (5, 5) and a variance of its own, so many times."""
+    noise = np.empty((3, 3))
+    for a in range(3):
+        for b in range(3):
+            noise[a, b] = (covariance[OBSERVED[a], OBSERVED[b]] + (scatter_px2 if a == b else 0.0)) * times
+    return noise
+
+
+@njit(cache=True, nogil=True)
+def widened(covariance: Floats, shifts_px: Floats, variances: Floats) -> Floats:
+    """Covariance (5, 5) with more errors, as a new array.
+
+    Parameters
+    ----------
+    shifts_px : (m, 2) float64
+        1 sigma each by which the place is off along a direction.
+    variances : (k, 5) float64
+        Of independent errors, added in this order.
+    """
+    spread = covariance.copy()
+    for m in range(shifts_px.shape[0]):
+        for i in range(2):
+            for j in range(2):
+                spread[i, j] += shifts_px[m, i] * shifts_px[m, j]
+    for m in range(variances.shape[0]):
+        for i in range(STATES):
+            spread[i, i] += variances[m, i]
+    return spread
+
+
+@njit(cache=True, nogil=True)
 def _transformed(matrix: Floats, covariance: Floats) -> Floats:
     """Covariance M C M^T of a matrix M (m, n) times what has this covariance C (n, n)."""
     rows, n = matrix.shape

@@ -16,7 +16,7 @@ from ..kernels.moving_circle import HALF_AHEAD
 from ..kernels.take_events import take_events
 from ..results import Circle, Packet
 from .track_contact import Contact
-from .track_kalman import OBSERVED, OBSERVED_BLOCK, BallFilter
+from .track_kalman import OBSERVED, BallFilter, observation_noise, widened
 from .track_outline import FREE, LEAST_ARC, Edge, Sighting, measure
 from .track_path import PathPoint
 from .track_result import BallTrack, BeganBy
@@ -34,9 +34,8 @@ ARCS_LAG_STD_PX, ARCS_RADIUS_STD_PX = 0.5, 1.2
 MOST_SURPRISE = 25.0
 # Scatter of an outline's centre and radius from tick to tick beyond the statistical one, on the samples.
 OUTLINE_STD_PX = 0.05
-OUTLINE_COVARIANCE = OUTLINE_STD_PX**2 * np.eye(3)
 # The same of arcs, on white walls of our simulator (seeds 96000-96010): mostly 0.2 to 0.5 px, single ones 2 px.
-ARCS_COVARIANCE = 0.5**2 * np.eye(3)
+ARCS_STD_PX = 0.5
 # What no filtering takes away: the calibration of latency, place and radius. The first two differ from shot to shot;
 # how far outside the outline is seen, from sensor to sensor: two simulators with the same biases are 0.3 px apart.
 LATENCY_STD_US = 12.0
@@ -148,7 +147,8 @@ class TrackedBall:
         """The ball of a sighting at a packet's end."""
         state = measuring.edge.ball(sighting.ring)
         ball = cls(shot, packet.start_us, began_by, measuring.filter_at(state, sighting.covariance), 0, state)
-        ball._see(measuring, sighting, ball._noise(measuring, sighting, packet.start_us, packet.end_us), packet.end_us)
+        noise = ball._noise(measuring, sighting, packet.start_us, packet.end_us)
+        ball._see(measuring.circle(sighting), sighting, noise, packet.end_us)
         return ball
 
     def after(self, contact: Contact, measuring: Measuring, shot: int) -> TrackedBall:
@@ -227,19 +227,21 @@ class TrackedBall:
 
     def measure(self, measuring: Measuring, events: EventBatch, start_us: int, end_us: int) -> Sighting | None:
         """Measure the outline near the predicted ball and give it to the filter; None if it is not there."""
-        spread = np.sqrt(np.diag(self.filter.covariance))
+        variances = self.filter.covariance.diagonal().tolist()
+        x_std, y_std, vx_std, vy_std, _ = (math.sqrt(variance) for variance in variances)
         expected = measuring.edge.outline(self.filter.mean)
         # The velocity may leave the prediction by ten radii a second and the radius by half a pixel: loose for a
         # ball wholly in view, and it keeps the fit sane on short arcs.
-        loose = np.array([1e9, 1e9, 10 * expected[4] + spread[2], 10 * expected[4] + spread[3], 0.5])
-        gate = 2.0 + 3.0 * max(spread[0], spread[1])
+        loose = np.array([1e9, 1e9, 10 * expected[4] + vx_std, 10 * expected[4] + vy_std, 0.5])
+        gate = 2.0 + 3.0 * max(x_std, y_std)
         sighting = measure(events, end_us, measuring.camera, expected, gate, loose, self.part)
         if sighting is None or not self._is_pinned(sighting):
             return None
-        noise = self._noise(measuring, sighting, start_us, end_us)
-        if not self.filter.update(measuring.edge.ball(sighting.ring)[OBSERVED], noise, MOST_SURPRISE):
+        noise, circle = self._noise(measuring, sighting, start_us, end_us), measuring.circle(sighting)
+        observed = np.array([circle.x_px, circle.y_px, circle.radius_px])
+        if not self.filter.update(observed, noise, MOST_SURPRISE):
             return None
-        self._see(measuring, sighting, noise, end_us)
+        self._see(circle, sighting, noise, end_us)
         return sighting
 
     def measure_off_path(self, measuring: Measuring, events: EventBatch, start_us: int, end_us: int) -> Sighting | None:
@@ -258,7 +260,8 @@ class TrackedBall:
     def restart(self, measuring: Measuring, sighting: Sighting, start_us: int, end_us: int) -> None:
         """Start the filter anew at a sighting of the ball off its path."""
         self.filter = measuring.filter_at(measuring.edge.ball(sighting.ring), sighting.covariance)
-        self._see(measuring, sighting, self._noise(measuring, sighting, start_us, end_us), end_us)
+        noise = self._noise(measuring, sighting, start_us, end_us)
+        self._see(measuring.circle(sighting), sighting, noise, end_us)
 
     def _is_pinned(self, sighting: Sighting) -> bool:
         """Whether enough of the outline is seen to pin down its circle."""
@@ -311,30 +314,34 @@ class TrackedBall:
         off = np.hypot(*(self.filter.mean - other.filter.mean)[2:4])
         return bool(off < SHADOW_VELOCITY * np.hypot(*other.filter.mean[2:4]))
 
-    def total_covariance(self) -> Floats:
-        """(5, 5) float64: the filter's covariance plus the errors that every tick has in common."""
-        velocity = self.filter.mean[2:4]
-        late = velocity * LATENCY_STD_US * 1e-6
-        covariance = self.filter.covariance + COMMON_COVARIANCE
-        covariance[:2, :2] += late[:, None] * late
+    def total_covariance(self, observed_std_px: float = 0.0) -> Floats:
+        """(5, 5) float64: the filter's covariance plus the errors that every tick has in common.
+
+        And a further one of place and radius.
+        """
+        vx, vy = self.filter.mean[2:4].tolist()
+        shifts, variances = [[vx * LATENCY_STD_US * 1e-6, vy * LATENCY_STD_US * 1e-6]], []
         if self.part != HALF_AHEAD:
-            lag = velocity / np.hypot(*velocity) * ARCS_LAG_STD_PX
-            covariance[:2, :2] += lag[:, None] * lag
-            covariance[4, 4] += ARCS_RADIUS_STD_PX**2
-        return covariance
+            speed = math.hypot(vx, vy)
+            shifts.append([vx / speed * ARCS_LAG_STD_PX, vy / speed * ARCS_LAG_STD_PX])
+            variances.append([0.0, 0.0, 0.0, 0.0, ARCS_RADIUS_STD_PX**2])
+        more = observed_std_px**2
+        variances.append([more, more, 0.0, 0.0, more])
+        return widened(self.filter.covariance + COMMON_COVARIANCE, np.array(shifts), np.array(variances))
 
     def track(self, end_us: int, latency_us: float, outline_px: float, earlier: tuple[BallTrack, ...]) -> BallTrack:
         """Its present state, to the ball's rim; with `outline_px` = 0 to where the events ahead lie."""
-        rim_px = self.rim.outside_px(math.hypot(*self.filter.mean[2:4])) if outline_px > 0.0 else 0.0
-        covariance, circle = self.total_covariance(), self.measured
-        covariance[OBSERVED, OBSERVED] += self.rim.std_px(self.filter.mean[4]) ** 2
+        mean, circle = self.filter.mean.copy(), self.measured
+        _, _, vx, vy, radius = mean.tolist()
+        rim_px = self.rim.outside_px(math.hypot(vx, vy)) if outline_px > 0.0 else 0.0
+        mean[4] += rim_px
         return BallTrack(
             self.shot,
             end_us - latency_us,
             latency_us,
-            self.filter.mean + np.array([0.0, 0.0, 0.0, 0.0, rim_px]),
-            covariance,
-            None if circle is None else replace(circle, radius_px=circle.radius_px + rim_px),
+            mean,
+            self.total_covariance(self.rim.std_px(radius)),
+            None if circle is None else Circle(circle.x_px, circle.y_px, circle.radius_px + rim_px, circle.score),
             self.start_us,
             self.began_by,
             self.is_shot,
@@ -345,18 +352,18 @@ class TrackedBall:
     def _noise(self, measuring: Measuring, sighting: Sighting, start_us: int, end_us: int) -> Floats:
         # Outlines taken further back than one tick share events with the tick before and so count for less.
         shared = max(1.0, measuring.contour_us / (end_us - start_us))
-        scatter = OUTLINE_COVARIANCE if sighting.part == HALF_AHEAD else ARCS_COVARIANCE
-        noise: Floats = (sighting.covariance[OBSERVED_BLOCK] + scatter) * shared
-        return noise
+        scatter_px = OUTLINE_STD_PX if sighting.part == HALF_AHEAD else ARCS_STD_PX
+        return observation_noise(sighting.covariance, scatter_px**2, shared)
 
-    def _see(self, measuring: Measuring, sighting: Sighting, noise: Floats, end_us: int) -> None:
+    def _see(self, circle: Circle, sighting: Sighting, noise: Floats, end_us: int) -> None:
         self.seen_us, self.seen = end_us, self.filter.mean
         self.contrast, self.part = sighting.contrast, sighting.part
-        whole = sighting.part == HALF_AHEAD and sighting.visible == 1.0
-        if whole:
+        if sighting.visible < 1.0:
+            hidden = HIDDEN_ERROR * (1.0 - sighting.visible) * sighting.ring[4]
+            noise = noise + hidden**2 * np.eye(3)
+        elif sighting.part == HALF_AHEAD:
             self.rim = self.rim.with_outline(sighting)
-        hidden = HIDDEN_ERROR * (1.0 - sighting.visible) * sighting.ring[4]
-        self._add(PathPoint(end_us, measuring.circle(sighting), noise + hidden**2 * np.eye(3)))
+        self._add(PathPoint(end_us, circle, noise))
 
     def _add(self, point: PathPoint) -> None:
         if self.path and self.path[-1].end_us == point.end_us:  # found again elsewhere after all

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from ..kernels import kalman
 
 Floats = NDArray[np.float64]
-OBSERVED = kalman.OBSERVED
-OBSERVED_BLOCK = np.ix_(OBSERVED, OBSERVED)
+OBSERVED, observation_noise, widened = kalman.OBSERVED, kalman.observation_noise, kalman.widened
 
 
 class BallFilter:
