@@ -8,7 +8,10 @@ import numpy as np
 from numba import njit
 
 from .arrays import Bytes, Floats, Integers, Pixels
+from .isolated import copy_cleaned
 
+# Votes of which more than one in so many was given are set to zero all at once.
+FEW_VOTES = 8
 BLOCK_PIXELS = 16  # of `peak`: a vector instruction takes 16 votes
 
 
@@ -144,10 +147,13 @@ def best_circles(
         found += 1
         for row in range(max(0, b - near), min(height, b + near + 1)):
             votes[(row * width + max(0, a - near)) * radii : (row * width + min(width, a + near + 1)) * radii] = 0
-    for voter in voters:
-        centre = ((y_px[voter] - top) * width + x_px[voter] - left) * radii
-        for n in range(offsets.size):
-            votes[np.uint64(centre + offsets[n])] = 0
+    if width * height * radii < FEW_VOTES * voters.size * offsets.size:
+        votes[: width * height * radii] = 0
+    else:
+        for voter in voters:
+            centre = ((y_px[voter] - top) * width + x_px[voter] - left) * radii
+            for n in range(offsets.size):
+                votes[np.uint64(centre + offsets[n])] = 0
     return supports[:found].copy(), circles[:found].copy()
 
 
@@ -340,3 +346,41 @@ def best_circle(
     x, y, radius = refined(votes, a, b, k)
     share = min(1.0, votes[b, a, k] / (2.0 * math.pi * (radius0_px + k)))
     return left_px + x, top_px + y, radius0_px + radius, share
+
+
+@njit(cache=True, nogil=True)
+def circle_near(
+    levels: Bytes,
+    is_cleaned: bool,
+    full_blocks_only: bool,
+    least: int,
+    most_pixels: int,
+    x_px: int,
+    y_px: int,
+    reach_px: int,
+    radius0_px: int,
+    radii: int,
+) -> tuple[float, float, float, float]:
+    """`best_circle` through a surface's `bright_pixels`, its centre within reach_px of a pixel.
+
+    Parameters
+    ----------
+    levels : (height, width) uint8
+        The surface.
+    is_cleaned, full_blocks_only : bool
+        Whether its isolated pixels do not count, and by which rule, see `copy_cleaned`.
+    """
+    height, width = levels.shape
+    margin = radius0_px + radii + reach_px
+    left, top = max(0, x_px - margin), max(0, y_px - margin)
+    right, bottom = min(width, x_px + margin + 1), min(height, y_px + margin + 1)
+    if left >= right or top >= bottom:
+        return 0.0, 0.0, 0.0, 0.0
+    window = levels[top:bottom, left:right].copy()
+    if is_cleaned:
+        copy_cleaned(window, levels, left, top, full_blocks_only)
+    columns, rows = bright_pixels(window, least, most_pixels)
+    for n in range(columns.size):
+        columns[n] += left
+        rows[n] += top
+    return best_circle(columns, rows, x_px - reach_px, y_px - reach_px, 2 * reach_px + 1, radius0_px, radii)

@@ -78,10 +78,6 @@ class SurfaceResult(ReadOnlyArrays):
         Returns (rows, columns) uint8, empty where the window misses the image. Pixels around the window count
         as neighbours: any window is a cut-out of the whole image cleaned.
         """
-        return self._values_of(self.cleaned_levels(x0_px, y0_px, x1_px, y1_px))
-
-    def cleaned_levels(self, x0_px: int, y0_px: int, x1_px: int, y1_px: int) -> NDArray[np.uint8]:
-        """The levels of these values, as of `cleaned`."""
         height, width = self.levels.shape
         x0, y0 = min(max(x0_px, 0), width), min(max(y0_px, 0), height)
         x1, y1 = max(min(x1_px, width), x0), max(min(y1_px, height), y0)
@@ -89,7 +85,7 @@ class SurfaceResult(ReadOnlyArrays):
         window = self.levels[y0:y1, x0:x1].copy()
         if window.size and is_printed is not None:
             isolated.copy_cleaned(window, self.levels, x0, y0, is_printed)
-        return window
+        return self._values_of(window)
 
     def _values_of(self, levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
         values = np.zeros_like(levels)

@@ -12,7 +12,7 @@ from ..events import EventBatch
 from ..kernels import hough as kernels
 from ..kernels.arrays import Integers
 from ..results import Circle
-from .surface import SurfaceResult
+from .surface import CLEANINGS, SurfaceResult
 
 # A surface pixel at half of full brightness or more counts as an edge that is there now.
 EDGE_LEVEL = 128
@@ -41,16 +41,19 @@ def hough_near(
     """
     first_radius = max(1, round(radius_from_px))
     radii = max(1, round(radius_to_px) - first_radius + 1)
-    margin = first_radius + radii + reach_px
-    height, width = surface.levels.shape
-    x0, y0 = max(0, round(x_px) - margin), max(0, round(y_px) - margin)
-    x1, y1 = min(width, round(x_px) + margin + 1), min(height, round(y_px) + margin + 1)
-    if x0 >= x1 or y0 >= y1:
-        return None
-    window = surface.cleaned_levels(x0, y0, x1, y1)
-    corner = round(x_px) - reach_px, round(y_px) - reach_px
-    columns, rows = kernels.bright_pixels(window, surface.level_of(EDGE_LEVEL), MOST_PIXELS)
-    found = kernels.best_circle(columns + x0, rows + y0, *corner, 2 * reach_px + 1, first_radius, radii)
+    rule = CLEANINGS[surface.cleaning]
+    found = kernels.circle_near(
+        surface.levels,
+        rule is not None,
+        bool(rule),
+        surface.level_of(EDGE_LEVEL),
+        MOST_PIXELS,
+        round(x_px),
+        round(y_px),
+        reach_px,
+        first_radius,
+        radii,
+    )
     return Circle(*found) if found[3] > 0.0 else None
 
 
