@@ -52,7 +52,7 @@ class ColumnBatch:
 
     def between(self, start_us: float, end_us: float) -> Self:
         """The events of [start_us, end_us), as views."""
-        first, last = np.searchsorted(self.t_us, [start_us, end_us])
+        first, last = self.t_us.searchsorted([start_us, end_us])
         return self[int(first) : int(last)]
 
 

@@ -53,7 +53,7 @@ def near_outline(
 def _around_circle(circle: Floats, events: Events, reference_us: int, reach_px: float) -> Integers:
     """Indices (m,) int64 of events in the columns and rows that a moving circle of this radius passes, and some more.
 
-    The processor compares 16 whole numbers at once: in clutter 3 x faster than the distances of all events.
+    The processor compares 16 whole numbers at once: in clutter twice as fast as the distances of all events.
     """
     t_us, x_px, y_px, _ = events
     if t_us.size == 0:
@@ -75,16 +75,16 @@ def _around_circle(circle: Floats, events: Events, reference_us: int, reach_px: 
 @njit(cache=True, nogil=True)
 def _in_box(x_px: Pixels, y_px: Pixels, left_px: float, right_px: float, top_px: float, bottom_px: float) -> Integers:
     """Indices (m,) int64 of events in these columns and rows, the limits included."""
-    left, top = math.ceil(_pixel(left_px)), math.ceil(_pixel(top_px))
-    width, height = math.floor(_pixel(right_px)) - left, math.floor(_pixel(bottom_px)) - top
+    left, top = np.int64(math.ceil(_pixel(left_px))), np.int64(math.ceil(_pixel(top_px)))
+    width, height = np.int64(math.floor(_pixel(right_px))) - left, np.int64(math.floor(_pixel(bottom_px))) - top
     if right_px < 0.0 or bottom_px < 0.0 or width < 0 or height < 0:
         return np.empty(0, np.int64)
-    first_x, first_y, columns, rows = np.uint16(left), np.uint16(top), np.uint16(width), np.uint16(height)
+    columns, rows = np.uint16(width), np.uint16(height)
     inside = np.empty(x_px.size, np.bool_)
     for n in range(x_px.size):
         i = np.uint64(n)
         # What lies before the first one wraps to large numbers: one comparison an axis.
-        inside[i] = (np.uint16(x_px[i] - first_x) <= columns) & (np.uint16(y_px[i] - first_y) <= rows)
+        inside[i] = (np.uint16(np.int64(x_px[i]) - left) <= columns) & (np.uint16(np.int64(y_px[i]) - top) <= rows)
     return _set_rows(inside)
 
 

@@ -53,7 +53,7 @@ def vote_velocity(
     where negative, darker) than its background that moves so. Unsigned, it counts by its nearness alone: a ball over
     ground brighter here and darker there.
 
-    In single precision, good to 1e-6 of an event, and an event's votes for all velocities in one loop, eight at once:
+    In single precision, good to 1e-4 of an event, and an event's votes for all velocities in one loop, eight at once:
     2.5 x faster, and the same on every processor.
 
     Parameters
