@@ -89,8 +89,8 @@ VALUES = [
     ),
     Mutant(
         "pipeline/events.py",
-        "np.searchsorted(self.t_us, [start_us, end_us])",
-        'np.searchsorted(self.t_us, [start_us, end_us], side="right")',
+        "self.t_us.searchsorted([start_us, end_us])",
+        'self.t_us.searchsorted([start_us, end_us], side="right")',
         "tests/pipeline/test_events.py",
     ),
     Mutant(
