@@ -41,7 +41,7 @@ RIVALS = {"rivals_rps": np.array([[0.0, 30.0, 0.0], [0.0, 0.0, 9.0]])}
     ("trusted", "doubted", "reason"),
     [
         (SURE, replace(SURE, spin_rps=None, covariance_rps2=None), "200 logo events"),
-        (replace(SURE, contrast=0.26), replace(SURE, contrast=0.24), "gains 0.24"),
+        (replace(SURE, contrast=0.26), replace(SURE, contrast=0.24), r"sharpens the logo \(0.24 in log likelihood"),
         (replace(SURE, patch_rad=0.19), replace(SURE, patch_rad=0.17), "spread over 10 degrees"),
         (
             replace(SURE, margins=np.array([9.0, 1.3]), **RIVALS),
