@@ -42,7 +42,7 @@ def live(session: Session, killed_at_us: int | None = None) -> list[LiveOutput]:
     def put(output: LiveOutput | BaseException | None) -> None:
         if isinstance(output, LiveSpin):
             has_told.set()
-        run._outputs.put(output)
+        run._put(output)
 
     run = LiveRun(
         lambda tick_us, on_notice: EventStream(camera, tick_us, on_notice=on_notice),

@@ -129,7 +129,7 @@ def test_the_coach_sees_the_shot_alone(tab: Tab) -> None:
     tab.until(f"{views}.then((count) => count <= 3)")  # ball and flight; what was left out may be there, unseen
     assert tab.page.locator("#controls").is_hidden()
     said = " ".join(tab.page.inner_text("#sentence").split())
-    sentence = r"Topspin \d+ ±[\d.]+ rps \(\d+ rpm\) \d+ km/h, axis tilted \d+° from pure topspin, whole shot"
+    sentence = r"Topspin [\d.]+ ± [\d.]+ rps \(\d+ rpm\) \d+ km/h, axis tilted \d+° from pure topspin, whole shot"
     assert re.fullmatch(sentence, said), said
     tab.page.click("#leave")
     tab.page.wait_for_selector("#controls", state="visible")
