@@ -27,7 +27,7 @@ TAKES_SCENE_CHOICES = True
 TAKES_RIVALS = True
 REAL_KINDS = (SPINNER,)
 
-SEED = 284_876  # of this suite alone
+QUICK_SEED, SEED = 284_876, 303_835  # of this suite alone: of `--quick`, and drawn for the published results
 CENTRE_STD_PX = 0.3  # how well the place of a mounted ball is known, for centre and radius
 DURATION_MS = 100
 # Logo events from which an answer is asked for.
@@ -38,13 +38,14 @@ WINDOWS_MS = ((0, 100), (0, 10), (45, 55), (90, 100))
 
 def tasks(quick: bool) -> list[Task]:
     """One recording a task: balls 1-7, top, back and side, 10 to 100 rps."""
+    first_seed = QUICK_SEED if quick else SEED
     if quick:
         chosen = [(1, "top", 50.0), (2, "side", 50.0), (4, "back", 80.0)]
     else:
         steps = [10.0 * step for step in range(1, 11)]
         chosen = list(itertools.product(range(1, 8), ("top", "back", "side"), steps))
     return [
-        Task(measure, {"ball": ball, "kind": kind, "rps": rps, "seed": SEED + number})
+        Task(measure, {"ball": ball, "kind": kind, "rps": rps, "seed": first_seed + number})
         for number, (ball, kind, rps) in enumerate(chosen)
     ]
 
