@@ -153,13 +153,13 @@ def _graticule() -> Chunk:
     return once(at.GRATICULE, rr.LineStrips2D([*across, *down], colors=[(*at.MASK_COLOUR, 90)], radii=[-0.5]))
 
 
-@cache
 def bounds() -> Floats:
     """Extent of the two discs' picture, (2, 2), px: x and y, from and to."""
     height, width = disc_mask().shape
     return np.array([[0.0, width], [0.0, height]])
 
 
+@cache
 def _blanks() -> tuple[Bytes, Bytes, Bytes]:
     """Texture, discs and map without events, (height, width, 3) each."""
     discs = np.full((*disc_mask().shape, 3), at.BACKGROUND, np.uint8)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections import OrderedDict
@@ -72,8 +73,8 @@ class AppState:
         live: LiveSource | None = None,
         labels: Path | None = None,
     ) -> None:
-        self.path = path.absolute()
-        self.folders = RecordingFolders([folder.absolute() for folder in folders] or [self.path.parent])
+        self.path = Path(os.path.abspath(path))  # also without "..", which no name may hold
+        self.folders = RecordingFolders([Path(os.path.abspath(one)) for one in folders] or [self.path.parent])
         self.tools, self.layout, self.followed, self.live = tools, layout, followed, live
         self.labels = labels
         self.drawings = DrawingCache()

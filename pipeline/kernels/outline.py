@@ -198,7 +198,7 @@ def disc_events(circle: Floats, events: Events, reference_us: float) -> tuple[in
 
 
 @njit(cache=True, nogil=True)
-def fit_part(
+def fit_outline(
     expected: Floats,
     prior_std: Floats,
     ellipticity: Floats,
@@ -252,26 +252,6 @@ def evidence(
     tau_s, x, y, on = relative_events(around, events, reference_us)
     found = support(circle, ellipticity, tau_s, x, y, on, width_px, height_px)
     return found, distance_behind(circle, ellipticity, tau_s, x, y, on, found[1] > found[2])
-
-
-@njit(cache=True, nogil=True)
-def fit_outline(
-    expected: Floats,
-    prior_std: Floats,
-    ellipticity: Floats,
-    events: Events,
-    reference_us: int,
-    gate_px: float,
-    part: int,
-    width_px: int,
-    height_px: int,
-) -> tuple[Floats, Floats, float, Floats, float]:
-    """Fit of `fit_part` and its `evidence` in an image of this size, zeros and NaN where there is no fit."""
-    circle, covariance, scatter = fit_part(expected, prior_std, ellipticity, events, reference_us, gate_px, part)
-    if math.isnan(circle[0]):
-        return circle, covariance, scatter, np.zeros(8), np.nan
-    found, behind_px = evidence(circle, ellipticity, events, reference_us, width_px, height_px)
-    return circle, covariance, scatter, found, behind_px
 
 
 @njit(cache=True, nogil=True)

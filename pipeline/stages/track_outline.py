@@ -214,24 +214,19 @@ def measure(
     part : int
         Part of the outline that is fitted, see `kernels.moving_circle.near_outline`.
     """
-    ring, covariance, scatter, found, behind_px = kernels.fit_outline(
-        expected,
-        prior_std,
-        oval_of(camera, expected[0], expected[1]),
-        events.columns,
-        end_us,
-        gate_px,
-        part,
-        camera.width_px,
-        camera.height_px,
-    )
-    return None if math.isnan(ring[0]) else _sighting(ring, covariance, scatter, found, behind_px, part)
+    columns, oval = events.columns, oval_of(camera, expected[0], expected[1])
+    ring, covariance, scatter_px = kernels.fit_outline(expected, prior_std, oval, columns, end_us, gate_px, part)
+    if math.isnan(ring[0]):
+        return None
+    evidence = kernels.evidence(ring, oval, columns, end_us, camera.width_px, camera.height_px)
+    return _sighting(ring, covariance, scatter_px, evidence, part)
 
 
 def _sighting(
-    ring: Floats, covariance: Floats, scatter_px: float, found: Floats, behind_px: float, part: int
+    ring: Floats, covariance: Floats, scatter_px: float, evidence: tuple[Floats, float], part: int
 ) -> Sighting:
-    """The outline of a fit, with its support as `kernels.outline.support` gives it."""
+    """The outline of a fit, with its evidence as `kernels.outline.evidence` gives it."""
+    found, behind_px = evidence
     events_on, ahead_on, behind_on, ahead, behind, visible, outside, _ = found.tolist()
     return Sighting(
         ring,
@@ -282,15 +277,15 @@ def sight_arcs(
     columns, size = events.columns, (camera.width_px, camera.height_px)
     oval = oval_of(camera, ring[0], ring[1])
     for part in (OF_DARK, OF_BRIGHT):
-        first, _, _ = kernels.fit_part(ring, FREE, oval, recent.columns, end_us, 1.5 * gate, part)
+        first, _, _ = kernels.fit_outline(ring, FREE, oval, recent.columns, end_us, 1.5 * gate, part)
         if math.isnan(first[0]):
             continue
         first_oval = oval_of(camera, first[0], first[1])
-        fitted, covariance, scatter_px = kernels.fit_part(first, FREE, first_oval, columns, end_us, 3.0, part)
+        fitted, covariance, scatter_px = kernels.fit_outline(first, FREE, first_oval, columns, end_us, 3.0, part)
         if math.isnan(fitted[0]) or not _is_fixed_by_arcs(fitted, covariance):
             continue  # before its support is counted, which takes as long as the fit
-        found, behind_px = kernels.evidence(fitted, first_oval, columns, end_us, *size)
-        sighting = _sighting(fitted, covariance, scatter_px, found, behind_px, part)
+        evidence = kernels.evidence(fitted, first_oval, columns, end_us, *size)
+        sighting = _sighting(fitted, covariance, scatter_px, evidence, part)
         if sighting.in_arcs:
             return sighting
     return None

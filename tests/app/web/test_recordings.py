@@ -12,8 +12,10 @@ from typing import Any
 import httpx
 import pytest
 
+from spinscope.app.web.app_state import AppState
 from spinscope.app.web.recording_folder import RecordingFolders
 from spinscope.pipeline.errors import RecordingError
+from spinscope.pipeline.session import Choices
 from spinscope.pipeline.simulated_recordings import simulate_to_file
 
 from .browser_tab import Tab, bare_tab, needs_browser
@@ -65,6 +67,14 @@ def test_several_folders_are_listed_by_their_names(folder: Path, tmp_path: Path)
             folders.path(name)
     with pytest.raises(RecordingError):
         folders.listing("..")
+
+
+def test_a_folder_above_is_listed_by_its_own_name(folder: Path, tmp_path: Path) -> None:
+    above = folder / "more/.."
+    state = AppState(above / "spinner.h5", Choices(), folders=[above, tmp_path])
+    assert state.folders.listing().folders == [folder.name, tmp_path.name]
+    assert state.folders.name_of(state.path) == f"{folder.name}/spinner.h5"
+    state.close()
 
 
 @pytest.mark.parametrize("name", ["..", "../x", "more/../..", "/", "/etc", "a\\b", "none", "\0"])

@@ -20,10 +20,10 @@ class ListedPackets(EventCamera):
 
     name, serial, width_px, height_px = "toy", "1", 64, 48
 
-    def __init__(self, given: list[CameraPacket | CameraError], can_wait: bool = False) -> None:
+    def __init__(self, given: list[CameraPacket | CameraError]) -> None:
         self.bias_limits, self.biases = {"diff_on": (-10, 10)}, {"diff_on": 0}
         self.given, self.closed, self.applied = iter(given), 0, []
-        self.can_wait = can_wait
+        self.can_wait = False
 
     def read(self) -> CameraPacket | None:
         one = next(self.given, None)
@@ -51,6 +51,7 @@ def packets(events: EventBatch, *cuts_us: int) -> list[CameraPacket]:
 
 
 def ticks_of(camera: EventCamera, **options: object) -> tuple[list[ArrivedTick], EventStream]:
+    camera.can_wait = True  # however late the ticks are taken
     stream = EventStream(camera, TICK_US, **options)  # type: ignore[arg-type]
     stream.start()
     return list(stream.ticks()), stream

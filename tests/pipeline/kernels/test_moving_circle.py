@@ -191,16 +191,15 @@ def test_a_moving_ring_is_measured_from_a_place_alone(bright: bool) -> None:
     events = read_only(*(column[recent] for column in columns), (on if bright else ~on)[recent])
     start, gate = outline.find_moving_circle(60.8, 49.0, 15.5, events, 0, 1.5e-3, 12_000.0, True)
     assert np.hypot(*(start - ring)[2:4]) < 1500
-    fitted, covariance, scatter, found, behind_px = outline.fit_outline(
-        start, FREE, ROUND, events, 0, 1.5 * gate, HALF_AHEAD, 1280, 720
-    )
+    fitted, covariance, scatter = outline.fit_outline(start, FREE, ROUND, events, 0, 1.5 * gate, HALF_AHEAD)
+    found, behind_px = outline.evidence(fitted, ROUND, events, 0, 1280, 720)
     assert np.allclose(fitted[:2], ring[:2], atol=0.3) and abs(fitted[4] - 16) < 0.2
     assert np.hypot(*(fitted - ring)[2:4]) < 300 and scatter < 0.6 and np.all(np.diag(covariance) > 0)
     assert min(found[3], found[4]) > 0.8 and np.allclose(found[1:3], [bright, not bright], atol=0.03)
     assert abs(behind_px) < 0.2, "the outline is as thin as it is round"
     nothing = tuple(column[:5] for column in events)
     assert np.isnan(outline.find_moving_circle(60.8, 49.0, 15.5, nothing, 0, 1.5e-3, 12_000.0, True)[0][0])
-    assert np.isnan(outline.fit_outline(start, FREE, ROUND, nothing, 0, 3.0, HALF_AHEAD, 1280, 720)[0][0])
+    assert np.isnan(outline.fit_outline(start, FREE, ROUND, nothing, 0, 3.0, HALF_AHEAD)[0][0])
 
 
 def test_polarity_does_not_matter_to_an_unsigned_vote() -> None:
