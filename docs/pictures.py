@@ -87,7 +87,7 @@ def take(name: str, browser: Any) -> None:
     with served(wanted.command) as address:
         page = browser.new_page(viewport={"width": wanted.width_px, "height": wanted.height_px}, locale="en")
         page.set_default_timeout(PATIENCE_MS)
-        page.goto(f"{address}#{wanted.place}")
+        page.goto(f"{address.partition('#')[0]}#{wanted.place}")
         wanted.prepare(page)
         page.wait_for_timeout(AT_REST_MS)
         page.screenshot(path=str(DOCS / f"{name}.png"))
