@@ -7,7 +7,6 @@ const POLL_MS = 15;
 const PATIENCE_MS = 120_000; // without a graphics card a picture may take seconds
 const PICTURE_MS = 10_000;
 const LAYOUT_MS = 30_000;
-const TAKEN_MS = 2000; // the longest until a new layout is shown: one that the viewer does not take is not waited for
 const ANSWER_MS = 3000;
 const JPEG_QUALITY = 0.92;
 const APPLICATION = "spinscope";
@@ -124,21 +123,18 @@ export class Viewer extends EventTarget {
   // Takes a layout; one for a recording that is shown is there at the end, not some frames later over another one.
   layout(/** @type {Uint8Array} */ bytes) {
     return this.#next(async () => {
-      // Of a layout of the viewer's own making the root has numbers that JSON cannot tell.
-      const told = (/** @type {string} */ _, /** @type {any} */ value) =>
-        typeof value === "bigint" ? String(value) : value;
-      const root = async () => {
-        const { blueprint } = await this.#viewer.get_blueprint();
-        return JSON.stringify(blueprint["/viewport"]?.ViewportBlueprint, told);
-      };
+      const { front } = this; // it was asked for before somebody turned to this tab
+      const root = async () =>
+        (await this.#viewer.get_blueprint()).blueprint["/viewport"]?.ViewportBlueprint.root_container;
       const before = this.#shown === null ? null : await root();
       this.#channel.send_rrd(bytes);
-      const until = performance.now() + TAKEN_MS;
-      while (before !== null && await root() === before && performance.now() < until) {
+      if (this.#shown === null) return;
+      const until = performance.now() + LAYOUT_MS;
+      while (await root() === before) {
+        if (performance.now() > until) throw new Error("the viewer does not take the layout");
         await pause(POLL_MS);
       }
-      // It was asked for before somebody turned to another tab.
-      if (before !== null && this.front !== null) await this.#bring(this.front);
+      if (front !== null) await this.#bring(front);
     });
   }
 
