@@ -101,7 +101,8 @@ def step(
     if basis is None or contrast.changes:
         reason = contrast.estimate.reason or "the logo is not seen"
         # The flight is of two flights as well, or tells to a third what a logo in view would tell to a hundredth.
-        against = "trajectory" if contrast.changes or contrast.may_be_outline else None
+        in_doubt = contrast.changes or contrast.may_be_outline or contrast.is_off_rhythm
+        against = "trajectory" if in_doubt else None
         return CombinedResult(SpinEstimate.refused(METHOD, reason, against=against), witnesses)
     spins_rps = np.stack([candidate.spins_rps for candidate in candidates])
     bend = by_flight(trajectory, spins_rps)
@@ -151,6 +152,10 @@ def _candidates(
     gyro_std_deg = context["trajectory.gyro_std_deg"]
     if contrast.turns_seen:
         return "pattern", pattern_candidates(contrast)
+    # In none of 20 flights whose rhythm contradicts a sharp pattern is it right (own seeds of weak sensors and of logos
+    # near the pole): mostly it is twice the spin.
+    if contrast.is_off_rhythm:
+        return None, []
     if candidates := rhythm_candidates(rate, trajectory, gyro_std_deg):
         return "rhythm", candidates
     if contrast.may_be_outline:

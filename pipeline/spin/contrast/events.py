@@ -238,6 +238,9 @@ class ContrastResult(ReadOnlyArrays):
     may_be_outline : bool
         Whether the sharp pattern may be what a slow sensor reports of the ball's outline: then the logo may be in view
         or not, and its events tell neither its motion nor when it was seen.
+    is_off_rhythm : bool
+        Whether the pattern is sharp and comes back, but not with its spin: then neither the pattern nor its rhythm tells
+        the spin.
     changes : bool
         Whether the spin changes within the flight: a contact was missed, and no estimate from all of it holds.
     full : bool
@@ -261,6 +264,7 @@ class ContrastResult(ReadOnlyArrays):
     contrast: float
     turns_seen: bool
     may_be_outline: bool
+    is_off_rhythm: bool
     changes: bool
     full: bool
     magnitudes_rps: Floats
@@ -285,6 +289,7 @@ class ContrastResult(ReadOnlyArrays):
             contrast=0.0,
             turns_seen=False,
             may_be_outline=False,
+            is_off_rhythm=False,
             changes=False,
             full=False,
             **ScoreMap.empty()._asdict(),

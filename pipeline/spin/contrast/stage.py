@@ -356,17 +356,26 @@ def sigmas_apart(one: SpinEstimate, other: SpinEstimate) -> float:
     return math.sqrt(max(float(off @ np.linalg.solve(one.covariance_rps2 + other.covariance_rps2, off)), 0.0))
 
 
-def misses_rhythm(rate: RateResult, answer: ContrastEstimate) -> bool:
+def misses_rhythm(rate: RateResult, answer: ContrastEstimate, normal_flow: SpinEstimate) -> bool:
     """Whether the logo's pattern comes back, but by none of its possible magnitudes with this answer's.
 
     A magnitude too slow to come back is not one of them: none of 134 right answers on simulated shots is refused for
     that, but one with half of the true spin about a wrong axis.
+
+    A long logo near the pole of the spin looks alike after half a turn, as do stamps on two sides: it comes back twice
+    a turn. Half of a magnitude is a possible one where the normal flow, which knows nothing of visits, excludes the
+    whole.
     """
     estimate = SpinEstimate(METHOD, answer.spin_rps, answer.covariance_rps2, None)
     magnitude, std = estimate.magnitude_rps, estimate.magnitude_std_rps
     if magnitude is None or std is None or rate.period_sigmas < FEWEST_SIGMAS:
         return False
-    off_rps = np.abs(rate.period_spins_rps[rate.period_log_likelihoods > RHYTHM_EXCLUDED] - magnitude)
+    possible_rps = rate.period_spins_rps[rate.period_log_likelihoods > RHYTHM_EXCLUDED]
+    flow_rps, flow_std_rps = normal_flow.magnitude_rps, normal_flow.magnitude_std_rps
+    if flow_rps is not None and flow_std_rps is not None:
+        excluded = possible_rps > flow_rps + RHYTHM_SIGMAS * flow_std_rps
+        possible_rps = np.concatenate([possible_rps, 0.5 * possible_rps[excluded]])
+    off_rps = np.abs(possible_rps - magnitude)
     return bool(np.all(off_rps > RHYTHM_SIGMAS * math.hypot(std, RHYTHM_SHARE * magnitude, SIGHT_RPS)))
 
 
@@ -397,15 +406,17 @@ def _judged(
     count: int,
     rate: RateResult,
     normal_flow: SpinEstimate,
-) -> tuple[SpinEstimate, bool, bool]:
-    """Estimate of an answer from `count` events or its refusal, whether a pattern is seen to turn, or may be outline.
+) -> tuple[SpinEstimate, bool, bool, bool]:
+    """Estimate of an answer from `count` events or its refusal, and whether a pattern is seen to turn.
+
+    Where it is sharp and not seen to turn, also whether it may be outline, and whether its rhythm contradicts it.
 
     An answer is settled where the logo says so much that neither its rhythm nor its normal flow can put it in doubt.
     """
     assert answer.spin_rps is not None and answer.covariance_rps2 is not None
     settled = is_settled(parameters, state)
     may_be_outline = answer.turns < RETURNED_TURNS and _are_one_polarity(state)
-    off_rhythm = not settled and misses_rhythm(rate, answer)
+    off_rhythm = not settled and misses_rhythm(rate, answer, normal_flow)
     is_sharp = answer.contrast >= parameters.min_gain
     turns_seen = is_sharp and not may_be_outline and not off_rhythm
     estimate = SpinEstimate(METHOD, answer.spin_rps.copy(), answer.covariance_rps2.copy(), None, count)
@@ -425,7 +436,7 @@ def _judged(
         )
     if reason is not None:
         estimate = SpinEstimate.refused(METHOD, reason, count, against=against)
-    return estimate, turns_seen, is_sharp and may_be_outline
+    return estimate, turns_seen, is_sharp and may_be_outline, is_sharp and off_rhythm
 
 
 def _result(
@@ -434,7 +445,7 @@ def _result(
     answer = state.answer
     if answer is None or answer.spin_rps is None or answer.covariance_rps2 is None:
         return ContrastResult.nothing(SpinEstimate.refused(METHOD, state.reason or "no estimate yet", count))
-    estimate, turns_seen, may_be_outline = _judged(parameters, state, answer, count, rate, flow)
+    estimate, turns_seen, may_be_outline, is_off_rhythm = _judged(parameters, state, answer, count, rate, flow)
     middle_us, half_us = answer.reference_s * 1e6, 0.5e6 * answer.span_s
     return ContrastResult(
         estimate=estimate.up_to(state.context["spin.max_spin_rps"], FLOW_METHOD),
@@ -450,6 +461,7 @@ def _result(
         contrast=answer.contrast,
         turns_seen=turns_seen,
         may_be_outline=may_be_outline,
+        is_off_rhythm=is_off_rhythm,
         changes=state.changes,
         full=full,
         **{name: column.copy() for name, column in state.score_map._asdict().items()},

@@ -18,6 +18,18 @@ METHODS = [
         "tests/pipeline/spin/test_combined.py",
     ),
     Mutant(
+        "pipeline/spin/combined/stage.py",
+        "if contrast.is_off_rhythm:\n        return None, []",
+        "if False:\n        return None, []",
+        "tests/pipeline/spin/test_combined.py",
+    ),
+    Mutant(
+        "pipeline/spin/contrast/stage.py",
+        "np.concatenate([possible_rps, 0.5 * possible_rps[excluded]])",
+        "np.concatenate([possible_rps, 0.5 * possible_rps])",
+        "tests/pipeline/spin/test_contrast_trust.py",
+    ),
+    Mutant(
         "pipeline/spin/triplet.py",
         "np.cov(spins.T) / len(spins)",
         "np.cov(spins.T)",

@@ -258,6 +258,16 @@ def test_the_flight_does_not_answer_alone_where_the_logo_may_be_in_view() -> Non
     assert answered(unclear, told, rhythm([60.2])).basis == "rhythm"
 
 
+def test_nothing_answers_where_the_rhythm_contradicts_a_sharp_pattern() -> None:
+    """Neither the rhythm nor the flight, which would tell to a third what a logo in view leaves open."""
+    unclear = replace(ContrastResult.nothing(REFUSED), is_off_rhythm=True)
+    of_flight = {"trajectory": SpinEstimate("trajectory", TOP, covariance(TOP, 5.0, 15.0), None)}
+    refused = answered(unclear, flight(TOP), rhythm([60.2])).estimate
+    assert refused.reason == REFUSED.reason
+    assert trusted_method(of_flight | {"contrast": REFUSED, "combined": refused}) is None
+    assert answered(replace(unclear, is_off_rhythm=False), flight(TOP), rhythm([60.2])).basis == "rhythm"
+
+
 class _BentFlight(_Flight):
     """Flight that tells the magnitude to a quarter as well."""
 

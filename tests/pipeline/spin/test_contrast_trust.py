@@ -92,7 +92,36 @@ def rhythm(*spins_rps: float, sigmas: float = 9.0) -> RateResult:
     ],
 )
 def test_an_answer_has_one_of_the_rhythms_magnitudes(told: RateResult, misses: bool) -> None:
-    assert stage.misses_rhythm(told, SURE) == misses
+    assert stage.misses_rhythm(told, SURE, SpinEstimate.refused("normal_flow", "no flow")) == misses
+
+
+@pytest.mark.parametrize(
+    ("rhythm_rps", "flow_rps", "flow_std_rps", "misses"),
+    [
+        (40.0, 17.0, 7.5, False),  # three times that below the rhythm
+        (40.0, 17.0, 7.8, True),
+        (44.2, 17.0, 2.0, False),  # half of it 2.1 rps off: three times 0.76
+        (44.8, 17.0, 2.0, True),
+        (60.0, 17.0, 2.0, True),  # a third of it is none
+    ],
+)
+def test_a_logo_comes_back_twice_a_turn_where_the_normal_flow_says_so(
+    rhythm_rps: float, flow_rps: float, flow_std_rps: float, misses: bool
+) -> None:
+    flow = SpinEstimate("normal_flow", flow_rps * SPIN / 20.0, flow_std_rps**2 * np.eye(3), None)
+    assert stage.misses_rhythm(rhythm(rhythm_rps), SURE, flow) == misses
+
+
+def test_a_rhythm_that_contradicts_a_sharp_pattern_is_said_of_it() -> None:
+    """So that neither of the two answers; a pattern that is not sharp is not contradicted."""
+    ball = dotted_ball(SPIN, duration_s=0.1, events=600)
+    state = stage.ContrastState({}, parts=[(0, ball)], is_bright=[True])  # type: ignore[arg-type]
+    answer, flow = replace(SURE, span_s=0.1), SpinEstimate.refused("normal_flow", "no flow")
+    estimate, *said = stage._judged(PARAMETERS, state, answer, 600, rhythm(33.0), flow)
+    assert said == [False, False, True] and "comes back with 33.0 rps, not with (20, 0, 0)" in (estimate.reason or "")
+    assert stage._judged(PARAMETERS, state, answer, 600, rhythm(20.0), flow)[1:] == (True, False, False)
+    dull = replace(answer, contrast=0.2)
+    assert stage._judged(PARAMETERS, state, dull, 600, rhythm(33.0), flow)[1:] == (False, False, False)
 
 
 @pytest.mark.parametrize(
@@ -121,10 +150,10 @@ def test_what_may_be_outline_is_trusted_neither_to_the_pattern_nor_to_its_flow(e
     state = stage.ContrastState({}, parts=[(0, replace(ball, polarity=polarity))], is_bright=[True])  # type: ignore[arg-type]
     flow = SpinEstimate("normal_flow", SPIN, np.eye(3), None)
     answer = replace(SURE, span_s=0.4 / float(np.linalg.norm(SPIN)))
-    estimate, turns_seen, may_be_outline = stage._judged(PARAMETERS, state, answer, 600, rhythm(sigmas=0.0), flow)
+    estimate, *said = stage._judged(PARAMETERS, state, answer, 600, rhythm(sigmas=0.0), flow)
     if events == "on":
         assert (estimate.reason, estimate.against) == (stage.OUTLINE, "normal_flow")
         assert trusted_method({"normal_flow": flow, "contrast": estimate}) is None
     else:
         assert estimate.status == "ok"
-    assert (turns_seen, may_be_outline) == ((False, True) if events == "on" else (True, False))
+    assert said == ([False, True, False] if events == "on" else [True, False, False])
