@@ -319,7 +319,7 @@ def test_ctrl_c_and_kill_end_all_processes_and_the_rows_are_kept(folder: Path, s
             running.kill()
         else:
             os.killpg(running.pid, signal.SIGINT)
-        _, said = running.communicate(timeout=60)
+        _, said = running.communicate(timeout=240)
     assert running.returncode == (-signal.SIGKILL if is_killed else 130)
     assert is_killed or "what is done is kept" in said
     assert "Traceback" not in said

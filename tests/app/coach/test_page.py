@@ -223,7 +223,7 @@ def test_requests_from_elsewhere_and_nonsense_are_refused(address: str) -> None:
     assert len(bounced) == 1 and [int(one) for one in landings] == bounced and abs(landings[str(bounced[0])][0]) < 1.37
     assert httpx.get(f"{address}api/coach/sample/shots.parquet").content.startswith(b"PAR1")
     assert httpx.get(f"{address}api/coach/sample/shots.csv").text.startswith("id,recorded,player")
-    assert httpx.get(f"{address}api/coach/sample/report.pdf?language=de", timeout=60).content.startswith(b"%PDF")
+    assert httpx.get(f"{address}api/coach/sample/report.pdf?language=de", timeout=240).content.startswith(b"%PDF")
     assert httpx.get(f"{address}api/coach/sample/shots.txt").status_code == 422
     pictures = httpx.get(f"{address}api/coach/sample/pictures/1")
     assert pictures.content.startswith(b"\x89PNG")

@@ -183,7 +183,7 @@ def test_the_analysis_waits_while_a_shot_is_played_but_not_for_ever(
 
     monkeypatch.setattr(waiting, "run_once", work)
     waiting.start()
-    assert worked.wait(30.0)
+    assert worked.wait(240.0)
     waiting.close()
     assert calls[: calls.index("work")] == ["asked"] * asked
 

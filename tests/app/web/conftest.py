@@ -35,7 +35,7 @@ class Served:
 
     def open(self, recording: str | None = None) -> Client:
         """A new page that listens; closed with the server at the latest."""
-        http = httpx.Client(timeout=60.0, **PLAIN)
+        http = httpx.Client(timeout=240.0, **PLAIN)
         answer = http.post(f"{self.address}api/sessions", json={"recording": recording})
         assert answer.status_code == 200, answer.text
         client = Client(self.address, answer.json(), http)

@@ -90,10 +90,10 @@ def test_the_address_is_one_line_and_ctrl_c_leaves_nothing_running(samples: Path
     bare, _, token = address.partition("?token=")
     port = bare.rpartition(":")[2].strip("/")
     assert bare == f"http://127.0.0.1:{port}/" and len(token) >= 32
-    assert httpx.get(address, timeout=30).status_code == 200
-    assert httpx.get(bare, timeout=30).status_code == 401
+    assert httpx.get(address, timeout=240).status_code == 200
+    assert httpx.get(bare, timeout=240).status_code == 401
     process.send_signal(signal.SIGINT)
-    rest, errors = process.communicate(timeout=60)
+    rest, errors = process.communicate(timeout=240)
     assert process.returncode == 0 and rest == "" and "Traceback" not in errors
     assert f"ssh -L {port}:127.0.0.1:{port}" in errors
     with pytest.raises(httpx.ConnectError):
@@ -112,10 +112,10 @@ def test_view_says_where_it_is_and_how_to_get_there_without_a_browser(samples: P
     )
     assert found, line
     headers = {"authorization": f"token {found[3]}"}
-    opening = httpx.post(f"{found[1]}api/sessions", json={}, headers=headers, timeout=30).json()
+    opening = httpx.post(f"{found[1]}api/sessions", json={}, headers=headers, timeout=240).json()
     assert opening["tools"] is False and opening["tab"] == "Coach"
     process.send_signal(signal.SIGINT)
-    written, errors = process.communicate(timeout=60)
+    written, errors = process.communicate(timeout=240)
     assert process.returncode == 0 and written == "" and "Traceback" not in errors
 
 

@@ -85,10 +85,10 @@ def test_nothing_outside_of_the_folder_is_listed_or_opened(own: Served, name: st
 
 
 def test_a_summary_tells_of_events_and_shots_or_what_is_wrong(own: Served) -> None:
-    good = httpx.get(f"{own.address}api/summary", params={"name": "spinner.h5"}, timeout=120).json()
+    good = httpx.get(f"{own.address}api/summary", params={"name": "spinner.h5"}, timeout=240).json()
     assert good["events"] > 0 and good["duration_us"] > 0 and good["error"] is None
     assert good["picture"].startswith("data:image/png;base64,") and good["shots"] is not None and good["spin"]
-    bad = httpx.get(f"{own.address}api/summary", params={"name": "damaged.h5"}, timeout=120).json()
+    bad = httpx.get(f"{own.address}api/summary", params={"name": "damaged.h5"}, timeout=240).json()
     assert "damaged.h5" in bad["error"] and bad["events"] is None
 
 
