@@ -152,8 +152,7 @@ def _candidates(
     gyro_std_deg = context["trajectory.gyro_std_deg"]
     if contrast.turns_seen:
         return "pattern", pattern_candidates(contrast)
-    # In none of 20 flights whose rhythm contradicts a sharp pattern is it right (own seeds of weak sensors and of logos
-    # near the pole): mostly it is twice the spin.
+    # In none of 14 flights whose rhythm contradicts a sharp pattern is it right (docs/contrast.md): it is twice the spin.
     if contrast.is_off_rhythm:
         return None, []
     if candidates := rhythm_candidates(rate, trajectory, gyro_std_deg):
