@@ -152,7 +152,7 @@ def _candidates(
     gyro_std_deg = context["trajectory.gyro_std_deg"]
     if contrast.turns_seen:
         return "pattern", pattern_candidates(contrast)
-    # In none of 14 flights whose rhythm contradicts a sharp pattern is it right (docs/contrast.md): it is twice the spin.
+    # Of 17 rhythms that contradict a sharp pattern none is right: they are twice the spin (docs/contrast.md).
     if contrast.is_off_rhythm:
         return None, []
     if candidates := rhythm_candidates(rate, trajectory, gyro_std_deg):

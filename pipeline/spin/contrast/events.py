@@ -239,8 +239,8 @@ class ContrastResult(ReadOnlyArrays):
         Whether the sharp pattern may be what a slow sensor reports of the ball's outline: then the logo may be in view
         or not, and its events tell neither its motion nor when it was seen.
     is_off_rhythm : bool
-        Whether the pattern is sharp and comes back, but not with its spin: then neither the pattern nor its rhythm tells
-        the spin.
+        Whether the pattern is sharp and comes back, but not with its spin: then neither it nor its rhythm tells the
+        spin.
     changes : bool
         Whether the spin changes within the flight: a contact was missed, and no estimate from all of it holds.
     full : bool

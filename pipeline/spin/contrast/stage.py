@@ -356,27 +356,42 @@ def sigmas_apart(one: SpinEstimate, other: SpinEstimate) -> float:
     return math.sqrt(max(float(off @ np.linalg.solve(one.covariance_rps2 + other.covariance_rps2, off)), 0.0))
 
 
-def misses_rhythm(rate: RateResult, answer: ContrastEstimate, normal_flow: SpinEstimate) -> bool:
+def misses_rhythm(rate: RateResult, answer: ContrastEstimate) -> bool:
     """Whether the logo's pattern comes back, but by none of its possible magnitudes with this answer's.
 
     A magnitude too slow to come back is not one of them: none of 134 right answers on simulated shots is refused for
     that, but one with half of the true spin about a wrong axis.
-
-    A long logo near the pole of the spin looks alike after half a turn, as do stamps on two sides: it comes back twice
-    a turn. Half of a magnitude is a possible one where the normal flow, which knows nothing of visits, excludes the
-    whole.
     """
+    return rate.period_sigmas >= FEWEST_SIGMAS and not _is_one_of(_rhythms_rps(rate), answer)
+
+
+def comes_back_twice(rate: RateResult, answer: ContrastEstimate, normal_flow: SpinEstimate) -> bool:
+    """Whether the pattern comes back twice in a turn of this answer's: with a magnitude that the normal flow excludes.
+
+    A long logo near the pole of the spin looks alike after half a turn, as do stamps on two sides. The normal flow does
+    not rest on visits.
+    """
+    flow_rps, flow_std_rps = normal_flow.magnitude_rps, normal_flow.magnitude_std_rps
+    if flow_rps is None or flow_std_rps is None:
+        return False
+    rhythms_rps = _rhythms_rps(rate)
+    return _is_one_of(0.5 * rhythms_rps[rhythms_rps > flow_rps + RHYTHM_SIGMAS * flow_std_rps], answer)
+
+
+def _rhythms_rps(rate: RateResult) -> Floats:
+    """Magnitudes with which the pattern may come back."""
+    rhythms_rps: Floats = rate.period_spins_rps[rate.period_log_likelihoods > RHYTHM_EXCLUDED]
+    return rhythms_rps
+
+
+def _is_one_of(magnitudes_rps: Floats, answer: ContrastEstimate) -> bool:
+    """Whether the answer's magnitude is one of these, or has no error to compare it by."""
     estimate = SpinEstimate(METHOD, answer.spin_rps, answer.covariance_rps2, None)
     magnitude, std = estimate.magnitude_rps, estimate.magnitude_std_rps
-    if magnitude is None or std is None or rate.period_sigmas < FEWEST_SIGMAS:
-        return False
-    possible_rps = rate.period_spins_rps[rate.period_log_likelihoods > RHYTHM_EXCLUDED]
-    flow_rps, flow_std_rps = normal_flow.magnitude_rps, normal_flow.magnitude_std_rps
-    if flow_rps is not None and flow_std_rps is not None:
-        excluded = possible_rps > flow_rps + RHYTHM_SIGMAS * flow_std_rps
-        possible_rps = np.concatenate([possible_rps, 0.5 * possible_rps[excluded]])
-    off_rps = np.abs(possible_rps - magnitude)
-    return bool(np.all(off_rps > RHYTHM_SIGMAS * math.hypot(std, RHYTHM_SHARE * magnitude, SIGHT_RPS)))
+    if magnitude is None or std is None:
+        return True
+    most_rps = RHYTHM_SIGMAS * math.hypot(std, RHYTHM_SHARE * magnitude, SIGHT_RPS)
+    return bool(np.any(np.abs(magnitudes_rps - magnitude) <= most_rps))
 
 
 def _may_be_one_of(parameters: ContrastParameters, answer: ContrastEstimate, normal_flow: SpinEstimate) -> bool:
@@ -416,7 +431,7 @@ def _judged(
     assert answer.spin_rps is not None and answer.covariance_rps2 is not None
     settled = is_settled(parameters, state)
     may_be_outline = answer.turns < RETURNED_TURNS and _are_one_polarity(state)
-    off_rhythm = not settled and misses_rhythm(rate, answer, normal_flow)
+    off_rhythm = not settled and misses_rhythm(rate, answer) and not comes_back_twice(rate, answer, normal_flow)
     is_sharp = answer.contrast >= parameters.min_gain
     turns_seen = is_sharp and not may_be_outline and not off_rhythm
     estimate = SpinEstimate(METHOD, answer.spin_rps.copy(), answer.covariance_rps2.copy(), None, count)

@@ -25,8 +25,8 @@ METHODS = [
     ),
     Mutant(
         "pipeline/spin/contrast/stage.py",
-        "np.concatenate([possible_rps, 0.5 * possible_rps[excluded]])",
-        "np.concatenate([possible_rps, 0.5 * possible_rps])",
+        "0.5 * rhythms_rps[rhythms_rps > flow_rps + RHYTHM_SIGMAS * flow_std_rps]",
+        "0.5 * rhythms_rps",
         "tests/pipeline/spin/test_contrast_trust.py",
     ),
     Mutant(

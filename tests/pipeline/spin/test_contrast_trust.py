@@ -92,24 +92,26 @@ def rhythm(*spins_rps: float, sigmas: float = 9.0) -> RateResult:
     ],
 )
 def test_an_answer_has_one_of_the_rhythms_magnitudes(told: RateResult, misses: bool) -> None:
-    assert stage.misses_rhythm(told, SURE, SpinEstimate.refused("normal_flow", "no flow")) == misses
+    assert stage.misses_rhythm(told, SURE) == misses
 
 
 @pytest.mark.parametrize(
-    ("rhythm_rps", "flow_rps", "flow_std_rps", "misses"),
+    ("rhythm_rps", "flow_rps", "flow_std_rps", "twice"),
     [
-        (40.0, 17.0, 7.5, False),  # three times that below the rhythm
-        (40.0, 17.0, 7.8, True),
-        (44.2, 17.0, 2.0, False),  # half of it 2.1 rps off: three times 0.76
-        (44.8, 17.0, 2.0, True),
-        (60.0, 17.0, 2.0, True),  # a third of it is none
+        (40.0, 17.0, 7.5, True),  # three times that below the rhythm
+        (40.0, 17.0, 7.8, False),
+        (44.2, 17.0, 2.0, True),  # half of it 2.1 rps off: three times 0.76
+        (44.8, 17.0, 2.0, False),
+        (60.0, 17.0, 2.0, False),  # a third of it is none
+        (20.0, 17.0, 0.5, False),
     ],
 )
 def test_a_logo_comes_back_twice_a_turn_where_the_normal_flow_says_so(
-    rhythm_rps: float, flow_rps: float, flow_std_rps: float, misses: bool
+    rhythm_rps: float, flow_rps: float, flow_std_rps: float, twice: bool
 ) -> None:
     flow = SpinEstimate("normal_flow", flow_rps * SPIN / 20.0, flow_std_rps**2 * np.eye(3), None)
-    assert stage.misses_rhythm(rhythm(rhythm_rps), SURE, flow) == misses
+    assert stage.comes_back_twice(rhythm(rhythm_rps), SURE, flow) == twice
+    assert not stage.comes_back_twice(rhythm(40.0), SURE, SpinEstimate.refused("normal_flow", "no flow"))
 
 
 def test_a_rhythm_that_contradicts_a_sharp_pattern_is_said_of_it() -> None:
@@ -118,8 +120,11 @@ def test_a_rhythm_that_contradicts_a_sharp_pattern_is_said_of_it() -> None:
     state = stage.ContrastState({}, parts=[(0, ball)], is_bright=[True])  # type: ignore[arg-type]
     answer, flow = replace(SURE, span_s=0.1), SpinEstimate.refused("normal_flow", "no flow")
     estimate, *said = stage._judged(PARAMETERS, state, answer, 600, rhythm(33.0), flow)
-    assert said == [False, False, True] and "comes back with 33.0 rps, not with (20, 0, 0)" in (estimate.reason or "")
+    assert said == [False, False, True]
+    assert "comes back with 33.0 rps, not with (20, 0, 0)" in (estimate.reason or "")
     assert stage._judged(PARAMETERS, state, answer, 600, rhythm(20.0), flow)[1:] == (True, False, False)
+    flow = SpinEstimate("normal_flow", SPIN, np.eye(3), None)
+    assert stage._judged(PARAMETERS, state, answer, 600, rhythm(40.0), flow)[0].status == "ok"
     dull = replace(answer, contrast=0.2)
     assert stage._judged(PARAMETERS, state, dull, 600, rhythm(33.0), flow)[1:] == (False, False, False)
 
