@@ -340,8 +340,13 @@ TRUSTED_AXIS_DEG, TRUSTED_RPS, TRUSTED_SHARE = 7.0, 3.0, 0.1
 
 
 def is_trusted(estimates: Mapping[str, SpinEstimate]) -> bool:
-    """Whether normal flow is sure of itself and no other method's answer excludes it."""
-    estimate = estimates["normal_flow"]
+    """Whether normal flow is sure of itself, no other method excludes it, and `contrast` has no answer.
+
+    Where that is not trusted, all witnesses together leave another spin open, of whom the normal flow is one.
+    """
+    estimate, contrast = estimates["normal_flow"], estimates.get("contrast")
+    if contrast is not None and contrast.status == "ok":
+        return False
     if any(other.against == "normal_flow" for other in estimates.values()):
         return False
     magnitude, std, axis_std = estimate.magnitude_rps, estimate.magnitude_std_rps, estimate.axis_std_deg

@@ -42,6 +42,13 @@ def test_what_contrast_speaks_against_is_not_trusted() -> None:
     assert trusted_method({"normal_flow": estimate("normal_flow", 1.0), "contrast": against}) is None
 
 
+def test_normal_flow_does_not_answer_where_contrast_does_and_all_witnesses_leave_another_spin_open() -> None:
+    flow = {"normal_flow": estimate("normal_flow", 1.0)}
+    open_ = {"combined": SpinEstimate.refused("combined", "two spins are left open")}
+    assert trusted_method(flow | open_ | {"contrast": estimate("contrast", 8.0)}) is None
+    assert trusted_method(flow | open_ | {"contrast": estimate("contrast", None)}) == "normal_flow"
+
+
 def test_methods_that_were_not_run_are_not_missed() -> None:
     assert trusted_method({"normal_flow": estimate("normal_flow", 1.0)}) == "normal_flow"
     assert trusted_method({"triplet": estimate("triplet", 0.1)}) is None

@@ -71,6 +71,12 @@ METHODS = [
         "any(other.against for other in estimates.values())",
         "tests/pipeline/test_trusted_method.py",
     ),
+    Mutant(
+        "pipeline/spin/normal_flow.py",
+        'if contrast is not None and contrast.status == "ok":',
+        'if contrast is not None and contrast.status == "refused":',
+        "tests/pipeline/test_trusted_method.py",
+    ),
 ]
 
 CONTRAST = [
