@@ -328,7 +328,7 @@ def test_ctrl_c_and_kill_end_all_processes_and_the_rows_are_kept(folder: Path, s
 
 
 def _until(is_so: Callable[[], bool]) -> None:
-    for _ in range(1200):
+    for _ in range(6000):
         if is_so():
             return
         time.sleep(0.1)

@@ -20,7 +20,7 @@ from spinscope.pipeline.session import Choices
 
 from .browser_tab import CHROMIUM, FLAGS, SIZE, Tab, bare_tab
 
-PATIENCE_S = 120.0  # the first run on a machine compiles the kernels
+PATIENCE_S = 300.0  # the first run on a machine compiles the kernels
 PLAIN: dict[str, Any] = {"verify": False}  # reading the certificates takes a client longer than a test's requests
 
 
