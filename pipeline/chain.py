@@ -16,11 +16,12 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import islice
 from typing import Any
 
 from .camera import Camera
-from .column_cache import CACHE_BYTES, MAX_COLUMNS, Column, ColumnCache
+from .column_cache import CACHE_BYTES, MAX_COLUMNS, Column, ColumnCache, StageKey
 from .errors import ParameterError
 from .event_source import EventSource
 from .registry import STAGES, Parameters, default_stages, needed_stages
@@ -76,6 +77,7 @@ class Chain:
         self.stages = default_stages(rivals)
         self.seconds = dict.fromkeys(STAGES.names, 0.0)
         self._cache = ColumnCache(budget_bytes, max_columns)
+        self._key = lru_cache(max_columns)(StageKey)  # equal keys are one object: nothing is compared with its inputs
         self._clock = clock
 
     def tick_count(self, parameters: Parameters) -> int:
@@ -234,7 +236,7 @@ class Chain:
         for stage in STAGES:
             read = tuple(parameters.value(name) for name in stage.reads)
             inputs = tuple(keys["track" if name == "ball" else name] for name in stage.inputs)
-            keys[stage.name] = (stage.name, parameters.group(stage.group), read, inputs)
+            keys[stage.name] = self._key(stage.name, parameters.group(stage.group), read, inputs)
         del keys["packet"]
         return keys
 

@@ -35,7 +35,7 @@ def derotated_normals(normals: Floats, t_us: Integers, common_us: int, spin_rad_
     return derotated
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def fit_moving_line(u: Floats, v: Floats, t_s: Floats, width_rad: float) -> tuple[float, float, float, float, float]:
     """Fit a line (nu, nv) . (u, v) = c + drift t to points, robustly.
 
@@ -53,15 +53,16 @@ def fit_moving_line(u: Floats, v: Floats, t_s: Floats, width_rad: float) -> tupl
         Squared spread across the line over that along it; NO_LINE where there is no line.
     """
     nu, nv, c, drift, variance, sharpness = 0.0, 0.0, 0.0, 0.0, 0.0, NO_LINE
+    weights = np.ones(t_s.size)
     for round_ in range(ROUNDS):
+        if round_ > 0:  # in a loop of its own without a branch: several at once
+            for i in range(t_s.size):
+                off = (nu * u[i] + nv * v[i] - drift * t_s[i] - c) / width_rad
+                within = max(1.0 - off * off, 0.0)
+                weights[i] = within * within
         w, wu, wv, wt, uu, uv, vv, ut, vt, tt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(t_s.size):
-            weight = 1.0
-            if round_ > 0:
-                off = (nu * u[i] + nv * v[i] - drift * t_s[i] - c) / width_rad
-                if abs(off) >= 1.0:
-                    continue
-                weight = (1.0 - off * off) ** 2
+            weight = weights[i]
             a, b, d = weight * u[i], weight * v[i], weight * t_s[i]
             w, wu, wv, wt = w + weight, wu + a, wv + b, wt + d
             uu, uv, vv = uu + a * u[i], uv + a * v[i], vv + b * v[i]
@@ -91,23 +92,29 @@ def _gather(
 ) -> int:
     """Write (u, v, t in s) of event k and its neighbours into `near` (3, NEIGHBOURS); return how many there are.
 
-    The rows of `frame` (3, 3) are e of event k and two directions that span the tangent plane. Half the neighbours at
-    most come from before k and the rest from after, nearest in time first.
+    `turned` (3, n) are the events' normals. The rows of `frame` (3, 3) are that of event k and two directions that span
+    the tangent plane. Half the neighbours at most come from before k and the rest from after, nearest in time first.
     """
     size = 0
-    for direction in range(2):
-        step, room = (1, near.shape[1]) if direction else (-1, near.shape[1] // 2)
-        j = k + direction
-        while 0 <= j < t_us.size and size < room and abs(t_us[j] - t_us[k]) <= reach_us:
-            dx = turned[j, 0] - frame[0, 0]
-            dy = turned[j, 1] - frame[0, 1]
-            dz = turned[j, 2] - frame[0, 2]
-            if dx * dx + dy * dy + dz * dz <= reach_rad * reach_rad:
-                near[0, size] = frame[1, 0] * dx + frame[1, 1] * dy + frame[1, 2] * dz
-                near[1, size] = frame[2, 0] * dx + frame[2, 1] * dy + frame[2, 2] * dz
-                near[2, size] = (t_us[j] - t_us[k]) * 1e-6
-                size += 1
-            j += step
+    xs, ys, zs = turned[0], turned[1], turned[2]
+    us, vs, ts = near[0], near[1], near[2]
+    ex, ey, ez = frame[0, 0], frame[0, 1], frame[0, 2]
+    ux, uy, uz = frame[1, 0], frame[1, 1], frame[1, 2]
+    vx, vy, vz = frame[2, 0], frame[2, 1], frame[2, 2]
+    for after in range(2):
+        room = us.size if after else us.size // 2
+        for step in range(t_us.size - k - 1 if after else k + 1):
+            j = np.uint64(k + 1 + step) if after else np.uint64(k - step)
+            dt_us = t_us[j] - t_us[k]
+            if abs(dt_us) > reach_us or size >= room:
+                break
+            dx, dy, dz = xs[j] - ex, ys[j] - ey, zs[j] - ez
+            # Written in any case, kept where it is near: whether it is cannot be foreseen, a branch would cost more.
+            at = np.uint64(size)
+            us[at] = ux * dx + uy * dy + uz * dz
+            vs[at] = vx * dx + vy * dy + vz * dz
+            ts[at] = dt_us * 1e-6
+            size += dx * dx + dy * dy + dz * dz <= reach_rad * reach_rad
     return size
 
 
@@ -154,16 +161,16 @@ def derotated_constraints(
     speeds, variances, sizes = np.empty(n), np.empty(n), np.empty(n, np.int64)
     near, frame = np.empty((3, NEIGHBOURS)), np.empty((3, 3))
     count = 0
-    members, own, own_us = np.empty(n, np.int64), np.empty((n, 3)), np.empty(n, np.int64)
+    members, own, own_us = np.empty(n, np.int64), np.empty((3, n)), np.empty(n, np.int64)
     for polarity in range(2):
         m = 0
         for i in range(n):
             if on[i] == (polarity == 1):
                 members[m], own_us[m] = i, t_us[i]
-                own[m, 0], own[m, 1], own[m, 2] = turned[i, 0], turned[i, 1], turned[i, 2]
+                own[0, m], own[1, m], own[2, m] = turned[i, 0], turned[i, 1], turned[i, 2]
                 m += 1
         for k in range(stride // 2, m, stride):
-            ex, ey, ez = own[k, 0], own[k, 1], own[k, 2]
+            ex, ey, ez = own[0, k], own[1, k], own[2, k]
             # Two directions that span the tangent plane (Duff et al., JCGT 2017).
             sign = 1.0 if ez >= 0.0 else -1.0
             p = -1.0 / (sign + ez)
@@ -171,7 +178,7 @@ def derotated_constraints(
             frame[0, 0], frame[0, 1], frame[0, 2] = ex, ey, ez
             frame[1, 0], frame[1, 1], frame[1, 2] = 1.0 + sign * ex * ex * p, sign * q, -sign * ex
             frame[2, 0], frame[2, 1], frame[2, 2] = q, sign + ey * ey * p, -ey
-            size = _gather(near, own[:m], own_us[:m], k, frame, reach_rad, reach_us)
+            size = _gather(near, own, own_us[:m], k, frame, reach_rad, reach_us)
             if size < FEWEST:
                 continue
             nu, nv, drift, variance, sharpness = fit_moving_line(
@@ -244,3 +251,48 @@ def position_response(normals: Floats, sights: Floats, rows: Floats, spin_rad_s:
             change += line[2] * (bent[2] - (wx * off[1] - wy * off[0]))
             response[i, which] = change / radius_px
     return response
+
+
+@numba.njit(cache=True, nogil=True)
+def correlated_covariance(
+    gain: Floats, residuals: Floats, radians: Floats, place: Floats, bias: Floats, place_std_px: Floats
+) -> Floats:
+    """Covariance (3, 3) of a spin by what many of its constraints have in common.
+
+    Parameters
+    ----------
+    gain : (n, 3) float64
+        Change of the spin per change of each constraint's speed.
+    residuals, radians : (n,) float64
+        Each constraint's residual, and how far the ball had turned at its time: those of one radian are off together.
+    place : (n, 3) float64
+        See `position_response`.
+    bias : (n, 3) float64
+        Change of each constraint's speed by three independent errors of one sigma.
+    place_std_px : (3,) float64
+        1 sigma of the ball's x, y and radius.
+    """
+    first = np.floor(np.min(radians))
+    pulls = np.zeros((int(np.max(radians) - first) + 1, 3))
+    seen = np.zeros(pulls.shape[0], np.bool_)
+    moved, bent = np.zeros((3, 3)), np.zeros((3, 3))
+    for i in range(radians.size):
+        block = int(radians[i] - first)
+        seen[block] = True
+        for p in range(3):
+            pulls[block, p] += gain[i, p] * residuals[i]
+            for q in range(3):
+                moved[p, q] += gain[i, p] * place[i, q] * place_std_px[q]
+                bent[p, q] += gain[i, p] * bias[i, q]
+    blocks = 0
+    for block in range(seen.size):
+        blocks += seen[block]
+    more = blocks / max(blocks - 1, 1)
+    covariance = np.zeros((3, 3))
+    for p in range(3):
+        for q in range(3):
+            for block in range(seen.size):
+                covariance[p, q] += more * pulls[block, p] * pulls[block, q]
+            for k in range(3):
+                covariance[p, q] += moved[p, k] * moved[q, k] + bent[p, k] * bent[q, k]
+    return covariance

@@ -6,6 +6,7 @@ import math
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from .arrays import Events, Flags, Floats, Integers
 
@@ -162,22 +163,76 @@ def _spread(cells: Floats, x: float, y: float) -> None:
     cells[row + 1, column + 1] += right * down
 
 
+@numba.njit(cache=True, nogil=True)
+def deviations(pattern: Floats) -> Floats:
+    """Counts (n, c) of n bins less the mean pattern with as many events in each."""
+    n, places = pattern.shape
+    totals, whole = np.zeros(places), 0.0
+    for i in range(n):
+        for c in range(places):
+            totals[c] += pattern[i, c]
+    for c in range(places):
+        whole += totals[c]
+    varying = np.empty((n, places))
+    for i in range(n):
+        events = 0.0
+        for c in range(places):
+            events += pattern[i, c]
+        share = events / max(whole, 1.0)
+        for c in range(places):
+            varying[i, c] = pattern[i, c] - share * totals[c]
+    return varying
+
+
 def lag_sums(rows: Floats) -> tuple[Floats, Floats, float]:
     """Sums of the products of rows (n, c) by their lag, the most they can be, and the mean square of a product.
 
     Sums (n,) and bounds (n,) by Schwarz's inequality, from the rows that a lag leaves at either end; the mean is over
-    products of rows two or more apart. The sums come by Fourier transform, the squares from sum_ij (r_i . r_j)^2 =
-    |R^T R|^2: no n x n products are made.
+    products of rows two or more apart. The sums come by Fourier transform: no n x n products are made.
     """
     n = rows.shape[0]
-    spectrum = np.fft.rfft(rows, 2 * n, axis=0)
-    sums = np.fft.irfft(np.sum(spectrum.real**2 + spectrum.imag**2, axis=1), 2 * n)[:n]
-    energies = np.sum(rows**2, axis=1)
-    bounds = np.sqrt(np.cumsum(energies)[::-1] * np.cumsum(energies[::-1])[::-1])
-    # einsum, for the matrix product's threads would take longer to start than to compute.
-    squares = float(np.sum(np.einsum("ni,nj->ij", rows, rows) ** 2))
-    near = np.sum(energies**2) + 2.0 * np.sum(np.sum(rows[1:] * rows[:-1], axis=1) ** 2)
-    return sums, bounds, max(squares - float(near), 0.0) / max((n - 1) * (n - 2), 1)
+    spectrum = np.fft.rfft(np.ascontiguousarray(rows.T), 2 * n)
+    sums = np.fft.irfft(_powers(spectrum), 2 * n)[:n]
+    return sums, *_lag_bounds(rows)
+
+
+@numba.njit(cache=True, nogil=True)
+def _powers(spectrum: NDArray[np.complex128]) -> Floats:
+    """Sums (m,) of the squares of spectra (c, m)."""
+    powers = np.zeros(spectrum.shape[1])
+    for c in range(spectrum.shape[0]):
+        for k in range(powers.size):
+            powers[k] += spectrum[c, k].real ** 2 + spectrum[c, k].imag ** 2
+    return powers
+
+
+@numba.njit(cache=True, nogil=True)
+def _lag_bounds(rows: Floats) -> tuple[Floats, float]:
+    """Bounds (n,) and mean square of `lag_sums`, from sum_ij (r_i . r_j)^2 = |R^T R|^2."""
+    n, places = rows.shape
+    energies, products = np.zeros(n), np.zeros((places, places))
+    near = 0.0
+    for i in range(n):
+        after = 0.0
+        for c in range(places):
+            value = rows[i, c]
+            energies[i] += value * value
+            after += value * rows[i + 1, c] if i + 1 < n else 0.0
+            for other in range(places):
+                products[c, other] += value * rows[i, other]
+        near += energies[i] ** 2 + 2.0 * after**2
+    squares = 0.0
+    for c in range(places):
+        for other in range(places):
+            squares += products[c, other] ** 2
+    bounds, early, late = np.empty(n), 0.0, 0.0
+    for i in range(n):
+        early += energies[i]
+        bounds[n - 1 - i] = early
+    for i in range(n):
+        late += energies[n - 1 - i]
+        bounds[n - 1 - i] = np.sqrt(bounds[n - 1 - i] * late)
+    return bounds, max(squares - near, 0.0) / max((n - 1) * (n - 2), 1)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -195,3 +250,38 @@ def over_multiples(sums: Floats, bounds: Floats, periods: Floats) -> Floats:
             totals[2, k] += n - lag
             lag += periods[k]
     return totals
+
+
+@numba.njit(cache=True, nogil=True)
+def highest_peaks(places: Floats, heights: Floats, most: int, apart: float) -> Integers:
+    """Indices of at most so many peaks of a curve (n,), highest first, whose logarithms of place differ by `apart`."""
+    peaks, count = np.empty(most, np.int64), 0
+    while count < most:
+        best = -1
+        for k in range(1, heights.size - 1):
+            if not (heights[k] >= heights[k - 1] and heights[k] > heights[k + 1]):
+                continue
+            if best >= 0 and heights[k] <= heights[best]:
+                continue
+            alone = True
+            for j in range(count):
+                alone = alone and abs(np.log(places[k] / places[peaks[j]])) > apart
+            if alone:
+                best = k
+        if best < 0:
+            break
+        peaks[count] = best
+        count += 1
+    return peaks[:count].copy()
+
+
+@numba.njit(cache=True, nogil=True)
+def highest_near(places: Floats, heights: Floats, centres: Integers, apart: float) -> Integers:
+    """Index (m,) of the highest value (n,) less than `apart` from each centre (m,), in logarithms of place (n,)."""
+    highest = centres.copy()
+    for j in range(centres.size):
+        found = False
+        for k in range(places.size):
+            if abs(np.log(places[k] / places[centres[j]])) < apart and (not found or heights[k] > heights[highest[j]]):
+                highest[j], found = k, True
+    return highest

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..events import ColumnBatch
-from ..kernels.derotated_normal_flow import derotated_constraints, position_response
+from ..kernels.derotated_normal_flow import correlated_covariance, derotated_constraints, position_response
 from ..kernels.sphere import spin_rows
 from ..kernels.spin import robust_spin, sampled_spin
 from ..results import MethodResult, Packet, SpinEstimate
@@ -295,7 +295,7 @@ class NormalFlowSpin:
         seen = [sight - axis * (sight @ axis) for sight in (self.seen.sights[0], self.seen.sights[-1])]
         turned_rps = 0.0
         if min(float(np.linalg.norm(across)) for across in seen) > STEADY_SIGHT:
-            turned = math.atan2(float(axis @ np.cross(seen[0], seen[1])), float(seen[0] @ seen[1]))
+            turned = math.atan2(float(np.linalg.det([axis, *seen])), float(seen[0] @ seen[1]))
             turned_rps = turned / TAU / max((self.seen.t_us[-1] - self.seen.t_us[0]) * 1e-6, 1e-6)
         off_rps = rate.spin_rps + turned_rps - float(np.linalg.norm(spin_rps))
         variance = float(axis @ covariance_rps2 @ axis) + rate.spin_std_rps**2
@@ -316,20 +316,18 @@ class NormalFlowSpin:
         if lengths[0] <= OPEN * lengths[-1]:
             return None
         inverse = np.linalg.inv(fit.matrix)
-        gain = inverse @ (fit.rows * fit.weights[:, None]).T
+        gain = (fit.rows * fit.weights[:, None]) @ inverse
         radius_px, position_px, radius_std_px, _ = self._track()
-        turned = self.seen.t_us[fit.events] * (float(np.linalg.norm(fit.spin)) * 1e-6)
-        _, block = np.unique(np.floor(turned).astype(np.int64), return_inverse=True)
-        blocks = int(block.max()) + 1
-        pulls = np.zeros((blocks, 3))
-        np.add.at(pulls, block, (gain * (fit.speeds - fit.rows @ fit.spin)).T)
-        scatter = pulls.T @ pulls * blocks / max(blocks - 1, 1)
         normals = self.seen.normals[fit.events]
-        response = position_response(normals, self.seen.sights[fit.events], fit.rows, fit.spin, radius_px)
-        moved = gain @ response
-        place = moved @ np.diag([position_px**2, position_px**2, radius_std_px**2]) @ moved.T
-        bent = BIAS * gain @ (fit.speeds[:, None] * normals)
-        total: Floats = (scatter + fit.overlap * inverse + place + bent @ bent.T) * max(fit.scale, 1.0) ** 2
+        common = correlated_covariance(
+            gain,
+            fit.speeds - fit.rows @ fit.spin,
+            self.seen.t_us[fit.events] * (float(np.linalg.norm(fit.spin)) * 1e-6),
+            position_response(normals, self.seen.sights[fit.events], fit.rows, fit.spin, radius_px),
+            BIAS * fit.speeds[:, None] * normals,
+            np.array([position_px, position_px, radius_std_px]),
+        )
+        total: Floats = (common + fit.overlap * inverse) * max(fit.scale, 1.0) ** 2
         return total
 
 

@@ -181,17 +181,17 @@ def ended_slices(
 ) -> tuple[FlowEvents, Floats, Floats, NDArray[np.int64]]:
     """Events with flow of the slices that end by end_us, their flow and their slice; the state moves on to the next."""
     assert state.slice_start_us is not None
-    events, vx, vy, index = [FlowEvents.empty()], [np.empty(0)], [np.empty(0)], [np.empty(0, np.int64)]
+    own, vx, vy, index = [np.empty(0, np.int64)], [np.empty(0)], [np.empty(0)], [np.empty(0, np.int64)]
     while state.slice_start_us + t_acc_us <= end_us:
-        piece = state.events.between(state.slice_start_us, state.slice_start_us + t_acc_us)
-        rows, flow_x, flow_y = flow_of(piece)
-        events.append(piece[rows])
+        first, last = state.events.t_us.searchsorted([state.slice_start_us, state.slice_start_us + t_acc_us])
+        rows, flow_x, flow_y = flow_of(state.events[int(first) : int(last)])
+        own.append(first + rows)
         vx.append(flow_x)
         vy.append(flow_y)
         index.append(np.full(rows.size, state.slice_index, np.int64))
         state.slice_start_us += t_acc_us
         state.slice_index += 1
-    return FlowEvents.concatenate(events), np.concatenate(vx), np.concatenate(vy), np.concatenate(index)
+    return state.events[np.concatenate(own)], np.concatenate(vx), np.concatenate(vy), np.concatenate(index)
 
 
 def _triplets(
@@ -216,33 +216,32 @@ def _planes(
 
     Without the events of the outline: they would be taken for a logo that stands still.
     """
-    events, reach_us = state.events[~state.events.of_outline], PLANE_REACH * t_acc_us
+    events, own, reach_us = state.events, np.flatnonzero(~state.events.of_outline), PLANE_REACH * t_acc_us
+    t_us, x_px, y_px, on = (column[own] for column in (events.t_us, events.x_px, events.y_px, events.on))
     until_us = max(end_us - reach_us, state.planes_until_us)
-    first, last = (int(row) for row in np.searchsorted(events.t_us, [state.planes_until_us, until_us]))
+    first, last = (int(row) for row in np.searchsorted(t_us, [state.planes_until_us, until_us]))
     most = max(PLANES_PER_MS * (until_us - state.planes_until_us) * 1e-3, 1.0)
     stride = max(1, math.ceil((last - first) / most))
     state.planes_until_us = until_us
     scales_us, ball_px_s = np.array(PLANE_SCALES) * t_acc_us, ball.mean[2:4]
     ball_speed_px_s = float(np.linalg.norm(ball_px_s))
     rows, directions, speeds = plane_flow(
-        (events.t_us, events.x_px, events.y_px, events.on), first, last, stride, parameters.reach_px, reach_us,
-        scales_us, bound_px_s,
-    )  # fmt: skip
+        (t_us, x_px, y_px, on), first, last, stride, parameters.reach_px, reach_us, scales_us, bound_px_s
+    )
     if ball_speed_px_s == 0.0:
-        return events[rows], directions, speeds, np.zeros(rows.size, np.bool_)
+        return events[own[rows]], directions, speeds, np.zeros(rows.size, np.bool_)
+    in_image = t_us, x_px + events.centre_x_px[own], y_px + events.centre_y_px[own], on
     image_rows, along, absolute = plane_flow(
-        (events.t_us, events.x_px + events.centre_x_px, events.y_px + events.centre_y_px, events.on), first, last,
-        stride, parameters.reach_px, reach_us, scales_us, bound_px_s + ball_speed_px_s,
-    )  # fmt: skip
+        in_image, first, last, stride, parameters.reach_px, reach_us, scales_us, bound_px_s + ball_speed_px_s
+    )
     relative = absolute - along @ ball_px_s
     sense = np.where(relative < 0, -1.0, 1.0)
     fit = (relative * sense > 0) & (relative * sense <= bound_px_s)
-    in_image = np.arange(rows.size + int(fit.sum())) >= rows.size
     return (
-        events[np.concatenate([rows, image_rows[fit]])],
+        events[own[np.concatenate([rows, image_rows[fit]])]],
         np.concatenate([directions, (along * sense[:, None])[fit]]),
         np.concatenate([speeds, (relative * sense)[fit]]),
-        in_image,
+        np.arange(rows.size + int(fit.sum())) >= rows.size,
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.rate import add_to_pattern, lag_sums, over_multiples
+from ..kernels.rate import add_to_pattern, deviations, highest_near, highest_peaks, lag_sums, over_multiples
 from .logo import TurningEvents
 
 Floats = NDArray[np.float64]
@@ -120,11 +120,10 @@ def period_of(
         return PatternPeriod.nothing("the shot is too short for a period")
     # Neighbours differ by a quarter of a bin at the last return.
     count = math.ceil(math.log(max_spin_rps / slowest_rps) / (0.25 * bin_s / span_s))
-    spins_rps = np.geomspace(slowest_rps, max_spin_rps, count + 1)
+    spins_rps = slowest_rps * (max_spin_rps / slowest_rps) ** (np.arange(count + 1) / count)
     squares, sums, bounds = np.zeros((3, count + 1))
     for pattern in kept:
-        events = pattern.sum(axis=1, keepdims=True)
-        varying = pattern - events * (pattern.sum(axis=0) / max(float(pattern.sum()), 1.0))
+        varying = deviations(pattern)
         if nuisance is not None:
             varying = varying - nuisance @ (nuisance.T @ varying)
             varying /= np.sqrt((pattern.sum(axis=0) + SPARSE_EVENTS) / pattern.shape[0])
@@ -143,18 +142,10 @@ def _judged(
 
     The sigmas grow with what overlaps, and so lean to short lags; the correlations (m,) say where a peak really is.
     """
-    inner = sigmas[1:-1]
-    peaks = 1 + np.flatnonzero((inner >= sigmas[:-2]) & (inner > sigmas[2:]))
-    chosen: list[int] = []
-    for peak in peaks[np.argsort(-sigmas[peaks], kind="stable")]:
-        if all(abs(math.log(spins_rps[peak] / spins_rps[other])) > APART for other in chosen):
-            chosen.append(int(peak))
-        if len(chosen) == ALTERNATIVES:
-            break
-    if not chosen:
+    chosen = highest_peaks(spins_rps, sigmas, ALTERNATIVES, APART)
+    if not chosen.size:
         return PatternPeriod.nothing("the logo's pattern does not come back")
-    best, near = float(sigmas[chosen[0]]), [np.abs(np.log(spins_rps / spins_rps[peak])) < APART for peak in chosen]
-    found = np.array([spins_rps[np.argmax(np.where(rows, correlations, -np.inf))] for rows in near])
+    best, found = float(sigmas[chosen[0]]), spins_rps[highest_near(spins_rps, correlations, chosen, APART)]
     likelihoods = -0.5 * ((1.0 - sigmas[chosen] / best) / SPREAD) ** 2
     reason = None
     if best < fewest_sigmas:

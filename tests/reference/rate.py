@@ -54,3 +54,19 @@ def naive_over_multiples(sums: Floats, bounds: Floats, period: float) -> Floats:
             sum(n - lag for lag in lags),
         ]
     )
+
+
+def naive_deviations(pattern: Floats) -> Floats:
+    """Counts (n, c) less the mean pattern with as many events in each bin."""
+    mean = pattern.sum(axis=0) / max(pattern.sum(), 1.0)
+    return np.array([row - row.sum() * mean for row in pattern])
+
+
+def naive_highest_peaks(places: Floats, heights: Floats, most: int, apart: float) -> list[int]:
+    """Peaks by height, each with every higher one chosen before it at least so far away."""
+    peaks = [k for k in range(1, len(heights) - 1) if heights[k - 1] <= heights[k] > heights[k + 1]]
+    chosen: list[int] = []
+    for peak in sorted(peaks, key=lambda k: -heights[k]):
+        if all(abs(np.log(places[peak] / places[other])) > apart for other in chosen):
+            chosen.append(peak)
+    return chosen[:most]

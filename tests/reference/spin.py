@@ -153,3 +153,16 @@ def naive_autocorrelation(signal: Floats, lag: int) -> float:
     early, late = signal[: len(signal) - lag], signal[lag:]
     norm = np.sqrt(np.sum(early**2) * np.sum(late**2))
     return float(np.sum(early * late) / norm) if norm > 0 else 0.0
+
+
+def naive_correlated_covariance(
+    gain: Floats, residuals: Floats, radians: Floats, place: Floats, bias: Floats, place_std_px: Floats
+) -> Floats:
+    """Each block of one radian, each part of the place and each bias as one independent error."""
+    blocks = sorted(set(np.floor(radians).tolist()))
+    errors = [gain[np.floor(radians) == block].T @ residuals[np.floor(radians) == block] for block in blocks]
+    covariance = sum(np.outer(error, error) for error in errors) * len(blocks) / max(len(blocks) - 1, 1)
+    for k in range(3):
+        moved, bent = gain.T @ place[:, k] * place_std_px[k], gain.T @ bias[:, k]
+        covariance = covariance + np.outer(moved, moved) + np.outer(bent, bent)
+    return np.asarray(covariance)

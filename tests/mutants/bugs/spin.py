@@ -49,9 +49,15 @@ METHODS = [
     ),
     Mutant(
         "pipeline/spin/normal_flow.py",
-        "fit.overlap * inverse + place + bent",
-        "fit.overlap * inverse + bent",
+        "common + fit.overlap * inverse",
+        "fit.overlap * inverse",
         "tests/pipeline/stages/test_spin_refusals.py",
+    ),
+    Mutant(
+        "pipeline/kernels/derotated_normal_flow.py",
+        "moved[p, k] * moved[q, k] + bent",
+        "bent",
+        "tests/pipeline/kernels/test_derotated_normal_flow.py -k common",
     ),
     Mutant(
         "pipeline/spin/normal_flow.py",

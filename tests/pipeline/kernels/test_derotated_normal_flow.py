@@ -8,12 +8,13 @@ from hypothesis import strategies as st
 
 from spinscope.pipeline.kernels.derotated_normal_flow import (
     ROUNDS,
+    correlated_covariance,
     derotated_constraints,
     derotated_normals,
     fit_moving_line,
     position_response,
 )
-from tests.reference.spin import naive_line
+from tests.reference.spin import naive_correlated_covariance, naive_line
 from tests.spinning_ball import turns
 
 spins = st.tuples(*[st.floats(-500, 500)] * 3).filter(lambda s: np.linalg.norm(s) > 60)
@@ -107,3 +108,16 @@ def test_position_response_is_the_derivative_by_the_balls_place(seed: int, spin:
     row = np.cross(e, line)
     response = position_response(e[None], sight[None], row[None], omega, radius_px)[0]
     np.testing.assert_allclose(response, expected, rtol=2e-3, atol=0.02)
+
+
+@settings(max_examples=30)
+@given(seed=st.integers(0, 10_000), count=st.integers(1, 60), turned=st.floats(0.1, 40.0))
+def test_the_covariance_of_what_constraints_have_in_common_equals_its_twin(
+    seed: int, count: int, turned: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    gain, place, bias = rng.normal(size=(3, count, 3))
+    residuals, radians = rng.normal(size=count), rng.uniform(1000.0, 1000.0 + turned, count)
+    found = correlated_covariance(gain, residuals, radians, place, bias, np.array([0.2, 0.2, 0.5]))
+    slow = naive_correlated_covariance(gain, residuals, radians, place, bias, np.array([0.2, 0.2, 0.5]))
+    np.testing.assert_allclose(found, slow, rtol=1e-9, atol=1e-9)

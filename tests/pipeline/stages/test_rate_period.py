@@ -7,11 +7,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from spinscope.pipeline.kernels.rate import add_to_pattern, lag_sums, over_multiples
+from spinscope.pipeline.kernels.rate import (
+    add_to_pattern,
+    deviations,
+    highest_near,
+    highest_peaks,
+    lag_sums,
+    over_multiples,
+)
 from spinscope.pipeline.stages.logo import TurningEvents
 from spinscope.pipeline.stages.rate_period import CELLS, FEWEST_SIGMAS, LogoPattern, PatternPeriod, _judged
 from tests.reference.contrast import dotted_ball
-from tests.reference.rate import naive_lag_sums, naive_over_multiples, naive_pattern
+from tests.reference.rate import (
+    naive_deviations,
+    naive_highest_peaks,
+    naive_lag_sums,
+    naive_over_multiples,
+    naive_pattern,
+)
 
 BIN_US = 500
 
@@ -38,6 +51,27 @@ def test_lag_sums_and_their_totals_are_their_twins(seed: int, n: int, cells: int
     assert found[2] == pytest.approx(mean_square, abs=1e-9)
     totals = over_multiples(sums, bounds, np.array([period]))[:, 0]
     np.testing.assert_allclose(totals, naive_over_multiples(sums, bounds, period), atol=1e-9)
+
+
+@settings(max_examples=30)
+@given(seed=st.integers(0, 10_000), n=st.integers(1, 12), cells=st.integers(1, 9))
+def test_the_deviations_are_their_twins(seed: int, n: int, cells: int) -> None:
+    pattern = np.random.default_rng(seed).poisson(0.5, (n, cells)).astype(np.float64)
+    np.testing.assert_allclose(deviations(pattern), naive_deviations(pattern), atol=1e-12)
+
+
+@settings(max_examples=50)
+@given(seed=st.integers(0, 10_000), n=st.integers(1, 80), most=st.integers(1, 5))
+def test_the_highest_peaks_are_their_twins(seed: int, n: int, most: int) -> None:
+    """Heights of few values, so that neighbours and peaks tie."""
+    random = np.random.default_rng(seed)
+    places, heights = 3.0 * 1.02 ** np.arange(n), random.integers(0, 6, n).astype(np.float64)
+    peaks = highest_peaks(places, heights, most, 0.05)
+    assert peaks.tolist() == naive_highest_peaks(places, heights, most, 0.05)
+    others = random.integers(0, 6, n).astype(np.float64)
+    for peak, found in zip(peaks, highest_near(places, others, peaks, 0.05), strict=True):
+        near = np.abs(np.log(places / places[peak])) < 0.05
+        assert found == np.argmax(np.where(near, others, -np.inf))
 
 
 def turning(spin_rps: np.ndarray, *, duration_s: float = 0.1, stamps: int = 1, events: int = 1500) -> PatternPeriod:
