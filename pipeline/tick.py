@@ -66,7 +66,7 @@ class BallTick(StageResults):
         """Method whose estimate is trusted, None where none is."""
         return trusted_method(self.estimates, self.evidence.doubt)
 
-    @property
+    @cached_property
     def best_reason(self) -> str | None:
         """Reason for trusting no estimate, in words for people; None where one is."""
         return distrust_reason(self.estimates, self.evidence.doubt)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
@@ -23,11 +25,12 @@ RING_RADII, RING_POINTS = 1.18, 51  # of the ring that shows which way the ball 
 
 def ball_chunks(run: ViewedRun) -> list[Chunk]:
     """Everything in space but the logo on the ball."""
-    chunks = [_mesh(run), *_motion(run), *_arrows(run), *_ring(run), *_path(run), *_axes(run)]
+    chunks = [_mesh(run.ball_radius_m), *_motion(run), *_arrows(run), *_ring(run), *_path(run), *_axes(run)]
     return [once(at.WORLD, rr.ViewCoordinates.RDF), *chunks]
 
 
-def _mesh(run: ViewedRun) -> Chunk:
+@lru_cache(8)
+def _mesh(ball_radius_m: float) -> Chunk:
     """The sphere, in the body frame."""
     longitudes, latitudes = np.linspace(-np.pi, np.pi, 65), np.linspace(-np.pi / 2, np.pi / 2, 33)
     normals = sphere(longitudes[None, :], latitudes[:, None]).reshape(-1, 3)
@@ -40,7 +43,7 @@ def _mesh(run: ViewedRun) -> Chunk:
     return once(
         at.MESH,
         rr.Mesh3D(
-            vertex_positions=normals * run.ball_radius_m,
+            vertex_positions=normals * ball_radius_m,
             vertex_normals=normals,
             vertex_texcoords=np.stack([u.ravel(), v.ravel()], axis=1),
             triangle_indices=faces,

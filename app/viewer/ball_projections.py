@@ -11,6 +11,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from spinscope.pipeline.kernels.rotation import cross_product
+
 Floats = NDArray[np.float64]
 
 # As fine as the cells in which the events are counted.
@@ -61,9 +63,9 @@ def map_frame(spin_rps: Floats, middle: Floats) -> Floats:
     pole = spin_rps / magnitude if magnitude else np.array([0.0, -1.0, 0.0])
     out = middle - (middle @ pole) * pole
     if np.linalg.norm(out) < 1e-6 * np.linalg.norm(middle):
-        out = np.cross(pole, [1.0, 0.0, 0.0] if abs(pole[0]) < 0.9 else [0.0, 1.0, 0.0])
+        out = cross_product(pole, np.array([1.0, 0.0, 0.0] if abs(pole[0]) < 0.9 else [0.0, 1.0, 0.0]))
     out = out / np.linalg.norm(out)
-    return np.stack([out, np.cross(pole, out), pole])
+    return np.stack([out, cross_product(pole, out), pole])
 
 
 def disc_directions(middle: Floats) -> Floats:

@@ -133,8 +133,8 @@ class Plot:
 
     def _contacts(self, run: ViewedRun) -> list[Curve]:
         """Vertical lines at the contacts over the range of the axis: up within a nanosecond, the time's resolution."""
-        y_range = self.axis_range(run)
-        if y_range is None or not run.contacts_us.size:
+        y_range = self.axis_range(run) if run.contacts_us.size else None
+        if y_range is None:
             return []
         t_us = np.add.outer(run.contacts_us, [-1e-3, 0.0, 1e-3]).ravel()
         values = np.tile([*y_range, np.nan], run.contacts_us.size)

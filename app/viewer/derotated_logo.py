@@ -145,6 +145,7 @@ def _raw(pictures: Bytes) -> tuple[Bytes, list[rr.components.ImageFormat]]:
     return pictures.reshape(count, -1), [form] * count
 
 
+@cache
 def _graticule() -> Chunk:
     """Equator and poles of the map, and its quarters of a turn."""
     width, height = MAP_PX

@@ -8,6 +8,7 @@ wherever the playhead stands.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 import rerun as rr
@@ -18,7 +19,6 @@ from spinscope.pipeline.kernels.hsv import hsv_image, hsv_wheel
 from spinscope.pipeline.results import Circle
 
 from . import entities as at
-from .plots import true_state
 from .png import png
 from .rerun_api import Chunk, columns_at, once, states, strips, styled
 from .run import ViewedRun
@@ -40,9 +40,9 @@ def filter_chunks(run: ViewedRun) -> list[Chunk]:
     positions, classes = [], []
     for tick in run.ticks:
         events, kept, start_us = tick.packet.events, tick.filter.surface_events, tick.packet.start_us
-        is_kept = np.isin(_keys(events, start_us)[chosen], _keys(kept, start_us))
+        is_kept = _are_among(events, kept, start_us)[chosen]
         positions.append(np.stack([events.x_px[chosen], events.y_px[chosen]], axis=1))
-        is_flicker = np.isin(_keys(events, start_us)[chosen], _keys(tick.filter.flicker_events, start_us))
+        is_flicker = _are_among(events, tick.filter.flicker_events, start_us)[chosen]
         classes.append(4 * is_flicker.astype(np.uint16) + 2 * is_kept + events.on[chosen])
     width, height = run.camera.width_px, run.camera.height_px
     frame = rr.Boxes2D(mins=[[-0.5, -0.5]], sizes=[[width, height]], colors=[at.MASK_COLOUR], radii=[-0.5])
@@ -94,8 +94,8 @@ def track_chunks(run: ViewedRun) -> list[Chunk]:
         _names(run, at.CIRCLE_NAMES, circles | ({} if run.truth is None else {"truth": at.TRUTH_COLOUR})),
         *states(at.STATUS, run.times_us, statuses, at.STATUS_COLOURS),
     ]
-    if run.truth is not None:
-        chunks += _true_circle(run)
+    if run.true_states is not None:
+        chunks += _true_circle(run, run.true_states)
     return chunks
 
 
@@ -138,9 +138,22 @@ def flow_chunks(run: ViewedRun) -> list[Chunk]:
     return [
         once(at.FLOW, corner, rr.EncodedImage.from_fields(media_type="image/png", draw_order=-10.0)),
         columns_at(at.FLOW, run.times_us, rr.EncodedImage.columns(blob=blobs)),
-        once(at.FLOW_WHEEL, beside, rr.EncodedImage(contents=png(hsv_wheel(WHEEL_PX)), media_type="image/png")),
+        once(at.FLOW_WHEEL, beside, rr.EncodedImage(contents=_wheel(), media_type="image/png")),
         once(at.FLOW_SPEED, speed),
     ]
+
+
+@cache
+def _wheel() -> bytes:
+    """PNG of the wheel of colours."""
+    return png(hsv_wheel(WHEEL_PX))
+
+
+def _are_among(events: EventBatch, others: EventBatch, start_us: int) -> NDArray[np.bool_]:
+    """Flags (n,) of the events of a tick that are among others of it."""
+    if not len(others):
+        return np.zeros(len(events), np.bool_)
+    return np.isin(_keys(events, start_us), _keys(others, start_us))
 
 
 def _keys(events: EventBatch, start_us: int) -> NDArray[np.int64]:
@@ -241,14 +254,13 @@ def _ball_place(run: ViewedRun) -> Chunk:
     return columns_at(at.BALL_PLACE, run.times_us, rr.Transform3D.columns(translation=translation))
 
 
-def _true_circle(run: ViewedRun) -> list[Chunk]:
+def _true_circle(run: ViewedRun, state: Floats) -> list[Chunk]:
     """The true outline, dashed."""
-    state = true_state(run)
     angles = np.linspace(0, 2 * np.pi, 4 * DASHES, endpoint=False).reshape(DASHES, 4)[:, :3]
     unit = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     known = np.isfinite(state[:, 0])
-    dashes = [dash for row in state[known] for dash in row[:2] + row[4] * unit]
-    columns = rr.LineStrips2D.columns(strips=strips(dashes))
+    dashes = state[known, None, None, :2] + state[known, None, None, 4:] * unit
+    columns = rr.LineStrips2D.columns(strips=strips(dashes.reshape(-1, *unit.shape[1:])))
     return [
         styled(at.TRUE_CIRCLE, rr.LineStrips2D, colors=at.TRUTH_COLOUR, radii=-0.8),
         columns_at(at.TRUE_CIRCLE, run.times_us, columns, [0, *(DASHES * known.astype(int))]),

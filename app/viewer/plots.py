@@ -37,15 +37,6 @@ STATE = (
 )
 
 
-def true_state(run: ViewedRun) -> Floats:
-    """True Kalman states (n, 5) at the ticks' scene times; NaN where the truth does not reach."""
-    assert run.truth is not None
-    t_us = np.array([tick.track.t_us for tick in run.ticks])
-    truth, seconds = run.truth, run.truth.t_us * 1e-6
-    columns = [truth.x_px, truth.y_px, np.gradient(truth.x_px, seconds), np.gradient(truth.y_px, seconds)]
-    return run.true_values(t_us, np.column_stack([*columns, truth.radius_px]))
-
-
 def _state_curves(index: int, is_residual: bool, run: ViewedRun) -> list[Curve]:
     """Kalman value with its band, measured circles as dots, and truth; as residuals each minus the Kalman value."""
     component = STATE[index]
@@ -59,8 +50,8 @@ def _state_curves(index: int, is_residual: bool, run: ViewedRun) -> list[Curve]:
     if component.circle is not None:
         refined = _measured([track.measured for track in tracks], component.circle) - offset
         curves.append(Curve("measured", f"refined [{unit}]", at.MEASURED_COLOUR, refined, marker="circle", width=3.0))
-    if run.truth is not None:
-        curves.append(_truth(true_state(run)[:, index] - offset, f"truth [{unit}]", is_in_range=is_residual))
+    if run.true_states is not None:
+        curves.append(_truth(run.true_states[:, index] - offset, f"truth [{unit}]", is_in_range=is_residual))
     return curves
 
 

@@ -157,6 +157,16 @@ class ViewedRun:
         return self.true_values(np.array([tick.track.t_us for tick in self.ticks]), self.truth.spin_rps)
 
     @cached_property
+    def true_states(self) -> Floats | None:
+        """True Kalman states (n, 5) at the ticks' scene times; NaN where the truth does not reach, None without it."""
+        if self.truth is None:
+            return None
+        truth, seconds = self.truth, self.truth.t_us * 1e-6
+        columns = [truth.x_px, truth.y_px, np.gradient(truth.x_px, seconds), np.gradient(truth.y_px, seconds)]
+        t_us = np.array([tick.track.t_us for tick in self.ticks])
+        return self.true_values(t_us, np.column_stack([*columns, truth.radius_px]))
+
+    @cached_property
     def has_ball(self) -> NDArray[np.bool_]:
         """Flags (n,) of the ticks at whose end there is a ball."""
         return np.array([tick.track.has_ball for tick in self.ticks], np.bool_)

@@ -7,7 +7,7 @@ pictures are of the last full estimate.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 import cv2
 import numpy as np
@@ -140,8 +140,9 @@ def _on_map(spins_rps: Floats) -> NDArray[np.float32]:
 
 def _heat(directions: Floats, scores: Floats) -> NDArray[np.uint8]:
     """Picture (COARSE, COARSE_WIDTH, 3) of the mean score around every axis, dark = none, light = the highest."""
-    weights = np.exp((_axes() @ directions.astype(np.float32).T - 1) / np.float32(REACH_RAD**2))
-    mean = (weights @ scores.astype(np.float32)) / weights.sum(axis=-1)
+    best, others = _weights(directions[:1].tobytes()), _weights(directions[1:].tobytes())
+    weighted = best @ scores[:1].astype(np.float32) + others @ scores[1:].astype(np.float32)
+    mean = weighted / (best.sum(axis=-1) + others.sum(axis=-1))
     values = np.zeros((COARSE, COARSE_WIDTH), np.uint8)
     grey = np.clip(BRIGHTEST * mean / max(float(scores.max()), 1e-9), 0, BRIGHTEST)
     values[:, :COARSE], values[:, -COARSE:] = grey
@@ -159,6 +160,14 @@ def _frame(heat: str) -> list[Chunk]:
     # Only what is not quite opaque lets through what is below its holes.
     around = rr.EncodedImage(contents=png(picture), media_type="image/png", draw_order=-10.0, opacity=0.999)
     return [once(heat, rr.Transform3D(scale=CELL_PX)), once(at.SCORE_AXES, around)]
+
+
+@lru_cache(16)
+def _weights(directions: bytes) -> NDArray[np.float32]:
+    """Weights (2, COARSE, COARSE, n) of directions (n, 3) float64; all but an estimate's own are always the same."""
+    rows = np.frombuffer(directions).reshape(-1, 3).astype(np.float32)
+    weights: NDArray[np.float32] = np.exp((_axes() @ rows.T - 1) / np.float32(REACH_RAD**2))
+    return weights
 
 
 @cache

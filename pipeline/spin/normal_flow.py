@@ -319,12 +319,13 @@ class NormalFlowSpin:
         gain = (fit.rows * fit.weights[:, None]) @ inverse
         radius_px, position_px, radius_std_px, _ = self._track()
         normals = self.seen.normals[fit.events]
+        bias: Floats = BIAS * fit.speeds[:, None] * normals
         common = correlated_covariance(
             gain,
             fit.speeds - fit.rows @ fit.spin,
-            self.seen.t_us[fit.events] * (float(np.linalg.norm(fit.spin)) * 1e-6),
+            np.linalg.norm(fit.spin) * 1e-6 * self.seen.t_us[fit.events],
             position_response(normals, self.seen.sights[fit.events], fit.rows, fit.spin, radius_px),
-            BIAS * fit.speeds[:, None] * normals,
+            bias,
             np.array([position_px, position_px, radius_std_px]),
         )
         total: Floats = (common + fit.overlap * inverse) * max(fit.scale, 1.0) ** 2

@@ -217,7 +217,7 @@ def _planes(
     Without the events of the outline: they would be taken for a logo that stands still.
     """
     events, own, reach_us = state.events, np.flatnonzero(~state.events.of_outline), PLANE_REACH * t_acc_us
-    t_us, x_px, y_px, on = (column[own] for column in (events.t_us, events.x_px, events.y_px, events.on))
+    t_us, x_px, y_px, on = events.t_us[own], events.x_px[own], events.y_px[own], events.on[own]
     until_us = max(end_us - reach_us, state.planes_until_us)
     first, last = (int(row) for row in np.searchsorted(t_us, [state.planes_until_us, until_us]))
     most = max(PLANES_PER_MS * (until_us - state.planes_until_us) * 1e-3, 1.0)

@@ -40,6 +40,9 @@ ONE, TWO = np.uint64(1), np.uint64(2)  # cells: an unsigned index plus a signed 
 # what one coinciding event adds to a density.
 COINCIDENCE = 0.55 * 0.55
 SQRT2, LOG2 = math.sqrt(2.0), math.log(2.0)
+# Parts of a float64: number of bits of its mantissa, that mantissa, and the other bits of 1.0 and of 2^52.
+MANTISSA_BITS, MANTISSA = np.uint64(52), np.uint64(0x000FFFFFFFFFFFFF)
+ONE_BITS, TWO_TO_52 = np.uint64(0x3FF0000000000000), np.uint64(0x4330000000000000)
 # Splatting and reading are each smeared by the spline (variance 1/4 cell^2): kernel of 1 sigma = cell / sqrt(2).
 CELLS_PER_SIGMA = math.sqrt(2.0)
 # Divisors are never zero: `error_model="numpy"` spares a look for it. No fast math: its last bits depend on what the
@@ -70,7 +73,7 @@ def derotate(derotated: Floats, spin_rad_s: Floats, t_s: Floats, normals: Floats
         h2 = half * half
         s = half * (1.0 + h2 * (-1 / 6 + h2 * (1 / 120 + h2 * (-1 / 5040 + h2 * (1 / 362880 - h2 * (1 / 39916800))))))
         c = 1.0 + h2 * (
-            -1 / 2 + h2 * (1 / 24 + h2 * (-1 / 720 + h2 * (1 / 40320 + h2 * (-1 / 3628800 + h2 / 479001600))))
+            -1 / 2 + h2 * (1 / 24 + h2 * (-1 / 720 + h2 * (1 / 40320 + h2 * (-1 / 3628800 + h2 * (1 / 479001600)))))
         )
         versine = 2.0 * s * s
         to_x[k], to_y[k], to_z[k] = rotate((xs[k], ys[k], zs[k]), (ax, ay, az), 2.0 * s * c, 1.0 - versine, versine)
@@ -185,18 +188,20 @@ def take_logarithms(values: Floats) -> float:
 
     The binary exponent apart, a number is a mantissa m in [1, 2): log m = log sqrt(2) + 2 artanh of
     (m - sqrt(2)) / (m + sqrt(2)), whose series' terms left out are below 1e-12: plain arithmetic, so that the
-    compiler handles several numbers at once (2.5 times as fast as the library's).
+    compiler handles several numbers at once (1.5 times as fast as NumPy's).
     """
-    bits, exponents = values.view(np.int64), np.empty(values.size)
+    bits, shifted = values.view(np.uint64), np.empty(values.size, np.uint64)
+    exponents = shifted.view(np.float64)  # each plus 2^52: integers to floats is not done several at once
     for k in range(values.size):
-        exponents[k] = (bits[k] >> 52) - 1023
-        bits[k] = (bits[k] & 0x000FFFFFFFFFFFFF) | 0x3FF0000000000000
-    total = 0.0
+        shifted[k] = (bits[k] >> MANTISSA_BITS) | TWO_TO_52
+        bits[k] = (bits[k] & MANTISSA) | ONE_BITS
     for k in range(values.size):
         a = (values[k] - SQRT2) / (values[k] + SQRT2)
         a2 = a * a
         series = 1.0 + a2 * (1 / 3 + a2 * (1 / 5 + a2 * (1 / 7 + a2 * (1 / 9 + a2 * (1 / 11 + a2 * (1 / 13))))))
-        values[k] = (exponents[k] + 0.5) * LOG2 + 2.0 * a * series
+        values[k] = (exponents[k] - 2.0**52 - 1022.5) * LOG2 + 2.0 * a * series
+    total = 0.0  # summed in a loop of its own: in order, which is one number at a time
+    for k in range(values.size):
         total += values[k]
     return total
 

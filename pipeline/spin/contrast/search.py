@@ -370,15 +370,12 @@ def spin_covariance(
     squared = float(spin @ spin)
     along = np.outer(spin, spin) / squared
     covariance = _sandwich(objective, model, settings.repeats * len(events) / stretch.events)
-    # Events' speed on the ball, in radii a second, for one rad/s more about the axis.
-    x, y, z = spin / math.sqrt(squared)
-    nx, ny, nz = events.normals
-    lever = np.stack([y * nz - z * ny, z * nx - x * nz, x * ny - y * nx])
-    covariance += _drift(objective, events, ball, spin, lever, stretch.span_s)
-    oblique = max(1.0, RIM_COSINE / max(float(view_cosine(events).mean()), RIM_COSINE / MOST_OBLIQUE))
+    columns = events.normals, events.facing, events.radius_px, events.t_s
+    cosine, spread_s, lever, drift = _seen_of_turn(columns, objective.slopes, spin / math.sqrt(squared))
+    covariance += _drift_px_s(ball, stretch.span_s) ** 2 * drift
+    oblique = max(1.0, RIM_COSINE / max(cosine, RIM_COSINE / MOST_OBLIQUE))
     covariance += (AXIS_FLOOR * settings.sigma_rad * oblique) ** 2 * squared * (np.eye(3) - along)
-    spread_s = max(float(np.std(events.t_s)), 1e-5) * float(np.sqrt(np.mean(np.sum(lever**2, axis=0))))
-    covariance += (TURN_FLOOR * settings.sigma_rad / spread_s) ** 2 * along
+    covariance += (TURN_FLOOR * settings.sigma_rad / (max(spread_s, 1e-5) * lever)) ** 2 * along
     return covariance + _twist(events, ball, spin, stretch.span_s)
 
 
@@ -399,30 +396,72 @@ def _sandwich(objective: Objective, model: LocalModel, repeats: float) -> Floats
     return covariance
 
 
-def _drift(
-    objective: Objective, events: SphereEvents, ball: BallUncertainty, spin_rad_s: Floats, lever: Floats, span_s: float
-) -> Floats:
-    """A centre that drifts over the ball looks like a turn: (3, 3), rad^2/s^2.
+def _drift_px_s(ball: BallUncertainty, span_s: float) -> float:
+    """Speed, px/s, by which the tracked centre drifts over the ball.
 
     A track that is off by its sigma, anew every TRACK_MEMORY_S, looks like a ramp of sqrt(12) sigma over the stretch,
-    less so the more often its errors change. Across the spin's axis it is a turn about an axis in the image; about the
-    axis itself the turn that fits how far each event's place on the ball is shifted (`offset_slopes`), in the sense of
-    least squares: a pixel is more of the ball at the rim, and more of a turn near the axis. (Within less than a turn
-    the axis takes a part of it; that much too large an error is stated then.)
+    less so the more often its errors change.
     """
     changes = max(span_s / TRACK_MEMORY_S, 1.0)
     ramp_px_s = math.sqrt(12.0 / changes) * ball.track_std_px / max(span_s, 1e-6)
-    rate_px_s = min(ball.drift_std_px_s, ramp_px_s)
-    axis = spin_rad_s / math.sqrt(spin_rad_s @ spin_rad_s)
-    facing = events.facing.mean(axis=1)
-    facing /= np.linalg.norm(facing)
-    facing -= float(facing @ axis) * axis
-    across = np.eye(3) - np.outer(axis, axis) - np.outer(facing, facing)
-    squared_s2 = (events.t_s - events.t_s.mean()) ** 2
-    turns = np.einsum("kin,in->k", objective.slopes[:2], lever * squared_s2)
-    about_axis = float(turns @ turns) / max(float(squared_s2 @ np.sum(lever**2, axis=0)), 1e-18) ** 2
-    spread: Floats = rate_px_s**2 * (across / float(np.mean(events.radius_px)) ** 2 + about_axis * np.outer(axis, axis))
-    return spread
+    return min(ball.drift_std_px_s, ramp_px_s)
+
+
+@numba.njit(cache=True, nogil=True)
+def _seen_of_turn(
+    events: tuple[Floats, Floats, Floats, Floats], slopes: Floats, axis: Floats
+) -> tuple[float, float, float, Floats]:
+    """Properties of events by which a turn about an axis (3,) is seen, and what a drift of the centre adds to it.
+
+    Parameters
+    ----------
+    events : tuple of (3, n), (3, n), (n,) and (n,) float64
+        Normals, facing, radius and time, as in `SphereEvents`.
+    slopes : (3, 3, n) float64
+        Their `offset_slopes`.
+
+    Returns
+    -------
+    cosine, spread_s, lever : float
+        Mean cosine of the view, standard deviation of the times, and root mean square of the distance from the axis.
+    drift : (3, 3) float64
+        Covariance (rad/s)^2 of the spin where the centre drifts by 1 px/s. Across the spin's axis that is a turn about
+        an axis in the image; about the axis itself the turn that fits how far each event's place on the ball is shifted
+        (`offset_slopes`), in the sense of least squares: a pixel is more of the ball at the rim, and more of a turn
+        near the axis. (Within less than a turn the axis takes a part of it; that much too large an error is stated
+        then.)
+    """
+    normals, facing, radius_px, t_s = events
+    n = t_s.size
+    mean_s, cosine, radius, towards = 0.0, 0.0, 0.0, np.zeros(3)
+    for i in range(n):
+        mean_s += t_s[i] / n
+        radius += radius_px[i] / n
+        for k in range(3):
+            cosine -= normals[k, i] * facing[k, i] / n
+            towards[k] += facing[k, i] / n
+    variance, square, weighted, turns = 0.0, 0.0, 0.0, np.zeros(2)
+    for i in range(n):
+        squared_s2 = (t_s[i] - mean_s) ** 2
+        nx, ny, nz = normals[0, i], normals[1, i], normals[2, i]
+        # The event's speed on the ball, in radii a second, for one rad/s more about the axis.
+        x, y, z = axis[1] * nz - axis[2] * ny, axis[2] * nx - axis[0] * nz, axis[0] * ny - axis[1] * nx
+        lever2 = x * x + y * y + z * z
+        variance += squared_s2 / n
+        square += lever2 / n
+        weighted += squared_s2 * lever2
+        for k in range(2):
+            turns[k] += (slopes[k, 0, i] * x + slopes[k, 1, i] * y + slopes[k, 2, i] * z) * squared_s2
+    about_axis = (turns[0] ** 2 + turns[1] ** 2) / max(weighted, 1e-18) ** 2
+    length = math.sqrt(towards[0] ** 2 + towards[1] ** 2 + towards[2] ** 2)
+    along = (towards[0] * axis[0] + towards[1] * axis[1] + towards[2] * axis[2]) / length
+    drift = np.empty((3, 3))
+    for p in range(3):
+        for q in range(3):
+            view_p, view_q = towards[p] / length - along * axis[p], towards[q] / length - along * axis[q]
+            across = (1.0 if p == q else 0.0) - axis[p] * axis[q] - view_p * view_q
+            drift[p, q] = across / radius**2 + about_axis * axis[p] * axis[q]
+    return cosine, math.sqrt(variance), math.sqrt(square), drift
 
 
 def _twist(events: SphereEvents, ball: BallUncertainty, spin_rad_s: Floats, span_s: float) -> Floats:
