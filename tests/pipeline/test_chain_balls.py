@@ -5,11 +5,15 @@ from __future__ import annotations
 import dataclasses
 import threading
 import time
+from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from spinscope.pipeline.chain import Chain
+from spinscope.pipeline.event_source import EventsInMemory
+from spinscope.pipeline.session import Session
 from spinscope.pipeline.tick import Tick
 from tests.pipeline.toy_stages import ALL_BUT_CONTRAST, BELOW_LOGO, DEFAULT, INPUTS, OF_RECORDING, ToyBall, Toys, source
 
@@ -39,6 +43,18 @@ def test_each_ball_has_states_of_its_own(toys: Toys) -> None:
         assert [ball.results for ball in one.balls] == [ball.results for ball in other.balls]
     list(chain.run(DEFAULT.with_assignments(["logo.pad_px=1"]), ("logo",)))
     assert toys.counts["logo"] == 40 and toys.counts["rate"] == 20 == toys.counts["track"]
+
+
+def test_ticks_without_a_ball_say_why_and_share_their_results(samples: Path) -> None:
+    """With a reason of its own after a shot; made anew for each tick they take longer than tracking in noise."""
+    session = Session.open(samples / "own/bounce.h5")
+    flown_us = max(shot.end_us for shot in session.estimate("triplet").shots)
+    source = EventsInMemory("bounce", session.source.between(0, 10**9), 1280, 720, 0, flown_us + 60_000)
+    nobody = [tick for tick in Chain(source).run(session.parameters, ("triplet",)) if not tick.balls]
+    assert all(tick.results["triplet"].estimate.reason == tick.track.reason for tick in nobody)
+    for one, other in pairwise(nobody):
+        assert (one.logo is other.logo) == (one.track.reason == other.track.reason)
+    assert len({tick.track.reason for tick in nobody}) > 1
 
 
 def test_a_column_of_a_shot_is_not_known_until_its_last_tick(toys: Toys) -> None:
