@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import CameraError
 from ..events import EventBatch
+from ..kernels.time_order import is_in_order
 from ..results import Packet
 from .clock import now_s
 from .event_camera import CameraPacket, EventCamera
@@ -237,6 +238,7 @@ class EventStream:
     def _take(self, packet: CameraPacket) -> None:
         """Take a packet of the camera: hand it to the sinks, and cut it into ticks."""
         came_s, counts, events = now_s(), self.counts, packet.events
+        count = len(events)
         if self._end_us is not None and not 0 <= packet.end_us - self._end_us <= LARGEST_JUMP_US:
             self._on_notice(
                 "clock",
@@ -245,7 +247,7 @@ class EventStream:
             self._next_clock()
         counts.dropped += packet.dropped
         counts.outside += packet.outside
-        counts.events += len(events)
+        counts.events += count
         if packet.dropped:
             self._say_fault(
                 "lost",
@@ -260,30 +262,37 @@ class EventStream:
                 f"events beyond the sensor of {self.width_px} x {self.height_px} px, left out: {counts.outside} so "
                 "far: the camera states a wrong size: unplug it and plug it in again",
             )
-        if len(events) and np.any(events.t_us[1:] < events.t_us[:-1]):
+        if not is_in_order(events.t_us):
             events = events[np.argsort(events.t_us, kind="stable")]
         for sink in self._sinks:
             sink(self._clock, events)
-        if len(events) and self._next_us is None:
-            self._next_us = int(events.t_us[0]) // self._tick_us * self._tick_us
-        if len(events) and self._next_us is not None and events.t_us[0] < self._next_us:
-            on_time = events.between(self._next_us, 2**63 - 1)
-            counts.late += len(events) - len(on_time)
-            events = on_time
-        if len(events):
-            self._pending.append(events)
+        if count:
+            self._keep_for_ticks(events)
         if self._first_s is None:
             self._first_s = came_s
         self._end_us = counts.end_us = packet.end_us
         while self._next_us is not None and packet.end_us >= self._next_us + self._tick_us:
             self._cut(self._next_us + self._tick_us, came_s)
 
+    def _keep_for_ticks(self, events: EventBatch) -> None:
+        """Keep events until their tick is complete; those of a tick that is over are left out and counted."""
+        counts = self.counts
+        if self._next_us is None:
+            self._next_us = int(events.t_us[0]) // self._tick_us * self._tick_us
+        if events.t_us[0] < self._next_us:
+            on_time = events.between(self._next_us, 2**63 - 1)
+            counts.late += len(events) - len(on_time)
+            events = on_time
+        if len(events):
+            self._pending.append(events)
+
     def _cut(self, end_us: int, came_s: float) -> None:
         """Hand over the tick that ends at a time."""
         start_us = self._next_us
         assert start_us is not None
         events = EventBatch.concatenate(self._pending)
-        own, rest = events.between(start_us, end_us), events.between(end_us, 2**63 - 1)
+        count = int(events.t_us.searchsorted(end_us))
+        own, rest = events[:count], events[count:]
         first_s = came_s if self._first_s is None else self._first_s
         self._pending, self._first_s = ([rest], came_s) if len(rest) else ([], None)
         self._next_us = end_us

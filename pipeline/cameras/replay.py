@@ -138,10 +138,10 @@ class ReplayCamera(EventCamera):
                     next_fault_us = self._start_us + FAULT_US
                 for piece in self._split(events, last_us):
                     last_us = piece.end_us
-                    is_fault = self._fault is not None and last_us >= next_fault_us
-                    if is_fault:
+                    if self._fault is not None and last_us >= next_fault_us:
                         next_fault_us += FAULT_US
-                    yield piece._replace(is_fault=is_fault)
+                        piece = piece._replace(is_fault=True)
+                    yield piece
             if not self._loops or last_us is None:
                 return
             # Whole packets, so that a round is cut like the one before.
