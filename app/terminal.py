@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import sys
@@ -20,6 +21,9 @@ UNFOLDED_COLUMNS = 1000  # wider than any table
 PATIENCE_S = 1.0  # work that ends sooner shows no bar
 LOGGED_S = 30.0  # from line to line of a log: 120 lines an hour
 _ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+# Signals nearer to each other are one request: a shell, or `uv run`, hands on what the terminal has sent already.
+SAME_REQUEST_S = 0.5
+_requested_s = -math.inf  # when the last request came
 FULL_DISK = (ENOSPC, EDQUOT, EFBIG, EIO)  # errors of writing that are the disk's
 
 
@@ -44,6 +48,7 @@ def exit_on_signals() -> None:
     """
 
     def end(number: int, _: object) -> None:
+        _is_another_request()
         _ignore_signals()
         if number == signal.SIGINT:
             raise KeyboardInterrupt
@@ -55,29 +60,42 @@ def exit_on_signals() -> None:
 
 
 @contextmanager
-def ends_on_signals(stop: Callable[[], None]) -> Iterator[None]:
-    """Have the first signal that asks for the end call `stop` in the main thread, and ignore those after it.
+def ends_on_signals(end: Callable[[], None]) -> Iterator[None]:
+    """Have each request of the user or the system for the end call `end` in the main thread.
 
-    Also after this block, where the rest of the program ends. In another thread nothing is done.
+    After the first one, further ones are ignored from the end of this block on, where the rest of the program ends. In
+    another thread nothing is done.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    has_stopped = False
+    is_asked = False
 
-    def end(number: int, _: object) -> None:
-        nonlocal has_stopped
-        has_stopped = True
-        _ignore_signals()
-        stop()
+    def take(number: int, _: object) -> None:
+        nonlocal is_asked
+        if _is_another_request():
+            is_asked = True
+            end()
 
-    before = {one: signal.signal(one, end) for one in _ENDING if signal.getsignal(one) is not signal.SIG_IGN}
+    before = {one: signal.signal(one, take) for one in _ENDING if signal.getsignal(one) is not signal.SIG_IGN}
     try:
         yield
     finally:
-        if not has_stopped:
+        if is_asked:
+            _ignore_signals()
+        else:
             for one, handler in before.items():
                 signal.signal(one, handler)
+
+
+def _is_another_request() -> bool:
+    """Take a signal that comes now; whether it does not belong to the last request."""
+    global _requested_s
+    now_s = time.monotonic()
+    if now_s - _requested_s <= SAME_REQUEST_S:
+        return False
+    _requested_s = now_s
+    return True
 
 
 def _ignore_signals() -> None:

@@ -192,8 +192,7 @@ class LiveRun:
         finally:
             self.stop()
             if sys.exc_info()[0] is not None:  # nobody takes the rest
-                self._abandoned.set()
-                self._spins.abandon()
+                self.abandon()
             tracker.join()
             self._spins.join()
             self.stream.join()
@@ -205,6 +204,29 @@ class LiveRun:
     def stop(self) -> None:
         """Have the run end after what has come so far."""
         self.stream.stop()
+
+    def abandon(self) -> None:
+        """Have the run end at once, with what is answered so far."""
+        self._abandoned.set()
+        self.stop()
+        self._spins.abandon()
+
+    def end(self) -> None:
+        """Have the run end after what has come so far; at once where it does already."""
+        if self.is_ending:
+            self.abandon()
+        else:
+            self.stop()
+
+    @property
+    def is_ending(self) -> bool:
+        """Whether it ends after what has come so far, as `stop` has it, or as no more comes."""
+        return self.stream.is_stopped and not self._abandoned.is_set()
+
+    @property
+    def shots_waiting(self) -> int:
+        """Number of the shots so far, as the tracker has them, without their final spin."""
+        return self._spins.shots_waiting
 
     @property
     def needed_since(self) -> tuple[int, int] | None:

@@ -115,6 +115,18 @@ class SpinProcess:
             return self._kept[-1].number + 1 - self._done if self._kept else 0
 
     @property
+    def shots_waiting(self) -> int:
+        """Number of shots in the messages without their final answers."""
+        shots, segment = set[tuple[int, int]](), 0
+        with self._changed:
+            for one in self._kept:
+                if isinstance(one.message, SegmentStart):
+                    segment = one.number  # numbers of shots begin anew with it
+                elif one.message is not None and one.number >= self._done:
+                    shots |= {(segment, ball.shot) for ball in one.message.tick.track.balls}
+        return len(shots)
+
+    @property
     def unanswered(self) -> TrackedTick | None:
         """The oldest tick without its final answers."""
         with self._changed:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
+from ..terminal import ends_on_signals
 from .headless import LiveObserver, OpenLive
 
 
@@ -68,9 +69,11 @@ class CameraThread(threading.Thread):
             self._observer.end(self._error)
 
     def end(self) -> None:
-        """Stop the run and wait for it; raises what ended it."""
+        """Stop the run and wait for it, at Ctrl-C not for its spins; raises what ended it."""
         if self._observer.is_open:
-            self._observer.opened.run.stop()
-            self.join()
+            run = self._observer.opened.run
+            run.stop()
+            with ends_on_signals(run.end):
+                self.join()
         if self._error is not None:
             raise self._error

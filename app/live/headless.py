@@ -12,7 +12,7 @@ from spinscope.pipeline.cameras import ArrivedTick, EventCamera, EventStream, No
 from spinscope.pipeline.cameras.event_stream import Sink
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.live import LiveRun, load_kernels
-from spinscope.pipeline.live_outputs import LiveBall, LiveNotice, LiveOutput, LiveShot, LiveSpin
+from spinscope.pipeline.live_outputs import LiveBall, LiveNotice, LiveOutput, LiveShot, LiveSpin, LiveStatus
 from spinscope.pipeline.result_rows import ResultRow
 from spinscope.pipeline.session import Choices, Session
 from spinscope.pipeline.tick import Tick
@@ -199,12 +199,17 @@ def run_headless(
             observer.begin(live)
         if table is not None:
             at_end.callback(table.close)
-        with ends_on_signals(run.stop):
+        said: str | None = None
+        with ends_on_signals(run.end):
             for one in run.outputs():
                 of_shot = (session.camera, session.ball_radius_m) if isinstance(one, LiveShot) else ()
                 line = one.to_dict(*of_shot)
                 if isinstance(one, LiveNotice):
                     note(one.text)
+                words = _ending_words(run, one) if isinstance(one, LiveStatus) and run.is_ending else None
+                if words is not None and words != said:
+                    note(words)
+                    said = words
                 if server is not None:
                     server.send(line)
                 if lines is not None and not _is_of_every_tick(one):
@@ -217,6 +222,8 @@ def run_headless(
                     observer.add_output(one, row)
                 if sweep is not None and sweep.done.is_set():
                     run.stop()
+        if run.shots_waiting:
+            note(f"ended without the spins of {_shots(run.shots_waiting)}")
         if sweep is not None and to.sweep is not None:
             _write_sweep(sweep.sweep, lines, to.sweep.figure)
     if table is not None:
@@ -237,6 +244,18 @@ def _write_sweep(sweep: BiasSweep, lines: JsonLines | None, figure: Path | None)
         lines.write({"proposed": {"name": sweep.name, "value": value, "text": words}})
     if figure is not None:
         write_sweep_figure(sweep, value, figure)
+
+
+def _ending_words(run: LiveRun, status: LiveStatus) -> str | None:
+    """What an end waits for, None where it waits for nothing."""
+    waited_for = [f"the spins of {_shots(run.shots_waiting)}"] if run.shots_waiting else []
+    if status.backlog_ms:
+        waited_for.insert(0, f"the tracker, which is {status.backlog_ms / 1e3:.1f} s behind")
+    return f"ending: waits for {' and '.join(waited_for)}; Ctrl-C ends it at once" if waited_for else None
+
+
+def _shots(count: int) -> str:
+    return "a shot" if count == 1 else f"{count} shots"
 
 
 def _is_of_every_tick(one: LiveOutput) -> bool:

@@ -132,6 +132,11 @@ class EventStream:
         """Have it stop reading; the ticks so far can still be taken."""
         self._stop.set()
 
+    @property
+    def is_stopped(self) -> bool:
+        """Whether it was told to stop."""
+        return self._stop.is_set()
+
     def set_biases(self, biases: Mapping[str, int]) -> int:
         """Have the reading thread change biases before its next read; what goes wrong becomes a notice.
 

@@ -15,9 +15,13 @@ from pathlib import Path
 import pyarrow.parquet
 import pytest
 
+from spinscope.app.terminal import ends_on_signals
+from spinscope.pipeline.recordings import open_recording
+
 SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 PATIENCE_S = 300.0  # the first run on a machine compiles the kernels
 REPLAY = ("--replay", "sample_recordings/own/rally.h5", "--loop", "--method", "triplet")
+BOUNCE, ROUND_MS = "sample_recordings/own/bounce.h5", 500  # of it and the gap behind it
 PAGES = {
     "tune": ("tune", "sample_recordings/spinner_ball2_side.h5", "--no-browser", "--port", "0"),
     "view": ("view", "sample_recordings/spinner_ball2_side.h5", "--no-browser", "--port", "0"),
@@ -88,6 +92,60 @@ def test_a_watched_camera_s_table_is_whole(one: signal.Signals, tmp_path: Path) 
     rows = pyarrow.parquet.read_table(table).to_pylist()
     assert len(rows) >= 2 and rest[-1].startswith(f"{len(rows)} shots in {table}")
     assert all((tmp_path / row["events_file"]).is_file() for row in rows)
+
+
+def spins_of(process: int) -> int:
+    """The process of the spins that another one has started (Linux)."""
+    for folder in Path("/proc").iterdir():
+        with suppress(OSError, ValueError):
+            parent = (folder / "stat").read_text().rpartition(")")[2].split()[1]
+            if int(parent) == process and "live_spins" in (folder / "cmdline").read_text():
+                return int(folder.name)
+    raise AssertionError("there is none")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+@pytest.mark.parametrize("name", ["watch", "live"])
+def test_an_end_says_what_it_waits_for_and_comes_at_once_when_asked_for_again(name: str, tmp_path: Path) -> None:
+    """With a process of the spins that stands still, so that they never come."""
+    table, raw, jsonl = tmp_path / "day.csv", tmp_path / "day.raw", tmp_path / "lines.jsonl"
+    command = ("watch", str(table)) if name == "watch" else ("live", "--no-browser", "--port", "0")
+    outputs = "--record", str(raw), "--jsonl", str(jsonl)
+    with program(*command, "--replay", BOUNCE, "--loop", "--method", "triplet", *outputs) as (process, lines):
+        next(line for line in lines if line.startswith("shot 2"))
+        os.kill(spins_of(process.pid), signal.SIGSTOP)
+        while '"spin_backlog_ms":' not in (last := jsonl.read_text().rpartition('{"status"')[2]) or (
+            float(last.partition('"spin_backlog_ms":')[2].split(",")[0]) < ROUND_MS
+        ):
+            time.sleep(0.1)
+        os.killpg(process.pid, signal.SIGINT)
+        said = next(line for line in lines if line.startswith("ending") or "Traceback" in line)
+        assert "shots; Ctrl-C ends it at once" in said
+        told_again_and_again(process, [signal.SIGINT])
+        rest = list(lines)
+    assert process.returncode == 0 and not any("Traceback" in line for line in rest), rest
+    assert any(line.startswith("ended without the spins of ") for line in rest)
+    if name == "watch":
+        rows = table.read_text().splitlines()
+        assert len(rows) >= 3 and rest[-1].startswith(f"{len(rows) - 1} shots in {table}")
+    assert open_recording(raw).read().t_us.size > 0
+
+
+def test_signals_of_one_request_are_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As when a shell hands on what the terminal has sent already."""
+    now_s, asked = [100.0], list[float]()
+    monkeypatch.setattr("spinscope.app.terminal.time.monotonic", lambda: now_s[0])
+    before = {one: signal.getsignal(one) for one in SIGNALS}
+    try:
+        with ends_on_signals(lambda: asked.append(now_s[0])):
+            for now_s[0] in (100.0, 100.01, 100.4, 101.0, 101.01):
+                for one in SIGNALS:
+                    signal.raise_signal(one)
+        signal.raise_signal(signal.SIGINT)  # nothing comes of it any more
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+    assert asked == [100.0, 101.0]
 
 
 def test_an_end_asked_for_while_it_starts_is_an_end(tmp_path: Path) -> None:
