@@ -24,7 +24,7 @@ from spinscope.pipeline.tick import Tick
 
 from ..tuning.bias_sweep import BiasRange, BiasState, BiasSweep
 from ..viewer import entities
-from ..web.live_schemas import LiveRecording, LiveSecond, LiveShotRow, LiveView
+from ..web.live_schemas import LiveRecording, LiveSecond, LiveShotRow, LiveView, NumberedNotice
 from .camera_sweep import CameraSweep, proposal_words, swept_biases
 from .camera_thread import CameraObserver
 from .event_rates import EventRateMeter
@@ -66,7 +66,8 @@ class CameraView(CameraObserver):
         self._meter = EventRateMeter()
         self._seconds: deque[LiveSecond] = deque(maxlen=SECONDS_SHOWN)
         self._shots: dict[tuple[int, int], LiveShotRow] = {}  # by number and end: numbers begin anew after a gap
-        self._notices: deque[str] = deque(maxlen=NOTICES_SHOWN)
+        self._notices: deque[NumberedNotice] = deque(maxlen=NOTICES_SHOWN)
+        self._fault: str | None = None  # why no events come
         self._latencies_ms: dict[str, float] = {}
         self._sweep: CameraSweep | None = None
         self._windows: deque[Path] = deque()
@@ -101,7 +102,11 @@ class CameraView(CameraObserver):
             if isinstance(output, LiveStatus):
                 self._add_second(output)
             elif isinstance(output, LiveNotice):
-                self._notices.append(output.text)
+                self._add_notice(output.text)
+                if output.kind in ("unplugged", "stall"):
+                    self._fault = output.text
+                elif output.kind == "back":
+                    self._fault = None
             elif isinstance(output, LiveSpin) and output.ended_by is not None:
                 self._latencies_ms["announced"] = output.latency_ms
                 key, text = (output.shot, output.t_us), _words(output)
@@ -116,7 +121,7 @@ class CameraView(CameraObserver):
     def end(self, error: Exception | None) -> None:
         """Take note that the camera has ended."""
         if error is not None:
-            self._notices.append(str(error))
+            self._add_notice(str(error))
         self._is_running = False
         self.has_events.set()
         super().end(error)
@@ -145,6 +150,10 @@ class CameraView(CameraObserver):
             )
         )
 
+    def _add_notice(self, text: str) -> None:
+        number = self._notices[-1].number + 1 if self._notices else 1
+        self._notices.append(NumberedNotice(number=number, text=text))
+
     def _add_shot(self, key: tuple[int, int], row: LiveShotRow) -> None:
         known = self._shots.get(key)
         if known is None or not known.is_final:
@@ -164,6 +173,7 @@ class CameraView(CameraObserver):
             return LiveView(
                 camera=f"{camera.name} {camera.serial}",
                 is_running=self._is_running,
+                fault=self._fault,
                 kept_s=0.0 if span is None else (span[2] - span[1]) * 1e-6,
                 seconds=list(self._seconds),
                 shots=list(self._shots.values())[::-1],

@@ -99,15 +99,23 @@ class LiveMarkerRequest(Request):
     seconds_ago: float = Field(ge=0.0, le=3600.0, allow_inf_nan=False)
 
 
+class NumberedNotice(Response):
+    """Incident of a running camera in words, with its number from the start: the same may happen again."""
+
+    number: int
+    text: str
+
+
 class LiveView(Response):
-    """Running camera as the page shows it."""
+    """Running camera as the page shows it; `fault` is why no events come from it at present, in words."""
 
     camera: str
     is_running: bool
+    fault: str | None
     kept_s: float
     seconds: list[LiveSecond]
     shots: list[LiveShotRow]
-    notices: list[str]
+    notices: list[NumberedNotice]
     recording: LiveRecording | None
 
 

@@ -24,7 +24,7 @@ RETRY_S = 0.5  # between two attempts to open a camera that was unplugged
 LARGEST_JUMP_US = 60_000_000
 # Nothing at all from a camera for so long is said. Before its first event it may be dark, or just have been opened.
 LONGEST_SILENCE_S, LONGEST_FIRST_SILENCE_S = 0.4, 2.0
-SAID_US = 10_000_000  # between two notices of a fault that goes on, by the camera's clock
+SAID_US = 10_000_000  # between two notices of a fault that goes on
 
 Sink = Callable[[int, EventBatch], None]  # number of the clock and events, from the reading thread
 NoticeKind = Literal["unplugged", "back", "clock", "behind", "biases", "recording", "spins", "stall", "size", "lost"]
@@ -219,26 +219,28 @@ class EventStream:
         self._silent_s += seconds
         is_over = self._end_us is None or packet.end_us != self._end_us
         most_s = LONGEST_FIRST_SILENCE_S if self._next_us is None else LONGEST_SILENCE_S
-        if self._is_silence_said and is_over:
-            self._on_notice("back", f"the camera sends again, after {self._silent_s:.1f} s")
-        elif self._silent_s > most_s and not self._is_silence_said:
+        if self._silent_s > most_s:
             where = "its cable" if self._next_us is not None else "its lens cap, its cable"
-            self._say_fault(
+            # By this computer's clock: the camera's stands still.
+            self._is_silence_said |= self._say_fault(
                 "stall",
-                self._end_us or 0,
+                round(now_s() * 1e6),
                 f"nothing came from the camera for {self._silent_s:.1f} s: look at {where} and what else keeps this "
                 "computer busy",
             )
-            self._is_silence_said = True
         if is_over:
+            if self._is_silence_said:
+                self._on_notice("back", f"the camera sends again, after {self._silent_s:.1f} s")
             self._silent_s, self._is_silence_said = 0.0, False
 
-    def _say_fault(self, kind: NoticeKind, end_us: int, text: str) -> None:
-        """Say a fault of the camera, not with every packet that has it."""
+    def _say_fault(self, kind: NoticeKind, now_us: int, text: str) -> bool:
+        """Say a fault of the camera, not each time that it shows; whether it was said."""
         said_us = self._said_us.get(kind)
-        if said_us is None or not 0 <= end_us - said_us < SAID_US:
-            self._said_us[kind] = end_us
-            self._on_notice(kind, text)
+        if said_us is not None and 0 <= now_us - said_us < SAID_US:
+            return False
+        self._said_us[kind] = now_us
+        self._on_notice(kind, text)
+        return True
 
     def _take(self, packet: CameraPacket) -> None:
         """Take a packet of the camera: hand it to the sinks, and cut it into ticks."""

@@ -30,7 +30,7 @@ from spinscope.pipeline.biases import BiasParameters
 from spinscope.pipeline.cameras import CameraOptions, RecentEvents
 from spinscope.pipeline.errors import CameraError, RecordingError
 from spinscope.pipeline.events import EventBatch
-from spinscope.pipeline.live_outputs import LiveShot
+from spinscope.pipeline.live_outputs import LiveNotice, LiveShot
 from spinscope.pipeline.recordings import open_recording
 from spinscope.pipeline.registry import Parameters
 from spinscope.pipeline.session import Session
@@ -200,6 +200,11 @@ def _check_view(live: CameraView, bounce: Session) -> None:
     assert biases.values == biases.ranges == {} and not biases.known and not biases.swept
     with pytest.raises(RecordingError, match="the camera has ended"):
         live.set_recording(True)
+    for kind, fault in (("stall", "silent"), ("back", None), ("unplugged", "gone"), ("clock", "gone"), ("back", None)):
+        live.add_output(LiveNotice(kind, fault or "here"), None)  # type: ignore[arg-type]
+        assert live.view().fault == fault
+    numbers = [one.number for one in live.view().notices]
+    assert numbers == list(range(numbers[0], numbers[0] + 5))
     other = bounce.parameters.with_assignments(["logo.pad_px=6"])
     live.take_parameters(other)
     assert live.opened.run.parameters is other and live.opened.session.parameters is other

@@ -54,8 +54,7 @@ export class Live {
   /** @type {LiveRecording | null} */
   recording = null;
   marked_ms = 0;
-  /** @type {string[]} */
-  #told = [];
+  #told = 0; // number of the last notice that was shown
 
   /**
    * @param {any} parent
@@ -95,6 +94,7 @@ export class Live {
       attempt(() => this.#mark());
     });
     this.recorded = element("p.note", { role: "status" });
+    this.fault = element("p.fault", { role: "status", hidden: true });
     this.state = element("p.note", { role: "status" });
     this.shots = element("div.shots", { "aria-label": "Shots so far" });
     this.plots = element("div");
@@ -105,6 +105,7 @@ export class Live {
       element("div.row", {}, this.record),
       this.markers,
       this.recorded,
+      this.fault,
       this.state,
       this.shots,
       this.plots,
@@ -197,7 +198,7 @@ export class Live {
     }
   }
 
-  #show(/** @type {LiveView} */ { camera, is_running, kept_s, seconds, shots, notices, recording }) {
+  #show(/** @type {LiveView} */ { camera, is_running, fault, kept_s, seconds, shots, notices, recording }) {
     const now = seconds.at(-1);
     const parts = [is_running ? camera : `${camera} has ended`];
     if (now) {
@@ -213,8 +214,10 @@ export class Live {
     }
     parts.push(`${kept_s.toFixed(0)} s kept`);
     this.state.textContent = parts.join(" · ");
-    for (const text of notices) if (!this.#told.includes(text)) notice(text, "warning", 12);
-    this.#told = notices;
+    this.fault.textContent = (is_running && fault) || "";
+    this.fault.hidden = !this.fault.textContent;
+    for (const { number, text } of notices) if (number > this.#told) notice(text, "warning", 12);
+    this.#told = notices.at(-1)?.number ?? 0;
     this.#showRecording(recording);
     if (this.isPaused) return;
     this.shots.replaceChildren(...shots.map((shot) => this.#row(shot)));

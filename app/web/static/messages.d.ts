@@ -71,8 +71,8 @@ export type LiveRecordingRequest = { is_on: boolean };
 export type LiveSecond = { t_s: number; rate_mev_s: number; p50_ms: number | null; p99_ms: number | null; announced_ms: number | null; final_ms: number | null; dropped: number; outside: number; late: number; skipped: number; backlog_ms: number; spin_backlog_ms: number; noise_on_hz: number | null; noise_off_hz: number | null; ball_on_hz: number | null; ball_off_hz: number | null };
 /** A shot that has ended, in words; `recording` has its events as soon as its spin is final. */
 export type LiveShotRow = { text: string; is_final: boolean; recording: string | null };
-/** Running camera as the page shows it. */
-export type LiveView = { camera: string; is_running: boolean; kept_s: number; seconds: LiveSecond[]; shots: LiveShotRow[]; notices: string[]; recording: LiveRecording | null };
+/** Running camera as the page shows it; `fault` is why no events come from it at present, in words. */
+export type LiveView = { camera: string; is_running: boolean; fault: string | null; kept_s: number; seconds: LiveSecond[]; shots: LiveShotRow[]; notices: NumberedNotice[]; recording: LiveRecording | null };
 /** Recording of the last seconds: its name in the folder. */
 export type LiveWindow = { recording: string };
 /** Save the last seconds as a recording of its own. */
@@ -85,6 +85,8 @@ export type MetricInfo = { name: string; label: string; unit: string; help: stri
 export type Names = { player: string | null; wing: string | null; stroke: string | null; drill: string | null };
 /** Set names, marks, or that shots are deleted; what is not given stays. */
 export type NamesRequest = { ids: number[]; values: Record<string, string | boolean | null> };
+/** Incident of a running camera in words, with its number from the start: the same may happen again. */
+export type NumberedNotice = { number: number; text: string };
 /** Open a session on a recording of the folder; None for the one the program was started with. */
 export type OpenRequest = { recording?: string | null };
 /** Everything that the page needs to know at first; without `tools` it shows the viewer alone, `tab` in front. */

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from spinscope.app.tuning.bias_sweep import BiasRange, BiasState, BiasSweep, BiasSweepPoint, SweptBias
-from spinscope.app.web.live_schemas import LiveRecording, LiveSecond, LiveShotRow, LiveView
+from spinscope.app.web.live_schemas import LiveRecording, LiveSecond, LiveShotRow, LiveView, NumberedNotice
 from spinscope.pipeline.errors import CameraError, RecordingError
 from spinscope.pipeline.registry import Parameters
 
@@ -26,7 +26,8 @@ class StandIn:
 
     def __init__(self, window: Path) -> None:
         self.locked: str | None = None
-        self.notices: list[str] = []
+        self.notices: list[NumberedNotice] = []
+        self.fault: str | None = None
         self.window, self.asked = window, list[object]()
         self.recording: LiveRecording | None = None
 
@@ -37,6 +38,7 @@ class StandIn:
         return LiveView(
             camera="stand-in 1",
             is_running=True,
+            fault=self.fault,
             kept_s=3.0,
             seconds=seconds,
             shots=shots,
@@ -133,8 +135,13 @@ def test_the_buttons_of_the_panel(browser: Any, running: tuple[Served, StandIn])
     tab.open(made.address)
     panel = tab.panel("Live camera")
     panel.get_by_text("2 packets lost by the camera").wait_for()
-    live.notices = ["unplugged"]
-    tab.page.locator("#notices").get_by_text("unplugged").wait_for()
+    live.fault = "pulled out"
+    panel.get_by_text("pulled out").wait_for()
+    live.fault = None
+    panel.get_by_text("pulled out").wait_for(state="hidden")
+    for number in (1, 2):  # the same happens again
+        live.notices = [NumberedNotice(number=number, text="unplugged")]
+        tab.page.locator("#notices").get_by_text("unplugged").click()  # closes it
     assert panel.locator("svg path").count() == 8
     tab.until("document.querySelector('img.live').naturalWidth === 64")
     panel.get_by_text("Pause").click()

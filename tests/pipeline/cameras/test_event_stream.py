@@ -120,7 +120,7 @@ def test_a_camera_that_sends_nothing_is_said_with_when_it_sends_again(monkeypatc
     class Slow(ListedPackets):
         def read(self) -> CameraPacket | None:
             packet = super().read()
-            now_s[0] += 0.05 if packet is None or packet.end_us != 15_677_000 else 0.6
+            now_s[0] += 0.6 if packet is not None and packet.end_us == 15_677_000 else 0.3
             return packet
 
     nothing = [CameraPacket(EventBatch.empty(), 500) for _ in range(19)]
@@ -130,9 +130,27 @@ def test_a_camera_that_sends_nothing_is_said_with_when_it_sends_again(monkeypatc
         Slow([CameraPacket(at(500), 500), *nothing, *still, *late]),
         on_notice=lambda kind, text: notices.append((kind, text)),
     )
-    assert [kind for kind, _ in notices] == ["stall", "back", "stall"]
-    assert "for 0.4 s: look at its cable" in notices[0][1] and "after 1.0 s" in notices[1][1]
-    assert "for 0.6 s" in notices[2][1]
+    assert [kind for kind, _ in notices] == ["stall", "back"] * 2
+    assert "for 0.6 s: look at its cable" in notices[0][1] and "after 6.0 s" in notices[1][1]
+    assert "for 0.6 s" in notices[2][1] and "after 0.6 s" in notices[3][1]
+
+
+def test_a_camera_that_falls_silent_again_is_said_as_long_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its clock stands still meanwhile. A short pause soon after another is not said."""
+    now_s, notices = [0.0], list[tuple[str, str]]()
+    monkeypatch.setattr("spinscope.pipeline.cameras.event_stream.now_s", lambda: now_s[0])
+
+    class Dying(ListedPackets):
+        def read(self) -> CameraPacket | None:
+            now_s[0] += 0.5
+            return super().read()
+
+    given = [CameraPacket(at(100 * n), 100 * n) for n in range(1, 5)]
+    dead = [CameraPacket(EventBatch.empty(), 400) for _ in range(43)]
+    ticks_of(Dying([*given, *dead]), on_notice=lambda kind, text: notices.append((kind, text)))
+    said = ["nothing came from the camera for 0.5 s", "the camera sends again, after 0.5 s"]
+    said += [f"nothing came from the camera for {seconds} s" for seconds in ("9.0", "19.0")]
+    assert [text.partition(":")[0] for _, text in notices] == said
 
 
 def test_wrong_sizes_and_lost_packets_are_said_once_in_a_while() -> None:
