@@ -137,6 +137,8 @@ class BallUncertainty:
         Of the centre (one axis) and the radius, as constant errors over the stretch.
     track_std_px, drift_std_px_s : float
         Of the centre's changes within the stretch, and the most it can drift.
+    latency_std_px : float
+        What the centre moves in the time by which the logo's events come sooner or later than one another.
     speed_px_s : float
         Speed of the centre itself (no uncertainty): what an edge moves with besides the spin.
     """
@@ -145,6 +147,7 @@ class BallUncertainty:
     radius_std_px: float
     track_std_px: float = 0.0
     drift_std_px_s: float = 0.0
+    latency_std_px: float = 0.0
     speed_px_s: float = 0.0
 
 
@@ -170,6 +173,8 @@ class ContrastEstimate:
         Score per event less that of permuted times; 0 = no pattern turns with the spin.
     patch_rad : float
         See `SphereEvents`.
+    linked_share : float
+        Length of the stretch over which events of the logo confirm each other with this spin, over that of all of them.
     """
 
     spin_rps: Floats | None
@@ -184,6 +189,7 @@ class ContrastEstimate:
     offsets_px: Floats = field(default_factory=lambda: np.zeros(3))
     contrast: float = 0.0
     patch_rad: float = 0.0
+    linked_share: float = 1.0
 
     @property
     def turns(self) -> float:

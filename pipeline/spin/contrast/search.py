@@ -1,4 +1,4 @@
-"""Maximisation of the contrast score: a grid search over all spins, Newton's method, and the covariance at a maximum.
+"""Maximisation of the contrast score: a grid search over all spins, and Newton's method.
 
 A spin of m rps turns the ball by a given part of a turn within segments of that part / m seconds. Scored over such
 segments, every speed needs the same grid of directions and the same ratio from one magnitude to the next, and all
@@ -19,8 +19,17 @@ import numpy as np
 
 from ...kernels.arrays import Floats, Integers
 from ...kernels.order_statistics import median
-from .events import BallUncertainty, ContrastSettings, EventColumns, SphereEvents, segmented_window
-from .score import CELLS_PER_SIGMA, TURN, Objective, changed_spin, difference_steps, score, scores_near, spin_axes
+from .events import EventColumns, segmented_window
+from .score import (
+    CELLS_PER_SIGMA,
+    TURN,
+    Objective,
+    changed_spin,
+    difference_steps,
+    score,
+    scores_near,
+    spin_axes,
+)
 
 SLOWEST_RPS = 3.0
 # First pass: over a fifth of a turn, neighbours in a grid of 64 directions (0.44 rad) and of magnitudes 1.4 apart
@@ -45,22 +54,6 @@ SHARED = 0.15
 CURVATURE_TRUST = 2.0
 LEAST_CURVATURE = 1.0  # usual ones are 1 to 4 times the gradient's covariance
 NO_OFFSETS = np.zeros(0)
-# What the model lacks (the logo's blurred edges look different from each side) leaves errors that more events do not
-# lessen, as parts of the kernel: of the axis, and of the place on the ball over the stretch's spread in time, which is
-# a larger turn the nearer the logo is to the axis. From the errors of two simulators' balls with exact tracks.
-AXIS_FLOOR, TURN_FLOOR = 0.3, 0.036
-# Where the camera looks at the surface at less than this cosine (60 degrees, 2.2 px inside a 16.5 px ball's outline) a
-# blurred edge is that much farther off on the ball, and its axis is stated as less certain, at most by MOST_OBLIQUE.
-RIM_COSINE, MOST_OBLIQUE = 0.5, 5.0
-TRACK_MEMORY_S = 0.01  # over which a track's errors hang together: two steps of the Kalman filter
-# Refining leaves so much of the offsets' error: 0.43, 0.37 and 0.52 of 0.5 px on 87 spinners, less where the spin
-# depends on it.
-REFINED = 0.65
-# An edge gives events as far as it lies across its motion in the image. A ball that flies fast moves all edges the same
-# way: whatever turns about the logo's own middle, the edges seen keep their direction, and the spin's part along the
-# middle's normal is found too small. Its relative error over the turns seen: 0.37, 0.16, 0.16, 0.12 and 0.07 (rms)
-# at 0.15, 0.28, 0.42, 0.6 and 0.8 turns of 250 windows of our simulator's flights, nothing of it on the spinner.
-TWIST = 0.06
 
 
 def spread_directions(count: int) -> Floats:
@@ -338,142 +331,3 @@ def maximise_each(objective: Objective, spins_rad_s: Floats, iterations: int) ->
         maxima[k, 0], maxima[k, 1], maxima[k, 2] = best[0], best[1], best[2]
         values[k] = scores_near(shares[k : k + 1], objective, maxima[k], none, here)[0]
     return maxima, values, shares
-
-
-class Stretch(NamedTuple):
-    """Number of events in a stretch of time, its middle and its length."""
-
-    events: int
-    reference_s: float
-    span_s: float
-
-
-def view_cosine(events: SphereEvents) -> Floats:
-    """Cosine (n,) of the angle at which the camera looks at the surface: 1 in the middle of the disc, 0 at its rim."""
-    cosine: Floats = -np.sum(events.normals * events.facing, axis=0)
-    return cosine
-
-
-def spin_covariance(
-    objective: Objective,
-    model: LocalModel,
-    events: SphereEvents,
-    ball: BallUncertainty,
-    settings: ContrastSettings,
-    stretch: Stretch,
-) -> Floats:
-    """Covariance (3, 3) of the spin, rad^2/s^2, at the maximum that `model` was made at.
-
-    `events` are those of the objective, thinned from those of the stretch.
-    """
-    spin = model.spin_rad_s
-    squared = float(spin @ spin)
-    along = np.outer(spin, spin) / squared
-    covariance = _sandwich(objective, model, settings.repeats * len(events) / stretch.events)
-    columns = events.normals, events.facing, events.radius_px, events.t_s
-    cosine, spread_s, lever, drift = _seen_of_turn(columns, objective.slopes, spin / math.sqrt(squared))
-    covariance += _drift_px_s(ball, stretch.span_s) ** 2 * drift
-    oblique = max(1.0, RIM_COSINE / max(cosine, RIM_COSINE / MOST_OBLIQUE))
-    covariance += (AXIS_FLOOR * settings.sigma_rad * oblique) ** 2 * squared * (np.eye(3) - along)
-    covariance += (TURN_FLOOR * settings.sigma_rad / (max(spread_s, 1e-5) * lever)) ** 2 * along
-    return covariance + _twist(events, ball, spin, stretch.span_s)
-
-
-def _sandwich(objective: Objective, model: LocalModel, repeats: float) -> Floats:
-    """The events' noise and the ball's place, (3, 3) rad^2/s^2.
-
-    An event's part of the gradient is twice the slope of its own share (it also is the neighbour of its neighbours):
-    M = 4 repeats sum d_i d_i', with `repeats` events of one edge that tell the same. With A the score's curvature the
-    events' noise gives A_ww^-1 M_ww A_ww^-1 (w: the spin). A ball that is d off its assumed place moves the maximum
-    by -A_ww^-1 A_wp d; d has nearly the prior's covariance (REFINED), although offsets were refined with the spin:
-    refining improves the spin, but the refined offsets are themselves hardly nearer to the truth.
-    """
-    inverse = np.linalg.inv(model.curvature[:3, :3])
-    by_place = inverse @ model.curvature[:3, 3:] * (REFINED * objective.prior_px / model.steps[3:])
-    whole = 4.0 * repeats * inverse @ model.scatter[:3, :3] @ inverse + by_place @ by_place.T
-    back = spin_axes(model.spin_rad_s).T * model.steps[:3]
-    covariance: Floats = back @ whole @ back.T
-    return covariance
-
-
-def _drift_px_s(ball: BallUncertainty, span_s: float) -> float:
-    """Speed, px/s, by which the tracked centre drifts over the ball.
-
-    A track that is off by its sigma, anew every TRACK_MEMORY_S, looks like a ramp of sqrt(12) sigma over the stretch,
-    less so the more often its errors change.
-    """
-    changes = max(span_s / TRACK_MEMORY_S, 1.0)
-    ramp_px_s = math.sqrt(12.0 / changes) * ball.track_std_px / max(span_s, 1e-6)
-    return min(ball.drift_std_px_s, ramp_px_s)
-
-
-@numba.njit(cache=True, nogil=True)
-def _seen_of_turn(
-    events: tuple[Floats, Floats, Floats, Floats], slopes: Floats, axis: Floats
-) -> tuple[float, float, float, Floats]:
-    """Properties of events by which a turn about an axis (3,) is seen, and what a drift of the centre adds to it.
-
-    Parameters
-    ----------
-    events : tuple of (3, n), (3, n), (n,) and (n,) float64
-        Normals, facing, radius and time, as in `SphereEvents`.
-    slopes : (3, 3, n) float64
-        Their `offset_slopes`.
-
-    Returns
-    -------
-    cosine, spread_s, lever : float
-        Mean cosine of the view, standard deviation of the times, and root mean square of the distance from the axis.
-    drift : (3, 3) float64
-        Covariance (rad/s)^2 of the spin where the centre drifts by 1 px/s. Across the spin's axis that is a turn about
-        an axis in the image; about the axis itself the turn that fits how far each event's place on the ball is shifted
-        (`offset_slopes`), in the sense of least squares: a pixel is more of the ball at the rim, and more of a turn
-        near the axis. (Within less than a turn the axis takes a part of it; that much too large an error is stated
-        then.)
-    """
-    normals, facing, radius_px, t_s = events
-    n = t_s.size
-    mean_s, cosine, radius, towards = 0.0, 0.0, 0.0, np.zeros(3)
-    for i in range(n):
-        mean_s += t_s[i] / n
-        radius += radius_px[i] / n
-        for k in range(3):
-            cosine -= normals[k, i] * facing[k, i] / n
-            towards[k] += facing[k, i] / n
-    variance, square, weighted, turns = 0.0, 0.0, 0.0, np.zeros(2)
-    for i in range(n):
-        squared_s2 = (t_s[i] - mean_s) ** 2
-        nx, ny, nz = normals[0, i], normals[1, i], normals[2, i]
-        # The event's speed on the ball, in radii a second, for one rad/s more about the axis.
-        x, y, z = axis[1] * nz - axis[2] * ny, axis[2] * nx - axis[0] * nz, axis[0] * ny - axis[1] * nx
-        lever2 = x * x + y * y + z * z
-        variance += squared_s2 / n
-        square += lever2 / n
-        weighted += squared_s2 * lever2
-        for k in range(2):
-            turns[k] += (slopes[k, 0, i] * x + slopes[k, 1, i] * y + slopes[k, 2, i] * z) * squared_s2
-    about_axis = (turns[0] ** 2 + turns[1] ** 2) / max(weighted, 1e-18) ** 2
-    length = math.sqrt(towards[0] ** 2 + towards[1] ** 2 + towards[2] ** 2)
-    along = (towards[0] * axis[0] + towards[1] * axis[1] + towards[2] * axis[2]) / length
-    drift = np.empty((3, 3))
-    for p in range(3):
-        for q in range(3):
-            view_p, view_q = towards[p] / length - along * axis[p], towards[q] / length - along * axis[q]
-            across = (1.0 if p == q else 0.0) - axis[p] * axis[q] - view_p * view_q
-            drift[p, q] = across / radius**2 + about_axis * axis[p] * axis[q]
-    return cosine, math.sqrt(variance), math.sqrt(square), drift
-
-
-def _twist(events: SphereEvents, ball: BallUncertainty, spin_rad_s: Floats, span_s: float) -> Floats:
-    """The error of the turn about the logo's middle where the flight moves its edges more than the spin does."""
-    speed = float(np.linalg.norm(spin_rad_s))
-    spun_px_s = speed * float(np.mean(events.radius_px))
-    by_flight = ball.speed_px_s / max(ball.speed_px_s + spun_px_s, 1e-9)
-    middle = events.normals.mean(axis=1)
-    middle /= max(float(np.linalg.norm(middle)), 1e-9)
-    turns = max(speed * span_s / (2.0 * math.pi), 1e-3)
-    off = min(TWIST / turns, 1.0) * by_flight * float(spin_rad_s @ middle) * middle
-    # The logo that has come back has told the magnitude, not the axis.
-    axis = spin_rad_s / speed
-    off -= min(max(2.0 * turns - 1.0, 0.0), 1.0) * float(off @ axis) * axis
-    return np.outer(off, off)

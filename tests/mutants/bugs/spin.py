@@ -87,8 +87,26 @@ METHODS = [
 
 CONTRAST = [
     Mutant(
+        "pipeline/spin/contrast/uncertainty.py",
+        "span_s = min(linked_s, stretch.span_s)",
+        "span_s = stretch.span_s",
+        "tests/pipeline/spin/test_contrast_uncertainty.py -k stray",
+    ),
+    Mutant(
+        "pipeline/spin/contrast/uncertainty.py",
+        "if polarity[i] != polarity[j]:",
+        "if polarity[i] > polarity[j]:",
+        "tests/pipeline/spin/test_contrast_uncertainty.py -k coincide",
+    ),
+    Mutant(
         "pipeline/spin/contrast/stage.py",
-        "centre_std_px=max(math.hypot(position, speed * LATENCY_SPREAD_S), 0.01)",
+        "is_sharp and answer.linked_share >= LEAST_LINKED and",
+        "is_sharp and",
+        "tests/pipeline/spin/test_contrast_trust.py -k fit_together",
+    ),
+    Mutant(
+        "pipeline/spin/contrast/stage.py",
+        "centre_std_px=max(math.hypot(position, latency_std_px), 0.01)",
         "centre_std_px=max(position, 0.01)",
         "tests/pipeline/stages/test_contrast_memory.py -k flies_on",
     ),

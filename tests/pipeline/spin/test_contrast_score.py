@@ -30,6 +30,7 @@ from spinscope.pipeline.spin.contrast.events import (
 )
 from spinscope.pipeline.spin.contrast.score import score, take_logarithms
 from spinscope.pipeline.spin.contrast.search import cholesky_solve, distinct
+from spinscope.pipeline.spin.contrast.uncertainty import linked_span_s
 from tests.reference.contrast import dotted_ball, naive_score
 from tests.reference.rotation import turned
 
@@ -265,9 +266,11 @@ def test_a_drifting_track_looks_like_a_turn_in_the_image_across_the_spins_axis()
     events = dotted_ball(SPIN, duration_s=0.01, events=300)
     axis = answer_of(events).spin_rps
     across = np.eye(3) - np.outer(axis, axis) / (axis @ axis)
+    ramp_px = DRIFT_PX_S * linked_span_s(events, 2 * np.pi * axis, ContrastSettings())
     for rising in (
         {"drift_std_px_s": DRIFT_PX_S, "track_std_px": 9.0},
-        {"drift_std_px_s": 9e9, "track_std_px": DRIFT_PX_S / 100 / 12**0.5},  # events span 9.9 ms
+        {"drift_std_px_s": 9e9, "track_std_px": ramp_px / 12**0.5},
+        {"latency_std_px": ramp_px},
     ):
         in_image = (DRIFT_PX_S / 17.0 / (2 * np.pi)) ** 2 * np.diag([1.0, 1.0, 0.0])
         added = across @ drift_covariance(events, **rising) @ across

@@ -42,6 +42,7 @@ RIVALS = {"rivals_rps": np.array([[0.0, 30.0, 0.0], [0.0, 0.0, 9.0]])}
     [
         (SURE, replace(SURE, spin_rps=None, covariance_rps2=None), "200 logo events"),
         (replace(SURE, contrast=0.26), replace(SURE, contrast=0.24), r"sharpens the logo \(0.24 in log likelihood"),
+        (replace(SURE, linked_share=0.41), replace(SURE, linked_share=0.39), "do not fit together"),
         (replace(SURE, patch_rad=0.19), replace(SURE, patch_rad=0.17), "spread over 10 degrees"),
         (
             replace(SURE, margins=np.array([9.0, 1.3]), **RIVALS),
@@ -93,6 +94,18 @@ def rhythm(*spins_rps: float, sigmas: float = 9.0) -> RateResult:
 )
 def test_an_answer_has_one_of_the_rhythms_magnitudes(told: RateResult, misses: bool) -> None:
     assert stage.misses_rhythm(told, SURE) == misses
+
+
+@pytest.mark.parametrize("linked_share", [0.41, 0.39])
+def test_visits_that_do_not_fit_together_tell_no_spin(linked_share: float) -> None:
+    """Neither to contrast nor, by its likelihood, to all witnesses together; their flow is that of one visit."""
+    state = stage.ContrastState({}, parts=[(0, dotted_ball(SPIN))], is_bright=[True])  # type: ignore[arg-type]
+    flow = SpinEstimate("normal_flow", SPIN, np.eye(3), None)
+    answer = replace(SURE, linked_share=linked_share)
+    state.answer, state.reason = answer, stage.doubt(PARAMETERS, answer)
+    estimate, turns_seen, _ = stage._judged(PARAMETERS, state, answer, 600, rhythm(sigmas=0.0), flow)
+    trusted = trusted_method({"normal_flow": flow, "contrast": estimate})
+    assert (turns_seen, trusted) == ((True, "contrast") if linked_share > 0.4 else (False, None))
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,7 +12,7 @@ import pytest
 
 from spinscope.pipeline.results import SpinEstimate
 from spinscope.pipeline.spin.contrast import estimate as contrast
-from spinscope.pipeline.spin.contrast import search
+from spinscope.pipeline.spin.contrast import uncertainty
 from spinscope.pipeline.spin.contrast.estimate import estimate_spin, follow_spin
 from spinscope.pipeline.spin.contrast.events import (
     LOG_ODDS_PER_SIGMA,
@@ -19,8 +20,10 @@ from spinscope.pipeline.spin.contrast.events import (
     BallUncertainty,
     ContrastResult,
     ContrastSettings,
+    SphereEvents,
 )
 from tests.reference.contrast import dotted_ball
+from tests.reference.rotation import turned
 
 BALL = BallUncertainty(centre_std_px=0.2, radius_std_px=0.2)
 SPIN = np.array([40.0, -25.0, 20.0])
@@ -30,7 +33,7 @@ def twist(speed_px_s: float, turns: float) -> np.ndarray:
     spin = 2 * math.pi * SPIN
     events = dotted_ball(SPIN)
     ball = replace(BALL, speed_px_s=speed_px_s)
-    return search._twist(events, ball, spin, turns / float(np.linalg.norm(SPIN)))
+    return uncertainty._twist(events, ball, spin, turns / float(np.linalg.norm(SPIN)))
 
 
 def test_a_fast_flight_leaves_the_turn_about_the_logos_middle_open() -> None:
@@ -48,6 +51,44 @@ def test_the_logo_that_has_come_back_has_told_the_magnitude() -> None:
     assert axis @ twist(10_000.0, 0.4) @ axis > axis @ twist(10_000.0, 0.8) @ axis > 0.0
     once = twist(10_000.0, 1.0)
     assert axis @ once @ axis == pytest.approx(0.0, abs=1e-9) and np.trace(once) > 0.0
+
+
+def linked_share(events: SphereEvents, spin_rps: np.ndarray) -> float:
+    span_s = uncertainty.linked_span_s(events, 2 * math.pi * spin_rps, ContrastSettings())
+    return span_s / uncertainty.even_span_s(events)
+
+
+@pytest.mark.parametrize("spin_rps", [SPIN, 0.6 * SPIN])
+def test_the_linked_span_is_that_of_the_pairs_that_coincide(spin_rps: np.ndarray) -> None:
+    events = dotted_ball(SPIN, duration_s=0.02, events=200)
+    points = turned(events.normals.T, -spin_rps, events.t_s)
+    near = [sum(-0.0025 <= other - at < 0.0025 for other in events.t_s) for at in events.t_s]
+    seen = [row for row in range(200) if near[row] >= 0.05 * max(near)]
+    squares = [1e-10]
+    for i, j in itertools.combinations(seen, 2):
+        if events.polarity[i] == events.polarity[j] and math.acos(min(1.0, points[i] @ points[j])) < 0.08:
+            squares.append((events.t_s[i] - events.t_s[j]) ** 2)
+    span_s = uncertainty.linked_span_s(events, 2 * math.pi * spin_rps, ContrastSettings())
+    assert span_s == pytest.approx(math.sqrt(6 * np.mean(squares)), rel=1e-9)
+
+
+def test_visits_that_a_spin_brings_to_different_places_do_not_confirm_each_other() -> None:
+    """A logo that shows for a fifth of a turn and, two turns later, again; with the spin, and with a slower one."""
+    turn_s = 1.0 / float(np.linalg.norm(SPIN))
+    events = dotted_ball(SPIN, duration_s=2.2 * turn_s, events=1200)
+    visits = events.at(np.abs(events.t_s) > 0.9 * turn_s)
+    assert linked_share(visits, SPIN) > 0.8
+    assert linked_share(visits, 0.8 * SPIN) < 0.3
+
+
+def test_a_stray_event_before_the_logos_visit_does_not_make_it_longer() -> None:
+    visit = dotted_ball(SPIN, duration_s=0.005, events=300)
+    early = replace(visit, t_s=np.concatenate([[-0.05], visit.t_s[1:]]))
+    drifting = replace(BALL, track_std_px=0.2, drift_std_px_s=9e9)
+    plain, strayed = (estimate_spin(one, drifting, ContrastSettings(), starts_rps=SPIN[None]) for one in (visit, early))
+    assert strayed.span_s > 9 * plain.span_s
+    assert np.trace(strayed.covariance_rps2) == pytest.approx(np.trace(plain.covariance_rps2), rel=0.3)
+    assert strayed.linked_share > 0.9
 
 
 def test_polarities_that_disagree_are_stated() -> None:

@@ -13,8 +13,9 @@ from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.results import MethodResult, Packet, SpinEstimate
 from spinscope.pipeline.spin.contrast import ContrastParameters
 from spinscope.pipeline.spin.contrast import stage as contrast
-from spinscope.pipeline.spin.contrast.events import ContrastEstimate
+from spinscope.pipeline.spin.contrast.events import ContrastEstimate, ContrastSettings
 from spinscope.pipeline.spin.contrast.stage import doubt
+from spinscope.pipeline.spin.contrast.uncertainty import linked_span_s
 from spinscope.pipeline.stages import logo, rate
 from spinscope.pipeline.stages.filter import FilterResult
 from tests.reference.contrast import dotted_ball
@@ -65,6 +66,7 @@ def test_a_ball_that_flies_on_while_pixels_wait_is_less_sure_of_its_place() -> N
     uncertainty = contrast._uncertainty(state.ball_stds)
     assert uncertainty.centre_std_px == pytest.approx(0.25)
     assert uncertainty.track_std_px == pytest.approx(0.15)
+    assert uncertainty.latency_std_px == pytest.approx(0.2)
 
 
 def stated(position_std_px: float, velocity_std_px_s: float, radius_std_px: float = 0.05) -> SpinEstimate:
@@ -82,8 +84,11 @@ def stated(position_std_px: float, velocity_std_px_s: float, radius_std_px: floa
 def test_place_and_drift_of_the_track_enter_the_stated_error() -> None:
     sure, drifting, unsure = stated(0.05, 0.0), stated(0.05, 500.0), stated(1.0, 0.0)
     np.testing.assert_allclose(drifting.vector_rps, sure.vector_rps)
-    # A drift looks like a turn about an axis in the image: sqrt(12 / (span / 10 ms)) sigma over the span, per radius.
-    span_s = ticks()[-1].events.t_us[-1] * 1e-6
+    # A drift looks like a turn about an axis in the image: sqrt(12 / (span / 10 ms)) sigma over the linked span.
+    state = contrast.start(ContrastParameters(), CONTEXT)
+    for packet in ticks():
+        contrast.take(ContrastParameters(), state, packet, known_ball(packet.end_us), seen(packet))
+    span_s = linked_span_s(contrast._joined(state), 2 * math.pi * sure.vector_rps, ContrastSettings())
     rate_rps = math.sqrt(12.0 / (span_s / 0.01)) * 0.05 / span_s / known_ball(5000).mean[4] / (2 * math.pi)
     across = np.eye(3) - np.outer(sure.axis, sure.axis)
     added = across @ (drifting.covariance_rps2 - sure.covariance_rps2) @ across
