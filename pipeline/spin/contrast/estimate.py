@@ -30,7 +30,7 @@ from .search import (
     maximise_each,
     spread_directions,
 )
-from .uncertainty import RIM_COSINE, Stretch, even_span_s, linked_span_s, spin_covariance, view_cosine
+from .uncertainty import RIM_COSINE, Stretch, linked_share, spin_covariance, view_cosine
 
 # Magnitudes from 0.45 to 2.2 of a candidate's hold every confusion of n turns with n + 1 (or n - 1), down to half and
 # double; a step is never coarser than a tenth, and never finer than makes SCAN_MAGNITUDES of them.
@@ -316,15 +316,14 @@ def _refined(
     """The estimate around a spin, with the ball's offsets; `events` are thinned from those of the stretch."""
     objective = _with_place(events, ball, settings)
     spin, offsets, sharp, model = maximise(objective, spin_rad_s, offsets_px, iterations)
-    linked_s = linked_span_s(events, spin, settings)
     return ContrastEstimate(
         spin / TURN,
-        spin_covariance(objective, model, events, ball, settings, stretch, linked_s) / TURN**2,
+        spin_covariance(objective, model, events, ball, settings, stretch) / TURN**2,
         *stretch,
         offsets_px=offsets,
         contrast=_contrast(objective, spin, offsets, sharp),
         patch_rad=events.patch_rad,
-        linked_share=linked_s / max(even_span_s(events), 1e-9),
+        linked_share=linked_share(events, spin, settings),
     )
 
 
@@ -364,8 +363,7 @@ def _with_alternatives(
     objective, covariances = _with_place(some, ball, settings), np.empty((len(rivals), 3, 3))
     for k, rival in enumerate(rivals):
         model = local_model(objective, rival, np.zeros(3), 1.0)
-        linked_s = linked_span_s(some, rival, settings)
-        covariances[k] = spin_covariance(objective, model, some, ball, settings, stretch, linked_s) / TURN**2
+        covariances[k] = spin_covariance(objective, model, some, ball, settings, stretch) / TURN**2
     return replace(
         answer,
         covariance_rps2=answer.covariance_rps2 + kept,

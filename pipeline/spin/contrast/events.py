@@ -174,7 +174,7 @@ class ContrastEstimate:
     patch_rad : float
         See `SphereEvents`.
     linked_share : float
-        Length of the stretch over which events of the logo confirm each other with this spin, over that of all of them.
+        Stretch over which the events confirm the spin, as a share of that over which there are events.
     """
 
     spin_rps: Floats | None

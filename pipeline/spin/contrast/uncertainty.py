@@ -57,12 +57,11 @@ def spin_covariance(
     ball: BallUncertainty,
     settings: ContrastSettings,
     stretch: Stretch,
-    linked_s: float,
 ) -> Floats:
     """Covariance (3, 3) of the spin, rad^2/s^2, at the maximum that `model` was made at.
 
-    `events` are those of the objective, thinned from those of the stretch; `linked_s` is `linked_span_s`, without which
-    a spin from one visit of the logo would be stated as if it had been followed since a stray event before it.
+    `events` are those of the objective, thinned from those of the stretch. A stray event before the logo's first visit
+    does not lengthen what it was followed over.
     """
     spin = model.spin_rad_s
     squared = float(spin @ spin)
@@ -72,28 +71,30 @@ def spin_covariance(
     x, y, z = spin / math.sqrt(squared)
     nx, ny, nz = events.normals
     lever = np.stack([y * nz - z * ny, z * nx - x * nz, x * ny - y * nx])
-    span_s = min(linked_s, stretch.span_s)
+    even_s = max(even_span_s(events), 1e-5)
+    span_s = min(even_s, stretch.span_s)
     covariance += _drift(objective, events, ball, spin, lever, span_s)
     oblique = max(1.0, RIM_COSINE / max(float(view_cosine(events).mean()), RIM_COSINE / MOST_OBLIQUE))
     covariance += (AXIS_FLOOR * settings.sigma_rad * oblique) ** 2 * squared * (np.eye(3) - along)
-    spread_s = linked_s / math.sqrt(12.0) * float(np.sqrt(np.mean(np.sum(lever**2, axis=0))))
+    spread_s = even_s / math.sqrt(12.0) * float(np.sqrt(np.mean(np.sum(lever**2, axis=0))))
     covariance += (TURN_FLOOR * settings.sigma_rad / spread_s) ** 2 * along
     return covariance + _twist(events, ball, spin, span_s)
 
 
-def linked_span_s(events: SphereEvents, spin_rad_s: Floats, settings: ContrastSettings) -> float:
-    """Length of the stretch over which the events confirm a spin: that of all of them, or less.
+def linked_share(events: SphereEvents, spin_rad_s: Floats, settings: ContrastSettings) -> float:
+    """Stretch over which the events confirm a spin, as a share of that over which there are events.
 
-    Only events of one polarity that coincide on the turned-back ball tell how far it turned between them. Events filled
-    evenly over a stretch T that all coincide differ by T / sqrt(6) (rms), and so the stretch is taken to be sqrt(6)
-    times what the pairs that do differ by: a visit that shows another part of the logo, or that the spin brings
-    elsewhere, does not lengthen it.
+    Only events of one polarity that coincide on the turned-back ball tell how far it turned between them. So the root
+    mean square of the time between two events is taken over the pairs that do, and over all: where a visit of the logo
+    shows another part of it than the others, or the spin brings it elsewhere, the pairs that coincide are those within
+    the visits.
     """
     some = without_strays(events).thinned(LINKED_EVENTS)
     turned = np.empty_like(some.normals)
     derotate(turned, spin_rad_s, some.t_s, some.normals)
     nearest = math.cos(LINKED_KERNELS * settings.sigma_rad)
-    return math.sqrt(6.0 * _mean_square_gap(some.t_s, turned, some.polarity, nearest))
+    linked_s2 = _mean_square_gap(some.t_s, turned, some.polarity, nearest)
+    return math.sqrt(linked_s2 / max(2.0 * float(np.var(some.t_s)), 1e-12))
 
 
 def even_span_s(events: SphereEvents) -> float:
@@ -111,7 +112,7 @@ def without_strays(events: SphereEvents) -> SphereEvents:
 @numba.njit(cache=True, nogil=True)
 def _mean_square_gap(t_s: Floats, points: Floats, polarity: Integers, least_cosine: float) -> float:
     """Mean squared difference of the times of pairs of one polarity whose points (3, n) are so near each other."""
-    total, pairs = 1e-10, 1  # one pair 10 us apart, where there is none
+    total, pairs = 0.0, 0
     for i in range(t_s.size):
         for j in range(i):
             if polarity[i] != polarity[j]:
@@ -120,7 +121,7 @@ def _mean_square_gap(t_s: Floats, points: Floats, polarity: Integers, least_cosi
             if cosine > least_cosine:
                 total += (t_s[i] - t_s[j]) ** 2
                 pairs += 1
-    return total / pairs
+    return total / max(pairs, 1)
 
 
 def _sandwich(objective: Objective, model: LocalModel, repeats: float) -> Floats:

@@ -30,7 +30,7 @@ from spinscope.pipeline.spin.contrast.events import (
 )
 from spinscope.pipeline.spin.contrast.score import score, take_logarithms
 from spinscope.pipeline.spin.contrast.search import cholesky_solve, distinct
-from spinscope.pipeline.spin.contrast.uncertainty import linked_span_s
+from spinscope.pipeline.spin.contrast.uncertainty import even_span_s
 from tests.reference.contrast import dotted_ball, naive_score
 from tests.reference.rotation import turned
 
@@ -266,7 +266,7 @@ def test_a_drifting_track_looks_like_a_turn_in_the_image_across_the_spins_axis()
     events = dotted_ball(SPIN, duration_s=0.01, events=300)
     axis = answer_of(events).spin_rps
     across = np.eye(3) - np.outer(axis, axis) / (axis @ axis)
-    ramp_px = DRIFT_PX_S * linked_span_s(events, 2 * np.pi * axis, ContrastSettings())
+    ramp_px = DRIFT_PX_S * even_span_s(events)
     for rising in (
         {"drift_std_px_s": DRIFT_PX_S, "track_std_px": 9.0},
         {"drift_std_px_s": 9e9, "track_std_px": ramp_px / 12**0.5},

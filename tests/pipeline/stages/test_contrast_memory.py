@@ -13,9 +13,9 @@ from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.results import MethodResult, Packet, SpinEstimate
 from spinscope.pipeline.spin.contrast import ContrastParameters
 from spinscope.pipeline.spin.contrast import stage as contrast
-from spinscope.pipeline.spin.contrast.events import ContrastEstimate, ContrastSettings
+from spinscope.pipeline.spin.contrast.events import ContrastEstimate
 from spinscope.pipeline.spin.contrast.stage import doubt
-from spinscope.pipeline.spin.contrast.uncertainty import linked_span_s
+from spinscope.pipeline.spin.contrast.uncertainty import even_span_s
 from spinscope.pipeline.stages import logo, rate
 from spinscope.pipeline.stages.filter import FilterResult
 from tests.reference.contrast import dotted_ball
@@ -84,11 +84,11 @@ def stated(position_std_px: float, velocity_std_px_s: float, radius_std_px: floa
 def test_place_and_drift_of_the_track_enter_the_stated_error() -> None:
     sure, drifting, unsure = stated(0.05, 0.0), stated(0.05, 500.0), stated(1.0, 0.0)
     np.testing.assert_allclose(drifting.vector_rps, sure.vector_rps)
-    # A drift looks like a turn about an axis in the image: sqrt(12 / (span / 10 ms)) sigma over the linked span.
+    # A drift looks like a turn about an axis in the image: sqrt(12 / (span / 10 ms)) sigma over the events' span.
     state = contrast.start(ContrastParameters(), CONTEXT)
     for packet in ticks():
         contrast.take(ContrastParameters(), state, packet, known_ball(packet.end_us), seen(packet))
-    span_s = linked_span_s(contrast._joined(state), 2 * math.pi * sure.vector_rps, ContrastSettings())
+    span_s = even_span_s(contrast._joined(state))
     rate_rps = math.sqrt(12.0 / (span_s / 0.01)) * 0.05 / span_s / known_ball(5000).mean[4] / (2 * math.pi)
     across = np.eye(3) - np.outer(sure.axis, sure.axis)
     added = across @ (drifting.covariance_rps2 - sure.covariance_rps2) @ across
