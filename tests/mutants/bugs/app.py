@@ -83,8 +83,8 @@ VIEWER = [
     ),
     Mutant(
         "app/viewer/ball_projections.py",
-        "np.stack([out, np.cross(pole, out), pole])",
-        "np.stack([out, np.cross(out, pole), pole])",
+        "np.stack([out, cross_product(pole, out), pole])",
+        "np.stack([out, cross_product(out, pole), pole])",
         "tests/app/viewer/test_ball_projections.py",
     ),
     Mutant(

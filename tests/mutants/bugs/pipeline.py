@@ -7,8 +7,8 @@ from tests.mutants.mutation import Mutant
 CHAIN = [
     Mutant(
         "pipeline/chain.py",
-        "keys[stage.name] = (stage.name, parameters.group(stage.group), read, inputs)",
-        "keys[stage.name] = (stage.name, parameters.group(stage.group), inputs)",
+        "self._key(stage.name, parameters.group(stage.group), read, inputs)",
+        "self._key(stage.name, parameters.group(stage.group), inputs)",
         "tests/pipeline/test_cache_keys.py",
     ),
     Mutant(

@@ -103,7 +103,7 @@ def test_visits_that_do_not_fit_together_tell_no_spin(linked_share: float) -> No
     flow = SpinEstimate("normal_flow", SPIN, np.eye(3), None)
     answer = replace(SURE, linked_share=linked_share)
     state.answer, state.reason = answer, stage.doubt(PARAMETERS, answer)
-    estimate, turns_seen, _ = stage._judged(PARAMETERS, state, answer, 600, rhythm(sigmas=0.0), flow)
+    estimate, turns_seen, *_ = stage._judged(PARAMETERS, state, answer, 600, rhythm(sigmas=0.0), flow)
     trusted = trusted_method({"normal_flow": flow, "contrast": estimate})
     assert (turns_seen, trusted) == ((True, "contrast") if linked_share > 0.4 else (False, None))
 
