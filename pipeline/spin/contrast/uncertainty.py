@@ -72,7 +72,7 @@ def spin_covariance(
     nx, ny, nz = events.normals
     lever = np.stack([y * nz - z * ny, z * nx - x * nz, x * ny - y * nx])
     even_s = max(even_span_s(events), 1e-5)
-    span_s = min(even_s, stretch.span_s)
+    span_s = max(min(even_s, stretch.span_s), 1e-5)
     covariance += _drift(objective, events, ball, spin, lever, span_s)
     oblique = max(1.0, RIM_COSINE / max(float(view_cosine(events).mean()), RIM_COSINE / MOST_OBLIQUE))
     covariance += (AXIS_FLOOR * settings.sigma_rad * oblique) ** 2 * squared * (np.eye(3) - along)

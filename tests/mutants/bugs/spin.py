@@ -88,7 +88,7 @@ METHODS = [
 CONTRAST = [
     Mutant(
         "pipeline/spin/contrast/uncertainty.py",
-        "span_s = min(even_s, stretch.span_s)",
+        "span_s = max(min(even_s, stretch.span_s), 1e-5)",
         "span_s = stretch.span_s",
         "tests/pipeline/spin/test_contrast_uncertainty.py -k stray",
     ),
