@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .kernels.rotation import cross_product
 from .results import SpinEstimate
 
 Vector = NDArray[np.float64]
@@ -126,7 +125,7 @@ def _directions(velocity_m_s: Vector | None, up: Sequence[float]) -> dict[str, V
         return None
     v = np.asarray(velocity_m_s, np.float64) / speed
     u = np.asarray(up, np.float64) / np.linalg.norm(up)
-    s = cross_product(u, v)
+    s = np.cross(u, v)
     if np.linalg.norm(s) < STEEP:
         return None
     return {"topspin": s / np.linalg.norm(s), "left sidespin": u, "corkscrew": v}
