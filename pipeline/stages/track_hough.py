@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..events import EventBatch
 from ..kernels import hough as kernels
-from ..kernels.arrays import Integers
+from ..kernels.coarse_circles import coarse_circles
 from ..results import Circle
 from .surface import CLEANINGS, SurfaceResult
 
@@ -87,42 +86,24 @@ def candidates(
     votes : flat uint16
         `empty_votes`, and so again afterwards: new ones cost more than the vote.
     """
-    cells = kernels.active_cells(surface.levels, events.x_px, events.y_px, surface.level_of(EDGE_LEVEL), CELL_PX)
-    coarse: list[tuple[float, int, Circle]] = []
-    cell_px, smallest_px = CELL_PX, radius_min_px
-    while smallest_px < radius_max_px and cells[0].size >= 5:
-        largest_px = min(MOST_CELLS * cell_px, radius_max_px)
-        if smallest_px < largest_px:
-            coarse += _coarse_circles(votes, *cells, smallest_px, largest_px, most, cell_px)
-            smallest_px = largest_px
-            most = max(1, most // 2)
-        cell_px *= 2
-        cells = kernels.twice_as_wide(*cells)
-    for _, cell_px, circle in sorted(coarse, key=lambda one: one[0], reverse=True):
+    coarse = coarse_circles(
+        votes,
+        surface.levels,
+        events.x_px,
+        events.y_px,
+        surface.level_of(EDGE_LEVEL),
+        CELL_PX,
+        MOST_CELLS,
+        float(radius_min_px),
+        float(radius_max_px),
+        most,
+        LEAST_SUPPORT,
+    )
+    for _, cell_px, x, y, radius, share in sorted(coarse.tolist(), key=lambda one: one[0], reverse=True):
         if cell_px == CELL_PX:
-            low = max(circle.radius_px - 1.5 * CELL_PX, radius_min_px)
-            high = min(circle.radius_px + 1.5 * CELL_PX, radius_max_px)
-            refined = hough_near(surface, circle.x_px, circle.y_px, low, high, 2 * CELL_PX)
+            low, high = max(radius - 1.5 * CELL_PX, radius_min_px), min(radius + 1.5 * CELL_PX, radius_max_px)
+            refined = hough_near(surface, x, y, low, high, 2 * CELL_PX)
             if refined is not None:
                 yield refined
         else:
-            yield circle
-
-
-def _coarse_circles(
-    votes: NDArray[np.uint16],
-    columns: Integers,
-    rows: Integers,
-    radius_min_px: float,
-    radius_max_px: float,
-    most: int,
-    cell_px: int,
-) -> Iterator[tuple[float, int, Circle]]:
-    """Support in px of outline, cell and circle of those through these cells, best first."""
-    first_radius = max(1, math.floor(radius_min_px / cell_px))
-    radii = math.ceil(radius_max_px / cell_px) - first_radius + 1
-    supports, circles = kernels.best_circles(votes, columns, rows, first_radius, radii, most, LEAST_SUPPORT)
-    for support, (a, b, radius) in zip(supports.tolist(), circles.tolist(), strict=True):
-        x, y = (a + 0.5) * cell_px - 0.5, (b + 0.5) * cell_px - 0.5
-        share = min(1.0, math.sqrt(support / (2.0 * math.pi * radius)))
-        yield support * cell_px, cell_px, Circle(x, y, radius * cell_px, share)
+            yield Circle(x, y, radius, share)
