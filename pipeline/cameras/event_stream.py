@@ -236,11 +236,11 @@ class EventStream:
     def _say_fault(self, kind: NoticeKind, now_us: int, text: str) -> bool:
         """Say a fault of the camera, not each time that it shows; whether it was said."""
         said_us = self._said_us.get(kind)
-        if said_us is not None and 0 <= now_us - said_us < SAID_US:
-            return False
-        self._said_us[kind] = now_us
-        self._on_notice(kind, text)
-        return True
+        if said_us is None or not 0 <= now_us - said_us < SAID_US:
+            self._said_us[kind] = now_us
+            self._on_notice(kind, text)
+            return True
+        return False
 
     def _take(self, packet: CameraPacket) -> None:
         """Take a packet of the camera: hand it to the sinks, and cut it into ticks."""

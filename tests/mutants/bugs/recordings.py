@@ -275,7 +275,7 @@ CAMERAS = [
     ),
     Mutant(
         "pipeline/cameras/event_stream.py",
-        "if said_us is None or not 0 <= end_us - said_us < SAID_US:",
+        "if said_us is None or not 0 <= now_us - said_us < SAID_US:",
         "if said_us is None:",
         "tests/pipeline/cameras/test_event_stream.py",
     ),
