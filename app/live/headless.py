@@ -247,7 +247,7 @@ def _write_sweep(sweep: BiasSweep, lines: JsonLines | None, figure: Path | None)
 
 
 def _ending_words(run: LiveRun, status: LiveStatus) -> str | None:
-    """What an end waits for, None where it waits for nothing."""
+    """Work for which an end waits, in words; None where there is none left."""
     waited_for = [f"the spins of {_shots(run.shots_waiting)}"] if run.shots_waiting else []
     if status.backlog_ms:
         waited_for.insert(0, f"the tracker, which is {status.backlog_ms / 1e3:.1f} s behind")
