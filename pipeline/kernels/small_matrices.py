@@ -1,6 +1,8 @@
-"""Product and inverse of small matrices: LAPACK and BLAS take longer, and their last bits differ by processor."""
+"""Product, inverse and solution of small matrices: LAPACK and BLAS take longer, their last bits differ by processor."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numba import njit
@@ -42,3 +44,25 @@ def product(left: Floats, right: Floats) -> Floats:
             for k in range(right.shape[1]):
                 result[i, k] += left[i, j] * right[j, k]
     return result
+
+
+@njit(cache=True, nogil=True)
+def cholesky_solve(matrix: Floats, right: Floats) -> Floats:
+    """Solution x (c,) of matrix x = right; the matrix (c, c) is positive definite."""
+    count = right.size
+    lower, x = np.zeros((count, count)), right.copy()
+    for k in range(count):
+        for j in range(k + 1):
+            total = matrix[k, j]
+            for i in range(j):
+                total -= lower[k, i] * lower[j, i]
+            lower[k, j] = math.sqrt(max(total, 1e-300)) if k == j else total / lower[j, j]
+    for k in range(count):
+        for i in range(k):
+            x[k] -= lower[k, i] * x[i]
+        x[k] /= lower[k, k]
+    for k in range(count - 1, -1, -1):
+        for i in range(k + 1, count):
+            x[k] -= lower[i, k] * x[i]
+        x[k] /= lower[k, k]
+    return x

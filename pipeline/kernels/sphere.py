@@ -10,6 +10,8 @@ of which the paper's are the limit for a ball far away on the optical axis.
 
 from __future__ import annotations
 
+import math
+
 import numba
 import numpy as np
 
@@ -106,3 +108,12 @@ def spin_rows(points_m: Floats, normals: Floats, directions: Floats, focal_px: f
         ex, ey, ez = normals[i, 0], normals[i, 1], normals[i, 2]
         rows[i, 0], rows[i, 1], rows[i, 2] = ey * jz - ez * jy, ez * jx - ex * jz, ex * jy - ey * jx
     return rows
+
+
+def spread_directions(count: int) -> Floats:
+    """Unit vectors (count, 3) spread evenly over the sphere (Fibonacci's spiral)."""
+    i = np.arange(count) + 0.5
+    z = 1.0 - 2.0 * i / count
+    angle = math.pi * (1.0 + math.sqrt(5.0)) * i
+    across = np.sqrt(1.0 - z * z)
+    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)

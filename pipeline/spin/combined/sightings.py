@@ -9,10 +9,10 @@ import numpy as np
 from ...camera import Camera
 from ...kernels.arrays import Floats, Integers
 from ...kernels.sightings import sighting_log_likelihoods
+from ...kernels.sphere import spread_directions
 from ...results import Packet
 from ...stages.logo import LogoResult
 from ...stages.track_result import BallTrack
-from ..contrast.search import spread_directions
 
 # A ball of 150 rps turns by 54 degrees within this time.
 BIN_US = 1000

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...kernels.arrays import Floats, Integers
+from ...kernels.sphere import spread_directions
 from .events import (
     LOG_ODDS_PER_SIGMA,
     BallUncertainty,
@@ -23,14 +24,17 @@ from .score import TURN, Objective, burst_mask, scores, scores_near
 from .search import (
     NEAR,
     NO_OFFSETS,
+    RIM_COSINE,
+    Stretch,
     distinct,
     grid_search,
+    linked_share,
     local_model,
     maximise,
     maximise_each,
-    spread_directions,
+    spin_covariance,
+    view_cosine,
 )
-from .uncertainty import RIM_COSINE, Stretch, linked_share, spin_covariance, view_cosine
 
 # Magnitudes from 0.45 to 2.2 of a candidate's hold every confusion of n turns with n + 1 (or n - 1), down to half and
 # double; a step is never coarser than a tenth, and never finer than makes SCAN_MAGNITUDES of them.

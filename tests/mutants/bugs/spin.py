@@ -87,13 +87,13 @@ METHODS = [
 
 CONTRAST = [
     Mutant(
-        "pipeline/spin/contrast/uncertainty.py",
+        "pipeline/spin/contrast/search.py",
         "span_s = max(min(even_s, stretch.span_s), 1e-5)",
         "span_s = stretch.span_s",
         "tests/pipeline/spin/test_contrast_uncertainty.py -k stray",
     ),
     Mutant(
-        "pipeline/spin/contrast/uncertainty.py",
+        "pipeline/spin/contrast/search.py",
         "if polarity[i] != polarity[j]:",
         "if polarity[i] > polarity[j]:",
         "tests/pipeline/spin/test_contrast_uncertainty.py -k coincide",

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from spinscope.pipeline.kernels.rotation import rotations
 from spinscope.pipeline.kernels.sightings import sighting_log_likelihoods
-from spinscope.pipeline.spin.contrast.search import spread_directions
+from spinscope.pipeline.kernels.sphere import spread_directions
 from tests.reference.sightings import sighting_log_likelihood
 
 PLACES = spread_directions(60)

@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from spinscope.pipeline.kernels.small_matrices import cholesky_solve
 from spinscope.pipeline.spin.contrast import estimate
 from spinscope.pipeline.spin.contrast.estimate import estimate_spin, follow_spin
 from spinscope.pipeline.spin.contrast.events import (
@@ -29,8 +30,7 @@ from spinscope.pipeline.spin.contrast.events import (
     whole_window,
 )
 from spinscope.pipeline.spin.contrast.score import score, take_logarithms
-from spinscope.pipeline.spin.contrast.search import cholesky_solve, distinct
-from spinscope.pipeline.spin.contrast.uncertainty import even_span_s
+from spinscope.pipeline.spin.contrast.search import distinct, even_span_s
 from tests.reference.contrast import dotted_ball, naive_score
 from tests.reference.rotation import turned
 

@@ -12,7 +12,7 @@ import pytest
 
 from spinscope.pipeline.results import SpinEstimate
 from spinscope.pipeline.spin.contrast import estimate as contrast
-from spinscope.pipeline.spin.contrast import uncertainty
+from spinscope.pipeline.spin.contrast import search
 from spinscope.pipeline.spin.contrast.estimate import estimate_spin, follow_spin
 from spinscope.pipeline.spin.contrast.events import (
     LOG_ODDS_PER_SIGMA,
@@ -33,7 +33,7 @@ def twist(speed_px_s: float, turns: float) -> np.ndarray:
     spin = 2 * math.pi * SPIN
     events = dotted_ball(SPIN)
     ball = replace(BALL, speed_px_s=speed_px_s)
-    return uncertainty._twist(events, ball, spin, turns / float(np.linalg.norm(SPIN)))
+    return search._twist(events, ball, spin, turns / float(np.linalg.norm(SPIN)))
 
 
 def test_a_fast_flight_leaves_the_turn_about_the_logos_middle_open() -> None:
@@ -54,7 +54,7 @@ def test_the_logo_that_has_come_back_has_told_the_magnitude() -> None:
 
 
 def share(events: SphereEvents, spin_rps: np.ndarray) -> float:
-    return uncertainty.linked_share(events, 2 * math.pi * spin_rps, ContrastSettings())
+    return search.linked_share(events, 2 * math.pi * spin_rps, ContrastSettings())
 
 
 @pytest.mark.parametrize("spin_rps", [SPIN, 0.6 * SPIN])

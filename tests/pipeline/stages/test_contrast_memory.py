@@ -14,8 +14,8 @@ from spinscope.pipeline.results import MethodResult, Packet, SpinEstimate
 from spinscope.pipeline.spin.contrast import ContrastParameters
 from spinscope.pipeline.spin.contrast import stage as contrast
 from spinscope.pipeline.spin.contrast.events import ContrastEstimate
+from spinscope.pipeline.spin.contrast.search import even_span_s
 from spinscope.pipeline.spin.contrast.stage import doubt
-from spinscope.pipeline.spin.contrast.uncertainty import even_span_s
 from spinscope.pipeline.stages import logo, rate
 from spinscope.pipeline.stages.filter import FilterResult
 from tests.reference.contrast import dotted_ball
