@@ -101,8 +101,7 @@ def step(
     if basis is None or contrast.changes:
         reason = contrast.estimate.reason or "the logo is not seen"
         # The flight is of two flights as well, or tells to a third what a logo in view would tell to a hundredth.
-        in_doubt = contrast.changes or contrast.may_be_outline or contrast.is_off_rhythm
-        against = "trajectory" if in_doubt else None
+        against = "trajectory" if contrast.changes or contrast.is_sharp else None
         return CombinedResult(SpinEstimate.refused(METHOD, reason, against=against), witnesses)
     spins_rps = np.stack([candidate.spins_rps for candidate in candidates])
     bend = by_flight(trajectory, spins_rps)
@@ -157,7 +156,7 @@ def _candidates(
         return None, []
     if candidates := rhythm_candidates(rate, trajectory, gyro_std_deg):
         return "rhythm", candidates
-    if contrast.may_be_outline:
+    if contrast.is_sharp:
         return None, []
     candidates = flight_candidates(trajectory, gyro_std_deg, context["spin.max_spin_rps"])
     return ("flight" if candidates else None), candidates

@@ -240,10 +240,11 @@ class ContrastResult(ReadOnlyArrays):
     contrast : float
         Score an event less that of permuted times; 0 = nothing turns with the spin.
     turns_seen : bool
-        Whether the contrast is enough to tell a pattern that turns from chance; without it no spin is likelier.
-    may_be_outline : bool
-        Whether the sharp pattern may be what a slow sensor reports of the ball's outline: then the logo may be in view
-        or not, and its events tell neither its motion nor when it was seen.
+        Whether the events are those of one pattern that turns: sharp enough to be no chance, and nothing that follows
+        puts it in doubt; without it no spin is likelier.
+    is_sharp : bool
+        Whether the best spin brings the events together; without `turns_seen` they may be a slow sensor's outline, or
+        visits of the logo that do not fit together, and tell neither its motion nor when it was seen.
     is_off_rhythm : bool
         Whether the pattern is sharp and comes back, but not with its spin: then neither it nor its rhythm tells the
         spin.
@@ -269,7 +270,7 @@ class ContrastResult(ReadOnlyArrays):
     offsets_px: Floats
     contrast: float
     turns_seen: bool
-    may_be_outline: bool
+    is_sharp: bool
     is_off_rhythm: bool
     changes: bool
     full: bool
@@ -294,7 +295,7 @@ class ContrastResult(ReadOnlyArrays):
             offsets_px=np.zeros(3),
             contrast=0.0,
             turns_seen=False,
-            may_be_outline=False,
+            is_sharp=False,
             is_off_rhythm=False,
             changes=False,
             full=False,

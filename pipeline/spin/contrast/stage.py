@@ -431,9 +431,7 @@ def _judged(
     rate: RateResult,
     normal_flow: SpinEstimate,
 ) -> tuple[SpinEstimate, bool, bool, bool]:
-    """Estimate of an answer from `count` events or its refusal, and whether a pattern is seen to turn.
-
-    Where it is sharp and not seen to turn, also whether it may be outline, and whether its rhythm contradicts it.
+    """Estimate of an answer from `count` events or its refusal; turns_seen, is_sharp and is_off_rhythm of its result.
 
     An answer is settled where the logo says so much that neither its rhythm nor its normal flow can put it in doubt.
     """
@@ -460,7 +458,7 @@ def _judged(
         )
     if reason is not None:
         estimate = SpinEstimate.refused(METHOD, reason, count, against=against)
-    return estimate, turns_seen, is_sharp and may_be_outline, is_sharp and off_rhythm
+    return estimate, turns_seen, is_sharp, is_sharp and off_rhythm
 
 
 def _result(
@@ -469,7 +467,7 @@ def _result(
     answer = state.answer
     if answer is None or answer.spin_rps is None or answer.covariance_rps2 is None:
         return ContrastResult.nothing(SpinEstimate.refused(METHOD, state.reason or "no estimate yet", count))
-    estimate, turns_seen, may_be_outline, is_off_rhythm = _judged(parameters, state, answer, count, rate, flow)
+    estimate, turns_seen, is_sharp, is_off_rhythm = _judged(parameters, state, answer, count, rate, flow)
     middle_us, half_us = answer.reference_s * 1e6, 0.5e6 * answer.span_s
     return ContrastResult(
         estimate=estimate.up_to(state.context["spin.max_spin_rps"], FLOW_METHOD),
@@ -484,7 +482,7 @@ def _result(
         offsets_px=answer.offsets_px.copy(),
         contrast=answer.contrast,
         turns_seen=turns_seen,
-        may_be_outline=may_be_outline,
+        is_sharp=is_sharp,
         is_off_rhythm=is_off_rhythm,
         changes=state.changes,
         full=full,

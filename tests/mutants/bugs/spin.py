@@ -13,7 +13,7 @@ METHODS = [
     ),
     Mutant(
         "pipeline/spin/combined/stage.py",
-        "if contrast.may_be_outline:\n        return None, []",
+        "if contrast.is_sharp:\n        return None, []",
         "if False:\n        return None, []",
         "tests/pipeline/spin/test_combined.py",
     ),

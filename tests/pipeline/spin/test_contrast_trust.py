@@ -103,9 +103,9 @@ def test_visits_that_do_not_fit_together_tell_no_spin(linked_share: float) -> No
     flow = SpinEstimate("normal_flow", SPIN, np.eye(3), None)
     answer = replace(SURE, linked_share=linked_share)
     state.answer, state.reason = answer, stage.doubt(PARAMETERS, answer)
-    estimate, turns_seen, *_ = stage._judged(PARAMETERS, state, answer, 600, rhythm(sigmas=0.0), flow)
+    estimate, turns_seen, is_sharp, _ = stage._judged(PARAMETERS, state, answer, 600, rhythm(sigmas=0.0), flow)
     trusted = trusted_method({"normal_flow": flow, "contrast": estimate})
-    assert (turns_seen, trusted) == ((True, "contrast") if linked_share > 0.4 else (False, None))
+    assert is_sharp and (turns_seen, trusted) == ((True, "contrast") if linked_share > 0.4 else (False, None))
 
 
 @pytest.mark.parametrize(
@@ -133,9 +133,9 @@ def test_a_rhythm_that_contradicts_a_sharp_pattern_is_said_of_it() -> None:
     state = stage.ContrastState({}, parts=[(0, ball)], is_bright=[True])  # type: ignore[arg-type]
     answer, flow = replace(SURE, span_s=0.1), SpinEstimate.refused("normal_flow", "no flow")
     estimate, *said = stage._judged(PARAMETERS, state, answer, 600, rhythm(33.0), flow)
-    assert said == [False, False, True]
+    assert said == [False, True, True]
     assert "comes back with 33.0 rps, not with (20, 0, 0)" in (estimate.reason or "")
-    assert stage._judged(PARAMETERS, state, answer, 600, rhythm(20.0), flow)[1:] == (True, False, False)
+    assert stage._judged(PARAMETERS, state, answer, 600, rhythm(20.0), flow)[1:] == (True, True, False)
     flow = SpinEstimate("normal_flow", SPIN, np.eye(3), None)
     assert stage._judged(PARAMETERS, state, answer, 600, rhythm(40.0), flow)[0].status == "ok"
     dull = replace(answer, contrast=0.2)
@@ -174,4 +174,4 @@ def test_what_may_be_outline_is_trusted_neither_to_the_pattern_nor_to_its_flow(e
         assert trusted_method({"normal_flow": flow, "contrast": estimate}) is None
     else:
         assert estimate.status == "ok"
-    assert said == ([False, True, False] if events == "on" else [True, False, False])
+    assert said == ([False, True, False] if events == "on" else [True, True, False])
