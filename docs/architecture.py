@@ -11,6 +11,7 @@ import hashlib
 import itertools
 import textwrap
 from dataclasses import dataclass
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import grimp
@@ -49,7 +50,10 @@ class Box:
 
 
 def boxes_and_arrows() -> tuple[dict[str, Box], set[tuple[str, str]]]:
-    """Boxes by key, and (importer, imported) pairs of keys, without those that others imply."""
+    """Boxes by key, and (importer, imported) pairs of keys, without those that others imply.
+
+    Raises CycleError, with their names, where packages import each other.
+    """
     graph = grimp.build_graph(ROOT, cache_dir=None)  # a cache goes by times of change: wrong after a checkout
     home: dict[str, str] = {}  # module of the second level -> key of its box
     for folder in ("app", "pipeline"):
@@ -73,6 +77,7 @@ def boxes_and_arrows() -> tuple[dict[str, Box], set[tuple[str, str]]]:
             ends = [home.get(".".join(module.split(".")[:3])) for module in (importer, imported)]
             if ends[0] and ends[1] and ends[0] != ends[1]:
                 arrows.add((ends[0], ends[1]))
+    TopologicalSorter({key: {end for begin, end in arrows if begin == key} for key in boxes}).prepare()
     return boxes, _reduced(arrows)
 
 

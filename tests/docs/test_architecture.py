@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import runpy
+from graphlib import CycleError
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,16 @@ def test_picture_changes_with_the_imports(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(grimp, "build_graph", lambda *_, **__: graph)
     assert names["digest"]() != before
     assert names["draw"]().axes
+
+
+def test_packages_that_import_each_other_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    import grimp
+
+    names, graph = runpy.run_path(str(SCRIPT)), grimp.build_graph("spinscope", cache_dir=None)
+    graph.add_import(importer="spinscope.pipeline.kernels.eros", imported="spinscope.pipeline.stages.surface")
+    monkeypatch.setattr(grimp, "build_graph", lambda *_, **__: graph)
+    with pytest.raises(CycleError, match=r"pipeline\.kernels.*pipeline\.stages"):
+        names["digest"]()
 
 
 def test_imports_that_others_imply_are_not_drawn() -> None:
