@@ -33,8 +33,10 @@ def rrd_bytes(chunks: Sequence[Chunk], recording_id: str) -> bytes:
         return path.read_bytes()
 
 
-def layout_bytes(run: ViewedRun, tab: str, *, compare: bool = True, size: ViewerSize | None = None) -> bytes:
-    """Blueprint of the page's viewer.
+def layout_bytes(
+    run: ViewedRun, tab: str, *, compare: bool = True, size: ViewerSize | None = None
+) -> tuple[bytes, str]:
+    """Blueprint of the page's viewer, and the id of its root container, by which the viewer names it.
 
     Parameters
     ----------
@@ -50,5 +52,6 @@ def layout_bytes(run: ViewedRun, tab: str, *, compare: bool = True, size: Viewer
     layout = next((view.name for view in VIEWS if view.label == tab), "")
     with TemporaryDirectory() as folder:
         path = Path(folder) / "page.rbl"
-        blueprint(run, layout, compare=compare, is_lasting=True, size=size).save(at.APPLICATION, path)
-        return path.read_bytes()
+        made = blueprint(run, layout, compare=compare, is_lasting=True, size=size)
+        made.save(at.APPLICATION, path)
+        return path.read_bytes(), str(made.root_container.id)

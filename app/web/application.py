@@ -153,8 +153,8 @@ def _add_session_routes(app: FastAPI, state: AppState, session_of: SessionOf) ->
         if result is None:
             raise HTTPException(409, "nothing has been computed yet")
         size = ViewerSize(width_px, height_px)
-        made = await run_in_threadpool(layout_bytes, ViewedRun.of(result), tab, compare=tools, size=size)
-        return Response(made, media_type="application/octet-stream", headers=NO_STORE)
+        made, root = await run_in_threadpool(layout_bytes, ViewedRun.of(result), tab, compare=tools, size=size)
+        return Response(made, media_type="application/octet-stream", headers={**NO_STORE, "X-Layout-Root": root})
 
 
 async def _events(session: ClientSession) -> AsyncIterator[str]:

@@ -127,6 +127,16 @@ export class Connection extends EventTarget {
   }
 
   /**
+   * A layout, and the id of its root container.
+   * @param {string} query
+   * @returns {Promise<{content: Uint8Array, root: string}>}
+   */
+  async layout(query) {
+    const answer = await answered(await fetch(this.path(`layout?${query}`)));
+    return { content: new Uint8Array(await answer.arrayBuffer()), root: answer.headers.get("x-layout-root") ?? "" };
+  }
+
+  /**
    * @template {keyof ServerMessages} K
    * @param {K} kind
    * @param {(message: ServerMessages[K]) => void} listener
@@ -365,7 +375,7 @@ export class RunRequests extends EventTarget {
       width_px: String(width),
       height_px: String(height),
     });
-    const layout = await this.connection.bytes(`layout?${query}`);
+    const layout = await this.connection.layout(String(query));
     if (document.body.classList.contains("coach")) return; // entered meanwhile
     await this.viewer.layout(layout);
     this.#layoutOf = layoutOf;

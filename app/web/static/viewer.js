@@ -120,17 +120,18 @@ export class Viewer extends EventTarget {
     return done;
   }
 
-  // Takes a layout; one for a recording that is shown is there at the end, not some frames later over another one.
-  layout(/** @type {Uint8Array} */ bytes) {
+  /**
+   * Takes a layout; one for a recording that is shown is there at the end, not some frames later over another one.
+   * @param {{content: Uint8Array, root: string}} layout
+   */
+  layout({ content, root }) {
     return this.#next(async () => {
       const { front } = this; // it was asked for before somebody turned to this tab
-      const root = async () =>
-        (await this.#viewer.get_blueprint()).blueprint["/viewport"]?.ViewportBlueprint.root_container;
-      const before = this.#shown === null ? null : await root();
-      this.#channel.send_rrd(bytes);
+      this.#channel.send_rrd(content);
       if (this.#shown === null) return;
       const until = performance.now() + LAYOUT_MS;
-      while (await root() === before) {
+      const present = async () => (await this.#viewer.get_blueprint()).blueprint["/viewport"]?.ViewportBlueprint;
+      while ((await present())?.root_container !== root) { // one that was sent before may come late
         if (performance.now() > until) throw new Error("the viewer does not take the layout");
         await pause(POLL_MS);
       }

@@ -65,7 +65,7 @@ def test_the_page_has_a_tab_for_two_runs_only_where_there_can_be_two(flight: Vie
     assert [view.label for view in views(compare=True)] == labels
     assert [view.label for view in views()] == [label for label in labels if label != "Compare"]
     for tab in ("", "Coach", "nothing"):
-        assert layout_bytes(flight, tab).startswith(b"RRF2")
+        assert layout_bytes(flight, tab)[0].startswith(b"RRF2")
 
 
 def logged(a: ViewedRun, b: ViewedRun, folder: Path) -> dict[str, Rows]:

@@ -189,7 +189,7 @@ def test_a_layout_that_was_asked_for_before_another_tab_was_chosen_leaves_that_i
         """(async () => {
             const { connection, viewer } = window.spinscope;
             await viewer.bringToFront("Tracker");
-            const layout = await connection.bytes("layout?tab=Tracker&width_px=500&height_px=300");
+            const layout = await connection.layout("tab=Tracker&width_px=500&height_px=300");
             await viewer.bringToFront("Coach");
             await viewer.layout(layout);
             const front = await viewer.tab();
