@@ -150,6 +150,11 @@ class BallUncertainty:
     latency_std_px: float = 0.0
     speed_px_s: float = 0.0
 
+    @property
+    def is_flying(self) -> bool:
+        """Whether the ball moves; one on a spinner stays in place."""
+        return self.speed_px_s > 0.0
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContrastEstimate:

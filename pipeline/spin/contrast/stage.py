@@ -283,7 +283,7 @@ def _estimate(
         state.scanned_turns = answer.turns
     state.answer, state.reason, state.changes = answer, doubt(parameters, answer), False
     # A ball that stays in place, on a spinner, touches nothing.
-    if state.reason is None and ball.speed_px_s > 0.0:
+    if state.reason is None and ball.is_flying:
         ticks = max(1, len(state.ball_stds) // PARTS)
         balls = _uncertainty(state.ball_stds[:ticks]), _uncertainty(state.ball_stds[-ticks:])
         ends = estimates_of_ends(events, balls, settings, answer)

@@ -105,6 +105,12 @@ CONTRAST = [
         "tests/pipeline/spin/test_contrast_trust.py -k fit_together",
     ),
     Mutant(
+        "pipeline/spin/contrast/estimate.py",
+        "margins if ball.is_flying else IN_PLACE * margins",
+        "IN_PLACE * margins",
+        "tests/pipeline/spin/test_contrast_score.py -k in_place",
+    ),
+    Mutant(
         "pipeline/spin/contrast/stage.py",
         "centre_std_px=max(math.hypot(position, latency_std_px), 0.01)",
         "centre_std_px=max(position, 0.01)",

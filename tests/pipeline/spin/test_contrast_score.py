@@ -317,6 +317,18 @@ def test_margins_are_in_sigmas_of_independent_events() -> None:
     assert np.trace(four.covariance_rps2) > np.trace(one.covariance_rps2)
 
 
+def test_a_flight_with_its_tracks_errors_leads_by_less_than_a_ball_in_place() -> None:
+    events = dotted_ball(SPIN, duration_s=0.012, events=300)
+    in_place, flying = (
+        estimate_spin(
+            events, replace(BALL, speed_px_s=speed_px_s), ContrastSettings(), starts_rps=np.stack([SPIN, -SPIN])
+        )
+        for speed_px_s in (0.0, 1.0)
+    )
+    assert in_place.margins.size
+    np.testing.assert_allclose(in_place.margins, 1.5 * flying.margins, rtol=1e-6)
+
+
 def test_noise_has_no_contrast() -> None:
     events = dotted_ball(SPIN)
     noise = replace(events, t_s=np.sort(np.random.default_rng(1).permutation(events.t_s)))
