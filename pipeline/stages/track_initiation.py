@@ -18,6 +18,7 @@ from .track_search import (
     MOST_CANDIDATES,
     MOST_RIVALS,
     ROUTES,
+    Excluded,
     Route,
     agree,
     look,
@@ -69,7 +70,7 @@ def begin_tracks(
     hough, found, excluded = look(surface, events, packet.end_us, camera, limits, state.memory, most, routes, expected)
     if not (state.balls or found or excluded):
         excluded = removed_by_filter(state.context, packet, len(events), surface, limits, state.memory)
-    state.excluded = None if state.balls else excluded or state.excluded
+    _note_excluded(parameters, state, packet, excluded)
     pending, state.pending = state.pending, []
     for sighting, circle in found:
         if any(ball.covers(sighting) for ball in state.balls if ball.measured is not None):
@@ -86,6 +87,27 @@ def begin_tracks(
             hough = circle
     state.pending += [one for one in pending if packet.end_us - one[0] < HELD_US]
     return hough, state.pending[0][1] if state.pending else None
+
+
+def _note_excluded(parameters: TrackParameters, state: TrackState, packet: Packet, excluded: Excluded) -> None:
+    """Note the setting that excludes a ball: one that is seen again, as is asked of one within the limits.
+
+    A mark of its print on a ball moves like a ball for a tick as well.
+    """
+    if state.balls:
+        state.excluded, state.shut_out = None, []
+        return
+    before, state.shut_out = state.shut_out, []
+    for sighting, reason in excluded:
+        since = next((one for one in before if agree(one[1], sighting, packet.end_us - one[0])), None)
+        if since is None:
+            since = packet.end_us, sighting
+        else:
+            before.remove(since)
+        if packet.end_us - since[0] >= parameters.contour_us:
+            state.excluded = reason
+        state.shut_out.append(since)
+    state.shut_out += [one for one in before if packet.end_us - one[0] < HELD_US]
 
 
 def _circle_at(end_us: int, since_us: int, sighting: Sighting) -> Circle:

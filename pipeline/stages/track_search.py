@@ -66,6 +66,8 @@ class SearchMemory:
 
 
 Found = list[tuple[Sighting, Circle]]
+# Outlines that a setting excludes, and that setting in words.
+Excluded = list[tuple[Sighting, str]]
 # Where balls are looked for: the paper's surface, and the contour events (see `look`).
 Route = Literal["surface", "contour"]
 ROUTES: tuple[Route, Route] = ("surface", "contour")
@@ -81,8 +83,8 @@ def look(
     most: int,
     routes: tuple[Route, ...] = ROUTES,
     expected: tuple[Circle, ...] = (),
-) -> tuple[Circle | None, Found, str | None]:
-    """The best Hough circle anywhere; those that move like a ball; which setting excludes one, if none is left.
+) -> tuple[Circle | None, Found, Excluded]:
+    """The best Hough circle anywhere; those that move like a ball; those that a setting excludes, if none is left.
 
     Trusted ones come first, then the faster ones. The paper's surface is searched first. Where it shows no ball, the
     contour events that a neighbour supports: in low contrast an outline gives one event a pixel, of which STC lets
@@ -95,7 +97,7 @@ def look(
     searching = _Searching(end_us, camera, limits, most, expected, memory.votes)
     first: Circle | None = None
     found: Found = []
-    excluded: str | None = None
+    excluded: Excluded = []
     if "surface" in routes:
         first, found, excluded = searching.circles(surface, events, stated, signed=True)
     if found or "contour" not in routes or len(events) < LEAST_EVENTS:
@@ -108,7 +110,7 @@ def look(
     drawn = SurfaceResult(levels, surface.cleaning, table)
     second, found, excluded_there = searching.circles(drawn, supported, stated, signed=False)
     excluded = excluded or excluded_there
-    if not found and excluded is None and stated != limits.possible_px:
+    if not found and not excluded and stated != limits.possible_px:
         # Only to tell which setting to change.
         _, _, excluded = searching.circles(drawn, supported, limits.possible_px, signed=False)
     return first or second, found, excluded
@@ -116,8 +118,8 @@ def look(
 
 def removed_by_filter(
     context: Context, packet: Packet, passed: int, surface: SurfaceResult, limits: Limits, memory: SearchMemory
-) -> str | None:
-    """The setting of the outline's filter that removes a ball's outline from the packet, in words; None if none does.
+) -> Excluded:
+    """The outlines in the packet that the setting of the outline's filter removes.
 
     A ball is looked for in the packet's unfiltered events. Only where STC filters the outline, which needs a second
     event at a pixel: TRAIL passes the first one of every edge, no outline is lost by it.
@@ -129,15 +131,14 @@ def removed_by_filter(
     """
     mode, camera = context["filter.contour_mode"], context.camera
     if mode not in STC_MODES or len(packet.events) <= passed:
-        return None
+        return []
     _, found, _ = look(surface, packet.events, packet.end_us, camera, limits, memory, MOST_CANDIDATES, ("contour",))
-    radius_px = next((one.ring[4] for one, _ in found if one.trusted or one.explained), None)
-    if radius_px is None:
-        return None
-    return (
-        f"a circle of radius {radius_px:.3g} px moves like a ball in the unfiltered events, "
-        f"filter.contour_mode = {mode} removes it: off keeps it"
-    )
+    moves, removes = "moves like a ball in the unfiltered events", f"filter.contour_mode = {mode} removes it"
+    return [
+        (one, f"a circle of radius {one.ring[4]:.3g} px {moves}, {removes}: off keeps it")
+        for one, _ in found
+        if one.trusted or one.explained
+    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,11 +154,11 @@ class _Searching:
 
     def circles(
         self, surface: SurfaceResult, events: EventBatch, radii_px: tuple[float, float], *, signed: bool
-    ) -> tuple[Circle | None, Found, str | None]:
-        """The best circle with such a radius, those that move like a ball, and why one that does is excluded."""
+    ) -> tuple[Circle | None, Found, Excluded]:
+        """The best circle with such a radius, those that move like a ball, and those that do and are excluded."""
         tried: list[Circle] = []
         found: Found = []
-        excluded: str | None = None
+        excluded: Excluded = []
         by_hough = candidates(surface, events, *radii_px, self.most, self.votes)
         first = next(by_hough, None)
         for circle in chain([] if first is None else [first], by_hough, self.expected):
@@ -173,7 +174,7 @@ class _Searching:
             if reason is None:
                 found.append((sighting, circle))
             elif sighting.trusted or sighting.explained:
-                excluded = excluded or reason
+                excluded.append((sighting, reason))
         found.sort(key=lambda one: (one[0].trusted, one[0].speed_px_s), reverse=True)
         return first, found, excluded
 

@@ -35,6 +35,7 @@ class TrackState:
     past: Past = field(default_factory=Past)
     balls: list[TrackedBall] = field(default_factory=list)
     pending: list[tuple[int, Sighting]] = field(default_factory=list)
+    shut_out: list[tuple[int, Sighting]] = field(default_factory=list)  # outlines that a setting excludes, since when
     first_us: int | None = None
     looked_us: int = 0
     shaken_us: int | None = None  # when most of the background was last seen to move

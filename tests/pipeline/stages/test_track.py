@@ -244,6 +244,18 @@ def test_no_ball_names_the_setting_that_excludes_a_circle_and_a_value_that_admit
     assert any(result.has_ball for result in run(rows, TrackParameters(**{setting_name: float(advised[1])})))
 
 
+def test_no_ball_names_no_setting_for_what_is_seen_once() -> None:
+    """A mark on a ball looks for a tick like a smaller ball: changing a limit would find none."""
+    parameters = TrackParameters(radius_max_px=12.0)
+    ball = disc_events(np.array([400.0, 300.4, 4800.0, -2100.0, 17.5]), 0, 40_000)
+    lone = EventBatch(np.array([39_000]), np.array([9], np.uint16), np.array([9], np.uint16), np.array([True]))
+    for seen_us, is_named in ((10_000, False), (20_000, True)):
+        rows = inputs(merged(ball.between(5000, seen_us), lone))
+        reasons = [result.reason for result in run(rows, parameters)]
+        assert any("radius_max_px = 12 excludes it" in reason for reason in reasons if reason) == is_named
+    assert any(result.has_ball for result in run(inputs(ball.between(5000, 20_000)), TrackParameters()))
+
+
 @pytest.mark.parametrize("mode", ["stc", "stc_cut_trail"])
 def test_no_ball_names_the_filter_that_removes_its_outline(mode: str) -> None:
     """One event a pixel, of which STC passes none; noise that it removes as well is no ball."""
