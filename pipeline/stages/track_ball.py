@@ -271,7 +271,9 @@ class TrackedBall:
 
     def add_shake(self, std_px: float, since_us: int) -> None:
         """Note that a shaking camera moved the circles since by so much, 1 sigma: so much of a bend is no contact."""
-        self.path = [replace(one, shake_px=std_px) if one.end_us > since_us else one for one in self.path]
+        self.path = [
+            replace(one, shake_px=max(one.shake_px, std_px)) if one.end_us > since_us else one for one in self.path
+        ]
 
     def coast(self, end_us: int) -> None:
         """Note a tick in which it was not measured."""
@@ -363,7 +365,7 @@ class TrackedBall:
             noise = noise + hidden**2 * np.eye(3)
         elif sighting.part == HALF_AHEAD:
             self.rim = self.rim.with_outline(sighting)
-        self._add(PathPoint(end_us, circle, noise))
+        self._add(PathPoint(end_us, circle, noise, self.rim.unsteady_px(circle.radius_px)))
 
     def _add(self, point: PathPoint) -> None:
         if self.path and self.path[-1].end_us == point.end_us:  # found again elsewhere after all

@@ -20,7 +20,10 @@ from .track_result import ShotEnd
 from .track_state import TrackState
 
 # What speaks against one free flight, in words for people.
-CONTACT_UNCERTAIN = "the camera shakes so much that it is uncertain when, and whether, the ball touched something"
+CONTACT_UNCERTAIN = (
+    "the camera shakes, or a print at the ball's outline moves it, so much that it is uncertain when, and whether, "
+    "the ball touched something"
+)
 # A ball that is hit leaves from where it was: after 10 ms, the longest until it is found, the velocity of one outline
 # (0.2 m/s, 1 sigma) and drag (30 m/s^2 at 14 m/s) leave a tenth of its radius open.
 SAME_PLACE = 0.3

@@ -39,7 +39,7 @@ class PathPoint:
     noise : (3, 3) float64
         Covariance of its x, y and radius, px^2.
     shake_px : float
-        1 sigma by which a shaking camera moved it across the view, along either axis.
+        1 sigma by which a shaking camera, or a print that turns at the rim, moved it across the view, on either axis.
     """
 
     end_us: int

@@ -30,6 +30,10 @@ LATE_BEHIND_US = 40.0
 # Where the half behind gives no events at all, the light falls by less than the pixels tell: the outline ahead is one
 # of the ball's shading, and the rim, which nothing shows, lies up to a fifth of the radius outside (seeds as above).
 UNSEEN_ERROR = 0.15
+# Where much of a ball is printed, the print's edge is taken for the outline, and the circle moves as it turns: by this
+# share of the radius, 1 sigma, for each share of the events ahead that is not of the outline's polarity, beyond that of
+# logos and noise. Half-painted balls of our simulator (seeds 93401, 93402, 97000, 97002): 0.14 to 0.39.
+PRINT_SHARE, USUAL_MIXED = 0.2, 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,12 +46,15 @@ class Rim:
         Distance of the events behind outside the outline, see `kernels.outline.distance_behind`.
     shown : float
         Share of the half behind that has events.
+    mixed : float
+        Share of the events ahead that is of the rarer polarity.
     distances, outlines : int
-        Number of outlines behind each.
+        Number of outlines behind the first, and behind the others.
     """
 
     behind_px: float = USUAL_BEHIND_PX
     shown: float = 1.0
+    mixed: float = 0.0
     distances: int = 0
     outlines: int = 0
 
@@ -55,9 +62,12 @@ class Rim:
         """The same with one more outline."""
         outlines, distances = self.outlines + 1, self.distances + (not math.isnan(sighting.behind_px))
         shown = self.shown + (sighting.behind - self.shown) / outlines
+        rarer = min(sighting.ahead_on, 1.0 - sighting.ahead_on)
+        mixed = self.mixed + (rarer - self.mixed) / outlines
         if distances == self.distances:
-            return Rim(self.behind_px, shown, distances, outlines)
-        return Rim(self.behind_px + (sighting.behind_px - self.behind_px) / distances, shown, distances, outlines)
+            return Rim(self.behind_px, shown, mixed, distances, outlines)
+        behind_px = self.behind_px + (sighting.behind_px - self.behind_px) / distances
+        return Rim(behind_px, shown, mixed, distances, outlines)
 
     def outside_px(self, speed_px_s: float) -> float:
         """Distance of the rim outside the circle that is tracked; negative inside."""
@@ -68,6 +78,10 @@ class Rim:
     def std_px(self, radius_px: float) -> float:
         """Error of that, and of the centre (1 sigma), beyond the usual one."""
         return math.hypot(RIM_ERROR * max(self._seen_px, 0.0), UNSEEN_ERROR * (1.0 - self.shown) * radius_px)
+
+    def unsteady_px(self, radius_px: float) -> float:
+        """What a print at the rim moves the circle by from tick to tick (1 sigma)."""
+        return PRINT_SHARE * max(self.mixed - USUAL_MIXED, 0.0) * radius_px
 
     @property
     def _seen_px(self) -> float:

@@ -300,6 +300,9 @@ def test_a_ball_reaches_as_far_as_its_rim(monkeypatch: pytest.MonkeyPatch) -> No
     spread = np.diag([1.0, 1.0, 0.0, 0.0, 1.0]) * ball.rim.std_px(float(usual.mean[4])) ** 2
     np.testing.assert_allclose(bright.covariance - ball.total_covariance(), spread, atol=1e-9)
     assert ball.track(20_000, 40.0, 0.0, ()).mean[4] == usual.mean[4], "the circle of the events ahead"
+    _, printed, _ = updated(monkeypatch, sighting(ahead_on=0.8))
+    shown = printed.path[-1]
+    assert shown.circle is not None and shown.shake_px == printed.rim.unsteady_px(shown.circle.radius_px) > 0.0
     for changes in ({"part": OF_DARK}, {"visible": 0.9}):
         assert state(behind_px=0.8, behind=0.4, **changes)[0].rim == first
 

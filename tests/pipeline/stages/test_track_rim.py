@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import dataclasses
 import math
 
+import cv2
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from spinscope.pipeline.chain import Chain
 from spinscope.pipeline.event_source import EventsInMemory
 from spinscope.pipeline.presets import preset
 from spinscope.pipeline.simulator import Lens, Scene, SensorModel, simulate_scene
+from spinscope.pipeline.simulator.logos import Logo
 from spinscope.pipeline.simulator.scene import Background, Ball, Flight
 from spinscope.pipeline.stages.track_outline import Sighting
 from spinscope.pipeline.stages.track_rim import USUAL_BEHIND_PX, Rim
@@ -49,6 +52,29 @@ def test_a_rim_that_does_not_show_may_lie_further_out() -> None:
     """By 0.15 of the radius, 1 sigma, where there are no events behind."""
     assert Rim().with_outline(outline(math.nan, 0.0)).std_px(20.0) == pytest.approx(0.15 * 20.0)
     assert Rim().with_outline(outline(math.nan, 0.8)).std_px(20.0) == pytest.approx(0.2 * 0.15 * 20.0)
+
+
+def test_a_print_at_the_rim_moves_the_circle() -> None:
+    """By 0.2 of the radius for each share of the rarer polarity ahead beyond 0.02, on average over the outlines."""
+    rim = Rim()
+    for ahead_on in (0.8, 1.0, 0.1):
+        rim = rim.with_outline(dataclasses.replace(outline(0.0), ahead_on=ahead_on))
+    assert rim.mixed == pytest.approx(0.1)
+    assert rim.unsteady_px(20.0) == pytest.approx(0.2 * 0.08 * 20.0)
+    assert Rim().with_outline(dataclasses.replace(outline(0.0), ahead_on=0.99)).unsteady_px(20.0) == 0.0
+
+
+def test_a_ball_that_is_half_painted_touches_nothing() -> None:
+    """Its print comes and goes at the outline ahead, which moves the circle by half a pixel and more."""
+    _, black = cv2.imencode(".png", np.zeros((8, 8), np.uint8))
+    painted = Logo("png", base64.b64encode(black.tobytes()).decode(), 60.0)
+    flight = Flight(0.0, 0.06, (-0.11, 0.0, 1.8), (4.0, 0.3, 0.0), (5.0, 38.0, -30.0), (1.0, 0.0, 0.0, 0.0))
+    scene = Scene(0.06, (Ball((flight,), logo=painted),))
+    made = simulate_scene(scene, camera=Camera.of(CameraParameters(), 280, 120), seed=97_203)
+    chain = Chain(EventsInMemory("simulation", made.events, made.width_px, made.height_px, 0, made.duration_us))
+    results = [tick.track for tick in chain.run(preset("default"), targets=("track",))]
+    assert sum(result.measured is not None for result in results) >= 8
+    assert [end for result in results for end in result.ended] == []
 
 
 @pytest.mark.parametrize(
