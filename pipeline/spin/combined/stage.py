@@ -101,7 +101,7 @@ def step(
     if basis is None or contrast.changes:
         reason = contrast.estimate.reason or "the logo is not seen"
         # The flight is of two flights as well, or tells to a third what a logo in view would tell to a hundredth.
-        against = "trajectory" if contrast.changes or contrast.is_sharp else None
+        against = "trajectory" if contrast.changes or contrast.pattern != "none" else None
         return CombinedResult(SpinEstimate.refused(METHOD, reason, against=against), witnesses)
     spins_rps = np.stack([candidate.spins_rps for candidate in candidates])
     bend = by_flight(trajectory, spins_rps)
@@ -149,14 +149,14 @@ def _candidates(
 ) -> tuple[Basis | None, list[Candidate]]:
     """The spins to choose from by the most precise witness that names any, and which it is."""
     gyro_std_deg = context["trajectory.gyro_std_deg"]
-    if contrast.turns_seen:
+    if contrast.pattern == "turning":
         return "pattern", pattern_candidates(contrast)
     # Of 17 rhythms that contradict a sharp pattern none is right: they are twice the spin (docs/contrast.md).
-    if contrast.is_off_rhythm:
+    if contrast.pattern == "off_rhythm":
         return None, []
     if candidates := rhythm_candidates(rate, trajectory, gyro_std_deg):
         return "rhythm", candidates
-    if contrast.is_sharp:
+    if contrast.pattern == "unclear":
         return None, []
     candidates = flight_candidates(trajectory, gyro_std_deg, context["spin.max_spin_rps"])
     return ("flight" if candidates else None), candidates

@@ -27,6 +27,7 @@ from .search import (
     RIM_COSINE,
     Stretch,
     distinct,
+    even_span_s,
     grid_search,
     linked_share,
     local_model,
@@ -34,6 +35,7 @@ from .search import (
     maximise_each,
     spin_covariance,
     view_cosine,
+    without_strays,
 )
 
 # Magnitudes from 0.45 to 2.2 of a candidate's hold every confusion of n turns with n + 1 (or n - 1), down to half and
@@ -327,14 +329,15 @@ def _refined(
     """The estimate around a spin, with the ball's offsets; `events` are thinned from those of the stretch."""
     objective = _with_place(events, ball, settings)
     spin, offsets, sharp, model = maximise(objective, spin_rad_s, offsets_px, iterations)
+    steady = without_strays(events)
     return ContrastEstimate(
         spin / TURN,
-        spin_covariance(objective, model, events, ball, settings, stretch) / TURN**2,
+        spin_covariance(objective, model, events, ball, settings, stretch, even_span_s(steady)) / TURN**2,
         *stretch,
         offsets_px=offsets,
         contrast=_contrast(objective, spin, offsets, sharp),
         patch_rad=events.patch_rad,
-        linked_share=linked_share(events, spin, settings),
+        linked_share=linked_share(steady, spin, settings),
     )
 
 
@@ -372,9 +375,10 @@ def _with_alternatives(
             kept += np.outer(gap_rps, gap_rps) * one / (1.0 + one)
     rivals, some = spins_rad_s[1:][~near], events.thinned(settings.rival_events)
     objective, covariances = _with_place(some, ball, settings), np.empty((len(rivals), 3, 3))
+    even_s = even_span_s(without_strays(some))
     for k, rival in enumerate(rivals):
         model = local_model(objective, rival, np.zeros(3), 1.0)
-        covariances[k] = spin_covariance(objective, model, some, ball, settings, stretch) / TURN**2
+        covariances[k] = spin_covariance(objective, model, some, ball, settings, stretch, even_s) / TURN**2
     return replace(
         answer,
         covariance_rps2=answer.covariance_rps2 + kept,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numba
 import numpy as np
@@ -19,6 +19,14 @@ LOG_ODDS_PER_SIGMA = 1.7
 # No spin is less likely than this against the best one: of 190 answers on simulated flights and spinners none was
 # grossly wrong, so that up to 3 in 190 may be (rule of three, 95 %).
 UNEXPLAINED = math.log(3.0 / 190.0)
+# ON and OFF, bright and dark pixels report 25 us sooner or later than the mean latency: what the ball flies meanwhile
+# is an error of its place that the tracker, which sees the outline, does not know of.
+LATENCY_SPREAD_S = 25e-6
+# What the events are, turned back by the best spin. `none`: chance brings as many together; `unclear`: they come
+# together, but may be a slow sensor's outline, or visits of the logo that do not fit together, and tell neither its
+# motion nor when it was seen; `off_rhythm`: the pattern comes back, but not with its spin, so that neither of the two
+# tells the spin; `turning`: one pattern that turns, and nothing puts it in doubt.
+Pattern = Literal["none", "unclear", "off_rhythm", "turning"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -137,8 +145,6 @@ class BallUncertainty:
         Of the centre (one axis) and the radius, as constant errors over the stretch.
     track_std_px, drift_std_px_s : float
         Of the centre's changes within the stretch, and the most it can drift.
-    latency_std_px : float
-        What the centre moves in the time by which the logo's events come sooner or later than one another.
     speed_px_s : float
         Speed of the centre itself (no uncertainty): what an edge moves with besides the spin.
     """
@@ -147,13 +153,17 @@ class BallUncertainty:
     radius_std_px: float
     track_std_px: float = 0.0
     drift_std_px_s: float = 0.0
-    latency_std_px: float = 0.0
     speed_px_s: float = 0.0
 
     @property
     def is_flying(self) -> bool:
         """Whether the ball moves; one on a spinner stays in place."""
         return self.speed_px_s > 0.0
+
+    @property
+    def latency_std_px(self) -> float:
+        """What the centre moves in the time by which the logo's events come sooner or later than one another."""
+        return self.speed_px_s * LATENCY_SPREAD_S
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -244,15 +254,8 @@ class ContrastResult(ReadOnlyArrays):
         Centre x, y and radius of the ball, refined less tracked.
     contrast : float
         Score an event less that of permuted times; 0 = nothing turns with the spin.
-    turns_seen : bool
-        Whether the events are those of one pattern that turns: sharp enough to be no chance, and nothing that follows
-        puts it in doubt; without it no spin is likelier.
-    is_sharp : bool
-        Whether the best spin brings the events together; without `turns_seen` they may be a slow sensor's outline, or
-        visits of the logo that do not fit together, and tell neither its motion nor when it was seen.
-    is_off_rhythm : bool
-        Whether the pattern is sharp and comes back, but not with its spin: then neither it nor its rhythm tells the
-        spin.
+    pattern : Pattern
+        What the events are, turned back by the best spin; where it is not `turning`, no spin is likelier.
     changes : bool
         Whether the spin changes within the flight: a contact was missed, and no estimate from all of it holds.
     full : bool
@@ -274,9 +277,7 @@ class ContrastResult(ReadOnlyArrays):
     reference_us: float
     offsets_px: Floats
     contrast: float
-    turns_seen: bool
-    is_sharp: bool
-    is_off_rhythm: bool
+    pattern: Pattern
     changes: bool
     full: bool
     magnitudes_rps: Floats
@@ -299,9 +300,7 @@ class ContrastResult(ReadOnlyArrays):
             reference_us=math.nan,
             offsets_px=np.zeros(3),
             contrast=0.0,
-            turns_seen=False,
-            is_sharp=False,
-            is_off_rhythm=False,
+            pattern="none",
             changes=False,
             full=False,
             **ScoreMap.empty()._asdict(),
@@ -328,7 +327,7 @@ class ContrastResult(ReadOnlyArrays):
         over it is `contrast` times the number of events.
         """
         spins_rps = np.asarray(spins_rps, np.float64).reshape(-1, 3)
-        if not self.turns_seen:
+        if self.pattern != "turning":
             return np.zeros(len(spins_rps))
         heights = -LOG_ODDS_PER_SIGMA * np.concatenate([[0.0], self.rival_sigmas])
         means = np.concatenate([self.best_rps[None], self.rivals_rps])

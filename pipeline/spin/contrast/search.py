@@ -349,11 +349,11 @@ def spin_covariance(
     ball: BallUncertainty,
     settings: ContrastSettings,
     stretch: Stretch,
+    even_s: float,
 ) -> Floats:
     """Covariance (3, 3) of the spin, rad^2/s^2, at the maximum that `model` was made at.
 
-    `events` are those of the objective, thinned from those of the stretch. A stray event before the logo's first visit
-    does not lengthen what it was followed over.
+    `events` are those of the objective, thinned from those of the stretch, `even_s` is their `even_span_s`.
     """
     spin = model.spin_rad_s
     squared = float(spin @ spin)
@@ -363,7 +363,7 @@ def spin_covariance(
     x, y, z = spin / math.sqrt(squared)
     nx, ny, nz = events.normals
     lever = np.stack([y * nz - z * ny, z * nx - x * nz, x * ny - y * nx])
-    even_s = max(even_span_s(events), 1e-5)
+    even_s = max(even_s, 1e-5)
     span_s = max(min(even_s, stretch.span_s), 1e-5)
     covariance += _drift(objective, events, ball, spin, lever, span_s)
     oblique = max(1.0, RIM_COSINE / max(float(view_cosine(events).mean()), RIM_COSINE / MOST_OBLIQUE))
@@ -374,14 +374,14 @@ def spin_covariance(
 
 
 def linked_share(events: SphereEvents, spin_rad_s: Floats, settings: ContrastSettings) -> float:
-    """Stretch over which the events confirm a spin, as a share of that over which there are events.
+    """Stretch over which events, without strays, confirm a spin, as a share of that over which there are events.
 
     Only events of one polarity that coincide on the turned-back ball tell how far it turned between them. So the root
     mean square of the time between two events is taken over the pairs that do, and over all: where a visit of the logo
     shows another part of it than the others, or the spin brings it elsewhere, the pairs that coincide are those within
     the visits.
     """
-    some = without_strays(events).thinned(LINKED_EVENTS)
+    some = events.thinned(LINKED_EVENTS)
     turned = np.empty_like(some.normals)
     derotate(turned, spin_rad_s, some.t_s, some.normals)
     nearest = math.cos(LINKED_KERNELS * settings.sigma_rad)
@@ -390,12 +390,15 @@ def linked_share(events: SphereEvents, spin_rad_s: Floats, settings: ContrastSet
 
 
 def even_span_s(events: SphereEvents) -> float:
-    """Length of a stretch filled evenly with events whose times spread as much as these, strays apart."""
-    return math.sqrt(12.0) * float(np.std(without_strays(events).t_s))
+    """Length of a stretch filled evenly with events whose times spread as much as these, which are without strays."""
+    return math.sqrt(12.0) * float(np.std(events.t_s))
 
 
 def without_strays(events: SphereEvents) -> SphereEvents:
-    """The events without those that hardly any others are near in time: noise between the logo's visits."""
+    """The events without those that hardly any others are near in time: noise between the logo's visits.
+
+    A stray event before the first visit does not lengthen what the logo was followed over.
+    """
     first, last = (np.searchsorted(events.t_s, events.t_s + beside_s) for beside_s in (-BESIDE_S, BESIDE_S))
     near = last - first
     return events.at(near >= STRAY * near.max())

@@ -26,7 +26,16 @@ from ...stages.rate import RateResult
 from ...stages.rate_period import FEWEST_SIGMAS
 from ...stages.track_result import BallTrack
 from .estimate import PARTS, estimate_spin, estimates_of_ends, follow_spin, score_map
-from .events import BallUncertainty, ContrastEstimate, ContrastResult, ContrastSettings, ScoreMap, SphereEvents
+from .events import (
+    LATENCY_SPREAD_S,
+    BallUncertainty,
+    ContrastEstimate,
+    ContrastResult,
+    ContrastSettings,
+    Pattern,
+    ScoreMap,
+    SphereEvents,
+)
 
 METHOD, FLOW_METHOD = "contrast", "normal_flow"
 # Full estimates when the shot is so old, then each time it is half as old again; in between the last answer is
@@ -48,9 +57,6 @@ LOST = 0.85
 # more than 2 rps, and at the seventh's truth the visits meet. Of the others, at 0.52 and more, one is wrong.
 LEAST_LINKED = 0.4
 UNLINKED = "the logo's visits do not fit together: no spin found brings them to one place on the ball"
-# ON and OFF, bright and dark pixels report 25 us sooner or later than the mean latency: what the ball flies meanwhile
-# is an error of its place that the tracker, which sees the outline, does not know of.
-LATENCY_SPREAD_S = 25e-6
 # Before the logo has come back for the first time the magnitude rests on how far it moved.
 RETURNED_TURNS = 1.2
 # Edges that come and go give both polarities; what pixels of a slow sensor still report of the ball's outline when it
@@ -228,13 +234,11 @@ def _joined(state: ContrastState) -> SphereEvents:
 def _uncertainty(ball_stds: Sequence[tuple[float, float, float, float]]) -> BallUncertainty:
     """Uncertainty of the ball's place over some ticks: their medians."""
     position, radius, velocity, speed = (float(value) for value in np.median(np.array(ball_stds), axis=0))
-    latency_std_px = speed * LATENCY_SPREAD_S
     return BallUncertainty(
-        centre_std_px=max(math.hypot(position, latency_std_px), 0.01),
+        centre_std_px=max(math.hypot(position, speed * LATENCY_SPREAD_S), 0.01),
         radius_std_px=max(radius, 0.01),
         track_std_px=position,
         drift_std_px_s=velocity,
-        latency_std_px=latency_std_px,
         speed_px_s=speed,
     )
 
@@ -430,8 +434,8 @@ def _judged(
     count: int,
     rate: RateResult,
     normal_flow: SpinEstimate,
-) -> tuple[SpinEstimate, bool, bool, bool]:
-    """Estimate of an answer from `count` events or its refusal; turns_seen, is_sharp and is_off_rhythm of its result.
+) -> tuple[SpinEstimate, Pattern]:
+    """Estimate of an answer from `count` events or its refusal, and what the events are.
 
     An answer is settled where the logo says so much that neither its rhythm nor its normal flow can put it in doubt.
     """
@@ -439,13 +443,18 @@ def _judged(
     settled = is_settled(parameters, state)
     may_be_outline = answer.turns < RETURNED_TURNS and _are_one_polarity(state)
     off_rhythm = not settled and misses_rhythm(rate, answer) and not comes_back_twice(rate, answer, normal_flow)
-    is_sharp = answer.contrast >= parameters.min_gain
-    turns_seen = is_sharp and answer.linked_share >= LEAST_LINKED and not may_be_outline and not off_rhythm
+    pattern: Pattern = "turning"
+    if answer.contrast < parameters.min_gain:
+        pattern = "none"
+    elif off_rhythm:
+        pattern = "off_rhythm"
+    elif may_be_outline or answer.linked_share < LEAST_LINKED:
+        pattern = "unclear"
     estimate = SpinEstimate(METHOD, answer.spin_rps.copy(), answer.covariance_rps2.copy(), None, count)
     reason, against = state.reason, None
     if reason is not None:
         # Where nothing turns, the normal flow has seen no pattern either, but noise; of two spins it is a mixture.
-        one_pattern = turns_seen and not state.changes
+        one_pattern = pattern == "turning" and not state.changes
         against = None if one_pattern and _may_be_one_of(parameters, answer, normal_flow) else FLOW_METHOD
     elif may_be_outline:
         reason, against = OUTLINE, FLOW_METHOD  # which sees the same events
@@ -458,7 +467,7 @@ def _judged(
         )
     if reason is not None:
         estimate = SpinEstimate.refused(METHOD, reason, count, against=against)
-    return estimate, turns_seen, is_sharp, is_sharp and off_rhythm
+    return estimate, pattern
 
 
 def _result(
@@ -467,7 +476,7 @@ def _result(
     answer = state.answer
     if answer is None or answer.spin_rps is None or answer.covariance_rps2 is None:
         return ContrastResult.nothing(SpinEstimate.refused(METHOD, state.reason or "no estimate yet", count))
-    estimate, turns_seen, is_sharp, is_off_rhythm = _judged(parameters, state, answer, count, rate, flow)
+    estimate, pattern = _judged(parameters, state, answer, count, rate, flow)
     middle_us, half_us = answer.reference_s * 1e6, 0.5e6 * answer.span_s
     return ContrastResult(
         estimate=estimate.up_to(state.context["spin.max_spin_rps"], FLOW_METHOD),
@@ -481,9 +490,7 @@ def _result(
         reference_us=middle_us,
         offsets_px=answer.offsets_px.copy(),
         contrast=answer.contrast,
-        turns_seen=turns_seen,
-        is_sharp=is_sharp,
-        is_off_rhythm=is_off_rhythm,
+        pattern=pattern,
         changes=state.changes,
         full=full,
         **{name: column.copy() for name, column in state.score_map._asdict().items()},

@@ -13,13 +13,13 @@ METHODS = [
     ),
     Mutant(
         "pipeline/spin/combined/stage.py",
-        "if contrast.is_sharp:\n        return None, []",
+        'if contrast.pattern == "unclear":\n        return None, []',
         "if False:\n        return None, []",
         "tests/pipeline/spin/test_combined.py",
     ),
     Mutant(
         "pipeline/spin/combined/stage.py",
-        "if contrast.is_off_rhythm:\n        return None, []",
+        'if contrast.pattern == "off_rhythm":\n        return None, []',
         "if False:\n        return None, []",
         "tests/pipeline/spin/test_combined.py",
     ),
@@ -100,8 +100,8 @@ CONTRAST = [
     ),
     Mutant(
         "pipeline/spin/contrast/stage.py",
-        "is_sharp and answer.linked_share >= LEAST_LINKED and",
-        "is_sharp and",
+        "may_be_outline or answer.linked_share < LEAST_LINKED:",
+        "may_be_outline:",
         "tests/pipeline/spin/test_contrast_trust.py -k fit_together",
     ),
     Mutant(
@@ -112,7 +112,7 @@ CONTRAST = [
     ),
     Mutant(
         "pipeline/spin/contrast/stage.py",
-        "centre_std_px=max(math.hypot(position, latency_std_px), 0.01)",
+        "centre_std_px=max(math.hypot(position, speed * LATENCY_SPREAD_S), 0.01)",
         "centre_std_px=max(position, 0.01)",
         "tests/pipeline/stages/test_contrast_memory.py -k flies_on",
     ),

@@ -39,7 +39,7 @@ def pattern(
         rivals_rps=np.array(rivals).reshape(-1, 3),
         rival_covariances_rps2=covariances[1:],
         rival_sigmas=np.array(sigmas),
-        turns_seen=True,
+        pattern="turning",
         contrast=0.5,
     )
 
@@ -247,25 +247,25 @@ def test_the_bend_of_the_flight_alone_answers_where_it_tells_the_magnitude_to_a_
 
 def test_the_flight_does_not_answer_alone_where_the_logo_may_be_in_view() -> None:
     """What is seen may be a slow sensor's outline, or visits that do not fit together; their rhythm still counts."""
-    unclear = replace(ContrastResult.nothing(REFUSED), is_sharp=True)
+    unclear = replace(ContrastResult.nothing(REFUSED), pattern="unclear")
     bent = _BentFlight(TOP, 8.0)
     told = replace(flight(TOP), likelihood=bent, across=bent)  # type: ignore[arg-type]
     of_flight = {"trajectory": SpinEstimate("trajectory", TOP, covariance(TOP, 5.0, 15.0), None)}
     alone = answered(unclear, told).estimate
     assert alone.reason == REFUSED.reason
     assert trusted_method(of_flight | {"contrast": REFUSED, "combined": alone}) is None
-    assert answered(replace(unclear, is_sharp=False), told).estimate.status == "ok"
+    assert answered(replace(unclear, pattern="none"), told).estimate.status == "ok"
     assert answered(unclear, told, rhythm([60.2])).basis == "rhythm"
 
 
 def test_nothing_answers_where_the_rhythm_contradicts_a_sharp_pattern() -> None:
     """Neither the rhythm nor the flight, which would tell to a third what a logo in view leaves open."""
-    unclear = replace(ContrastResult.nothing(REFUSED), is_sharp=True, is_off_rhythm=True)
+    contradicted = replace(ContrastResult.nothing(REFUSED), pattern="off_rhythm")
     of_flight = {"trajectory": SpinEstimate("trajectory", TOP, covariance(TOP, 5.0, 15.0), None)}
-    refused = answered(unclear, flight(TOP), rhythm([60.2])).estimate
+    refused = answered(contradicted, flight(TOP), rhythm([60.2])).estimate
     assert refused.reason == REFUSED.reason
     assert trusted_method(of_flight | {"contrast": REFUSED, "combined": refused}) is None
-    assert answered(replace(unclear, is_off_rhythm=False), flight(TOP), rhythm([60.2])).basis == "rhythm"
+    assert answered(replace(contradicted, pattern="unclear"), flight(TOP), rhythm([60.2])).basis == "rhythm"
 
 
 class _BentFlight(_Flight):

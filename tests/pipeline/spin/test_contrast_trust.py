@@ -103,9 +103,9 @@ def test_visits_that_do_not_fit_together_tell_no_spin(linked_share: float) -> No
     flow = SpinEstimate("normal_flow", SPIN, np.eye(3), None)
     answer = replace(SURE, linked_share=linked_share)
     state.answer, state.reason = answer, stage.doubt(PARAMETERS, answer)
-    estimate, turns_seen, is_sharp, _ = stage._judged(PARAMETERS, state, answer, 600, rhythm(sigmas=0.0), flow)
+    estimate, pattern = stage._judged(PARAMETERS, state, answer, 600, rhythm(sigmas=0.0), flow)
     trusted = trusted_method({"normal_flow": flow, "contrast": estimate})
-    assert is_sharp and (turns_seen, trusted) == ((True, "contrast") if linked_share > 0.4 else (False, None))
+    assert (pattern, trusted) == (("turning", "contrast") if linked_share > 0.4 else ("unclear", None))
 
 
 @pytest.mark.parametrize(
@@ -132,14 +132,14 @@ def test_a_rhythm_that_contradicts_a_sharp_pattern_is_said_of_it() -> None:
     ball = dotted_ball(SPIN, duration_s=0.1, events=600)
     state = stage.ContrastState({}, parts=[(0, ball)], is_bright=[True])  # type: ignore[arg-type]
     answer, flow = replace(SURE, span_s=0.1), SpinEstimate.refused("normal_flow", "no flow")
-    estimate, *said = stage._judged(PARAMETERS, state, answer, 600, rhythm(33.0), flow)
-    assert said == [False, True, True]
+    estimate, pattern = stage._judged(PARAMETERS, state, answer, 600, rhythm(33.0), flow)
+    assert pattern == "off_rhythm"
     assert "comes back with 33.0 rps, not with (20, 0, 0)" in (estimate.reason or "")
-    assert stage._judged(PARAMETERS, state, answer, 600, rhythm(20.0), flow)[1:] == (True, True, False)
+    assert stage._judged(PARAMETERS, state, answer, 600, rhythm(20.0), flow)[1] == "turning"
     flow = SpinEstimate("normal_flow", SPIN, np.eye(3), None)
     assert stage._judged(PARAMETERS, state, answer, 600, rhythm(40.0), flow)[0].status == "ok"
     dull = replace(answer, contrast=0.2)
-    assert stage._judged(PARAMETERS, state, dull, 600, rhythm(33.0), flow)[1:] == (False, False, False)
+    assert stage._judged(PARAMETERS, state, dull, 600, rhythm(33.0), flow)[1] == "none"
 
 
 @pytest.mark.parametrize(
@@ -168,10 +168,10 @@ def test_what_may_be_outline_is_trusted_neither_to_the_pattern_nor_to_its_flow(e
     state = stage.ContrastState({}, parts=[(0, replace(ball, polarity=polarity))], is_bright=[True])  # type: ignore[arg-type]
     flow = SpinEstimate("normal_flow", SPIN, np.eye(3), None)
     answer = replace(SURE, span_s=0.4 / float(np.linalg.norm(SPIN)))
-    estimate, *said = stage._judged(PARAMETERS, state, answer, 600, rhythm(sigmas=0.0), flow)
+    estimate, pattern = stage._judged(PARAMETERS, state, answer, 600, rhythm(sigmas=0.0), flow)
     if events == "on":
         assert (estimate.reason, estimate.against) == (stage.OUTLINE, "normal_flow")
         assert trusted_method({"normal_flow": flow, "contrast": estimate}) is None
     else:
         assert estimate.status == "ok"
-    assert said == ([False, True, False] if events == "on" else [True, True, False])
+    assert pattern == ("unclear" if events == "on" else "turning")

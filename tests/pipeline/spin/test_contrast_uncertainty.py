@@ -54,7 +54,7 @@ def test_the_logo_that_has_come_back_has_told_the_magnitude() -> None:
 
 
 def share(events: SphereEvents, spin_rps: np.ndarray) -> float:
-    return search.linked_share(events, 2 * math.pi * spin_rps, ContrastSettings())
+    return search.linked_share(search.without_strays(events), 2 * math.pi * spin_rps, ContrastSettings())
 
 
 @pytest.mark.parametrize("spin_rps", [SPIN, 0.6 * SPIN])
@@ -167,7 +167,7 @@ def result(**changes: object) -> ContrastResult:
         "rivals_rps": -SPIN[None],
         "rival_covariances_rps2": 4.0 * np.eye(3)[None],
         "rival_sigmas": np.array([1.5]),
-        "turns_seen": True,
+        "pattern": "turning",
     }
     return replace(nothing, **(known | changes))
 
@@ -179,6 +179,6 @@ def test_the_likelihood_of_a_spin_is_that_of_its_nearest_candidate() -> None:
 
 
 def test_where_nothing_turns_no_spin_is_likelier() -> None:
-    assert not result(turns_seen=False).log_likelihood(np.stack([SPIN, -SPIN])).any()
+    assert not result(pattern="unclear").log_likelihood(np.stack([SPIN, -SPIN])).any()
     nothing = ContrastResult.nothing(SpinEstimate.refused("contrast", "no ball"))
     assert nothing.log_likelihood(SPIN).tolist() == [0.0]

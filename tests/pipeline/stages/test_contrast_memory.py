@@ -14,7 +14,7 @@ from spinscope.pipeline.results import MethodResult, Packet, SpinEstimate
 from spinscope.pipeline.spin.contrast import ContrastParameters
 from spinscope.pipeline.spin.contrast import stage as contrast
 from spinscope.pipeline.spin.contrast.events import ContrastEstimate
-from spinscope.pipeline.spin.contrast.search import even_span_s
+from spinscope.pipeline.spin.contrast.search import even_span_s, without_strays
 from spinscope.pipeline.spin.contrast.stage import doubt
 from spinscope.pipeline.stages import logo, rate
 from spinscope.pipeline.stages.filter import FilterResult
@@ -88,7 +88,7 @@ def test_place_and_drift_of_the_track_enter_the_stated_error() -> None:
     state = contrast.start(ContrastParameters(), CONTEXT)
     for packet in ticks():
         contrast.take(ContrastParameters(), state, packet, known_ball(packet.end_us), seen(packet))
-    span_s = even_span_s(contrast._joined(state))
+    span_s = even_span_s(without_strays(contrast._joined(state)))
     rate_rps = math.sqrt(12.0 / (span_s / 0.01)) * 0.05 / span_s / known_ball(5000).mean[4] / (2 * math.pi)
     across = np.eye(3) - np.outer(sure.axis, sure.axis)
     added = across @ (drifting.covariance_rps2 - sure.covariance_rps2) @ across
