@@ -384,13 +384,10 @@ export class RunRequests extends EventTarget {
   // Waits for the first layout: before it there is one of the viewer's own. One that comes while the viewer is starting
   // can get lost, and is not taken a second time: then it gets another one of the same panes.
   async #laidOut() {
-    const wanted = this.viewer.front; // chosen while the layout was on its way
-    if (await this.viewer.tab(LAYOUT_MS) === null) {
-      this.#layoutOf = null;
-      await this.#fit();
-      await this.viewer.tab();
-    }
-    if (wanted !== null) await this.viewer.bringToFront(wanted);
+    if (await this.viewer.laidOut(LAYOUT_MS)) return;
+    this.#layoutOf = null;
+    await this.#fit();
+    await this.viewer.laidOut();
   }
 
   // The panes of a viewer of another size; a picture that is on its way brings them along.

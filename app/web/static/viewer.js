@@ -65,6 +65,7 @@ export class Viewer extends EventTarget {
   #play = "paused";
   /** @type {string | null} name of the tab in front */
   front = null;
+  #isLaidOut = false; // before our first layout there is one of the viewer's own
   #isAlone = false;
 
   /**
@@ -121,14 +122,14 @@ export class Viewer extends EventTarget {
   }
 
   /**
-   * Takes a layout; one for a recording that is shown is there at the end, not some frames later over another one.
+   * Takes a layout; any but the first is there at the end, not some frames later over another one.
    * @param {{content: Uint8Array, root: string}} layout
    */
   layout({ content, root }) {
     return this.#next(async () => {
       const { front } = this; // it was asked for before somebody turned to this tab
       this.#channel.send_rrd(content);
-      if (this.#shown === null) return;
+      if (!this.#isLaidOut) return;
       const until = performance.now() + LAYOUT_MS;
       const present = async () => (await this.#viewer.get_blueprint()).blueprint["/viewport"]?.ViewportBlueprint;
       while ((await present())?.root_container !== root) { // one that was sent before may come late
@@ -262,9 +263,9 @@ export class Viewer extends EventTarget {
   }
 
   bringToFront(/** @type {string} */ title) {
-    if (this.#shown === null) this.#turned(title); // the first recording is shown there
+    if (!this.#isLaidOut) this.#turned(title); // the first layout opens there
     return this.#next(async () => {
-      if (this.#shown !== null) await this.#bring(title);
+      if (this.#isLaidOut) await this.#bring(title);
     });
   }
 
@@ -322,10 +323,18 @@ export class Viewer extends EventTarget {
     }
   }
 
-  // The name of the tab in front; null where none of ours has come so long.
-  async tab(patience_ms = LAYOUT_MS) {
-    const blueprint = await this.#layout(patience_ms);
-    this.#turned(tabs(blueprint).find(({ front }) => front)?.title ?? null);
+  // Whether our first layout has come; the tab that was chosen until then is in front.
+  laidOut(patience_ms = LAYOUT_MS) {
+    return this.#next(async () => {
+      this.#isLaidOut = tabs(await this.#layout(patience_ms)).some(({ title }) => title);
+      if (this.#isLaidOut) await (this.front === null ? this.tab() : this.#bring(this.front));
+      return this.#isLaidOut;
+    });
+  }
+
+  // The name of the tab in front.
+  async tab() {
+    this.#turned(tabs(await this.#layout()).find(({ front }) => front)?.title ?? null);
     return this.front;
   }
 

@@ -37,7 +37,7 @@ VISIBLE = 500  # logo events in a flight from which an answer is asked for
 
 THROWER, HUMAN = "thrower", "people"  # who plays
 
-QUICK = {(25, -3, False), (20, 4, False), (15, 0, True)}
+QUICK = {(25, -3, False), (15, 0, True)}
 
 
 def flights(quick: bool) -> list[dict[str, Any]]:

@@ -8,6 +8,8 @@ from typing import Any
 
 import pytest
 
+from tests.app.web.browser_tab import pauses
+
 CHROMIUM = Path("/usr/bin/chromium")
 FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
 PATIENCE_MS = 120_000
@@ -43,10 +45,10 @@ class CoachTab:
 
     def until(self, holds: str) -> None:
         """Wait until an expression holds in the page, whose policy forbids Playwright's own way."""
-        end = time.monotonic() + PATIENCE_MS / 1000
+        end, waiting = time.monotonic() + PATIENCE_MS / 1000, pauses(self.page)
         while not self.page.evaluate(holds):
             assert time.monotonic() < end, holds
-            self.page.wait_for_timeout(30)
+            next(waiting)
 
     def texts(self, selector: str) -> list[str]:
         return [str(text) for text in self.page.locator(selector).all_inner_texts()]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ FLAGS = [
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
+    "--disable-gpu-compositing",  # the page around the viewer without OpenGL: a third of the computing
     "--disable-dev-shm-usage",
 ]
 SIZE = {"width": 760, "height": 480}  # software drawing is slow: a small window
@@ -27,6 +28,15 @@ needs_browser = [
     pytest.mark.browser,
     pytest.mark.skipif(not CHROMIUM.exists(), reason=f"there is no browser at {CHROMIUM}"),
 ]
+
+
+def pauses(page: Any) -> Iterator[None]:
+    """Let the page go on, each time a little longer: to ask it costs 6 ms of computing, also of what it waits for."""
+    pause_ms = 15.0
+    while True:
+        page.wait_for_timeout(pause_ms)
+        pause_ms = min(1.25 * pause_ms, 200.0)
+        yield
 
 
 class Tab:
@@ -76,10 +86,10 @@ class Tab:
 
     def until(self, holds: str, says: Callable[[], str] | None = None) -> None:
         """Wait until an expression holds in the page, which may be loaded anew meanwhile; what is said where not."""
-        end = time.monotonic() + PATIENCE_MS / 1000
+        end, waiting = time.monotonic() + PATIENCE_MS / 1000, pauses(self.page)
         while not self._holds(holds):
             assert time.monotonic() < end, says() if says else holds
-            self.page.wait_for_timeout(30)
+            next(waiting)
 
     def _holds(self, expression: str) -> bool:
         try:

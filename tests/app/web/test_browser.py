@@ -200,6 +200,29 @@ def test_a_layout_that_was_asked_for_before_another_tab_was_chosen_leaves_that_i
     assert front == "Coach"
 
 
+def test_a_tab_that_is_chosen_while_the_first_layout_is_awaited_is_in_front_of_it(tab: Tab) -> None:
+    """As is one that was chosen before; the layout comes when there is one of the viewer's own."""
+    front = tab.page.evaluate(
+        """(async () => {
+            const { viewer } = window.spinscope, { api } = viewer;
+            let asked = 0;
+            await viewer.bringToFront("Tracker");
+            api.get_blueprint = () => (asked++, { blueprint: {} });
+            viewer.laidOut(0);
+            const came = viewer.laidOut();
+            while (asked < 3) await new Promise((resolve) => setTimeout(resolve, 10));
+            const chosen = viewer.bringToFront("Coach");
+            delete api.get_blueprint;
+            const front = [await came, viewer.front];
+            await chosen;
+            front.push(await viewer.tab());
+            await viewer.bringToFront("Tracker");
+            return front;
+        })()"""
+    )
+    assert front == [True, "Coach", "Coach"]
+
+
 def test_the_panes_follow_a_ball_that_is_fixed_and_flies_again(tab: Tab) -> None:
     """The layout is made anew for the mode, and the tab stays."""
     tab.settled("shown")
@@ -256,8 +279,10 @@ def test_a_layout_that_is_lost_while_the_viewer_starts_is_made_again(browser: An
 
     tab.page.route(re.compile(r"/layout\?"), lose_first)
     tab.open(f"{tuner.address}#tab=Tracker")
+    tab.until("window.spinscope.viewer.playhead_us !== null")  # the picture has come, the layout has not
+    tab.page.evaluate("window.spinscope.viewer.bringToFront('Coach')")
     tab.settled("shown")
-    assert lost and tab.page.evaluate("window.spinscope.viewer.front") == "Tracker"
+    assert lost and tab.page.evaluate("window.spinscope.viewer.tab()") == "Coach"
     context.close()
 
 

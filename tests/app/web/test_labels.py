@@ -19,7 +19,7 @@ from spinscope.pipeline.calibration.label_file import HAND_STD_PX
 from spinscope.pipeline.events import EventBatch
 from spinscope.pipeline.recordings import open_recording
 
-from .browser_tab import PATIENCE_MS, bare_tab, needs_browser
+from .browser_tab import PATIENCE_MS, bare_tab, needs_browser, pauses
 from .conftest import Client, Served
 
 
@@ -91,10 +91,10 @@ def test_labels_are_gone_through_by_key_and_mouse(browser: Any, tuner: Served, p
 
     def saved(holds: Callable[[BallLabels], bool]) -> None:
         """Wait until what is in the file holds."""
-        end_s = time.monotonic() + PATIENCE_MS / 1000
+        end_s, waiting = time.monotonic() + PATIENCE_MS / 1000, pauses(page)
         while not holds(found := BallLabels.read(path)):
             assert time.monotonic() < end_s, found
-            page.wait_for_timeout(30)
+            next(waiting)
 
     page.keyboard.press("Enter")
     page.keyboard.press("Shift+ArrowRight")

@@ -87,9 +87,11 @@ def test_the_lives_that_the_facts_name() -> None:
 
 
 @pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.stem)
-def test_whole_recordings_equal_the_reference(path: Path) -> None:
+def test_recordings_equal_the_reference(path: Path) -> None:
+    """15,000 events in the middle: of the ball, and noise all over the image."""
     with h5py.File(path) as file:
-        x, y = file["events/x"][:], file["events/y"][:]
+        first = max(0, file["events/x"].size // 2 - 7500)
+        x, y = (file[f"events/{axis}"][first : first + 15_000] for axis in "xy")
         width, height = int(file.attrs["width"]), int(file.attrs["height"])
     cuts = range(0, x.size, max(1, x.size // 4))
     assert_equal_streams(width, height, 10, [(x[i : i + cuts.step], y[i : i + cuts.step]) for i in cuts])

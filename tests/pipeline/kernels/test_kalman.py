@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from types import ModuleType
 
 import numpy as np
 import pytest
-from filterpy import kalman as filterpy
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -14,6 +14,14 @@ from spinscope.pipeline.kernels import kalman
 from tests.reference import kalman as reference
 
 SEEDS = st.integers(0, 2**32 - 1)
+
+
+@pytest.fixture(scope="module")
+def filterpy() -> ModuleType:
+    """Loaded here, for it brings scipy.stats: a tenth of what all tests load."""
+    from filterpy import kalman
+
+    return kalman
 
 
 def state(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -24,7 +32,7 @@ def state(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 
 @given(seed=SEEDS, dt_s=st.floats(1e-4, 0.05))
-def test_a_prediction_equals_the_twins_and_filterpys(seed: int, dt_s: float) -> None:
+def test_a_prediction_equals_the_twins_and_filterpys(filterpy: ModuleType, seed: int, dt_s: float) -> None:
     rng = np.random.default_rng(seed)
     mean, covariance = state(rng)
     acceleration, growth = rng.uniform(1e3, 1e5), rng.uniform(1, 500)
@@ -36,7 +44,7 @@ def test_a_prediction_equals_the_twins_and_filterpys(seed: int, dt_s: float) -> 
 
 
 @given(seed=SEEDS)
-def test_an_update_equals_the_twins_and_filterpys(seed: int) -> None:
+def test_an_update_equals_the_twins_and_filterpys(filterpy: ModuleType, seed: int) -> None:
     rng = np.random.default_rng(seed)
     mean, covariance = state(rng)
     root = rng.normal(size=(3, 3)) * 0.2

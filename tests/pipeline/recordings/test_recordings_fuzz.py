@@ -19,7 +19,7 @@ from spinscope.pipeline.recordings import FORMATS, open_recording, summary
 from tests.pipeline.recordings.sound_files import some_events, sound_files
 
 NAMES = [format.name for format in FORMATS]
-CASES, ISOLATED_CASES = 500, 100  # a foreign library that crashes costs a new process of 0.4 s
+CASES, ISOLATED_CASES = 200, 50  # a foreign library that crashes costs a new process of 0.4 s
 MOST_S = 5.0  # until a file is refused or read
 MOST_GROWTH_BYTES = 512 << 20  # of this process over all cases; one that reads for it has its own limit
 EVENTS = 500  # of a sound file: reading lines of text costs by their number

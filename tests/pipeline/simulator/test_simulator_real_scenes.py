@@ -37,7 +37,7 @@ def test_every_scene_has_a_flight_in_view_and_can_be_told_as_json(kind):
         scene, found = segments(kind, seed)
         assert Scene.from_dict(json.loads(json.dumps(scene.to_dict()))) == scene
         assert any(segment.is_shot and segment.end_us - segment.start_us > 30_000 for segment in found), seed
-        assert scene == real_scene(kind, seed).scene
+    assert scene == real_scene(kind, seed).scene
     with pytest.raises(ParameterError, match="unknown"):
         real_scene("snow")
 
@@ -177,10 +177,10 @@ def test_logo_events_are_counted_for_every_ball():
 def test_the_net_swings_at_its_tape_and_stands_at_its_feet():
     made = real_scene("net", 1)
     recording = simulate_scene(
-        replace(made.scene, balls=(), duration_s=0.05), camera=made.camera, sensor=QUIET, lens=made.lens
+        replace(made.scene, balls=(), duration_s=0.02), camera=made.camera, sensor=QUIET, lens=made.lens
     )
     assert set(np.unique(recording.truth.label)) == {3}
-    still = replace(made.scene, balls=(), duration_s=0.05, net=replace(made.scene.net, swing_m=0.0))
+    still = replace(made.scene, balls=(), duration_s=0.02, net=replace(made.scene.net, swing_m=0.0))
     assert len(simulate_scene(still, camera=made.camera, sensor=QUIET, lens=made.lens).events) == 0
 
 
