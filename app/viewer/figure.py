@@ -20,6 +20,8 @@ PANELS = (
     plots.AXIS_ERROR_PLOT,
 )
 COLUMNS = 2
+SPARE = 0.05  # of the time shown, on each side of the ball's flight
+TIME_LABELS = 6  # at most: more of a long time in ms overlap
 BRIGHTEST = 0.45  # relative luminance of a line on white, at most: the viewer's colours are made for a dark ground
 
 
@@ -43,13 +45,22 @@ def series_figure(run: ViewedRun, suffix: str, pinned: ViewedRun | None = None) 
         _draw(panel, plot, run)
         if pinned is not None:
             _draw(panel, plot, pinned, is_pinned=True)
-        panel.set(xlabel="time [ms]", ylabel=plot.title, ylim=plot.axis_range(run))
+        panel.set(xlabel="time [ms]", ylabel=plot.title, xlim=time_range_ms(run), ylim=plot.axis_range(run))
+        panel.locator_params(axis="x", nbins=TIME_LABELS)
         panel.legend(fontsize="x-small")
     for panel in axes.flat[len(shown) :]:
         panel.remove()
     content = io.BytesIO()
     figure.savefig(content, format=suffix.removeprefix("."))
     return content.getvalue()
+
+
+def time_range_ms(run: ViewedRun) -> tuple[float, float]:
+    """Time that all panels show: that in which there is a ball, the whole run where there is none."""
+    seen = run.ends_us[run.has_ball] if run.has_ball.any() else run.ends_us
+    start, end = float(seen[0]) / 1000, float(seen[-1]) / 1000
+    spare = SPARE * max(end - start, 1.0)
+    return start - spare, end + spare
 
 
 def _draw(panel: Any, plot: Plot, run: ViewedRun, *, is_pinned: bool = False) -> None:

@@ -25,7 +25,7 @@ MIN_LEGEND_HEIGHT_PX = 160
 LEGEND_HEIGHTS_PX = {at.SPIN_MAGNITUDE: 330}
 PLOTS = (rrb.TimeSeriesView, rrb.StateTimelineView, rrb.BarChartView)
 # Width and height by a pane's origin: the witnesses have words in many rows, the tracker two lanes with their names.
-LARGER_PX = {at.WITNESSES: (320, 250), at.TRACKER: (200, 128)}
+LARGER_PX = {at.WITNESSES: (360, 250), at.TRACKER: (200, 128)}
 
 
 @dataclass(frozen=True)

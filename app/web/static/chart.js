@@ -174,7 +174,7 @@ function layout(spec, at, range, points) {
     paper_bgcolor: "#161b21",
     plot_bgcolor: "#11151a",
     showlegend: spec.series.filter(({ name }) => name).length > 1,
-    legend: { orientation: "h", x: 1, xanchor: "right", y: 1.02, yanchor: "bottom", font: { ...FONT, size: 9 } },
+    legend: { orientation: "h", x: 0.93, xanchor: "right", y: 1.02, yanchor: "bottom", font: { ...FONT, size: 9 } },
     hovermode: "closest",
     hoverlabel: { font: { size: 11 }, namelength: -1 },
     dragmode: false,

@@ -129,17 +129,21 @@ export class Optimization {
     const undo = { onclick: () => this.#before && this.settings.setAll(this.#before), disabled: !this.#before };
     const back = element("button", undo, "Restore the previous values");
     const refused = trials.filter(({ objection }) => objection).length;
+    const isBetter = best !== null && best < first.cost;
+    const where = clips === 1 ? "one clip" : `${clips} clips`;
+    const start = `the starting values gave ${number(first.cost, 3)}`;
     const texts = [
-      `Lowest on ${clips === 1 ? "one clip" : `${clips} clips`} ${number(best, 3)}; ` +
-      `the starting values gave ${number(first.cost, 3)}.`,
+      isBetter
+        ? `Lowest on ${where} ${number(best, 3)}; ${start}.`
+        : `On ${where} ${start}${held_out ? "" : ", and nothing better is found"}.`,
       refused ? `${refused} of ${trials.length} trials lost an answer or half of the logo events: not proposed.` : "",
-      trials.length === total ? heldOut(held_out) : "",
+      trials.length === total && (isBetter || held_out) ? heldOut(held_out) : "",
       ...skipped.map((text) => `Left out: ${text}`),
     ];
+    const proposal = [element("table.numbers", {}, ...rows), element("div.row", {}, take, back)];
     this.found.replaceChildren(
       ...texts.filter(Boolean).map((text) => element("p.note", {}, text)),
-      element("table.numbers", {}, ...rows),
-      element("div.row", {}, take, back),
+      ...(isBetter ? proposal : []),
       ...[this.#cost, this.#answers, this.#events].map(({ node }) => node),
     );
   }
@@ -171,7 +175,7 @@ export class Optimization {
 }
 
 function heldOut(/** @type {HeldOut | null} */ held) {
-  if (!held) return "No part was held out, or nothing better was found: check the values on another recording.";
+  if (!held) return "No part was held out: check the values on another recording.";
   const where = `On ${held.clips === 1 ? "one clip" : `${held.clips} clips`} held out`;
   if (held.objection) return `${where} they fail (${held.objection}): nothing is proposed.`;
   const verdict = held.after <= held.before ? "" : " They do worse where they were not tuned: do not trust them.";

@@ -243,15 +243,29 @@ def test_a_point_of_a_sweep_is_taken_by_a_click(bare: Tab) -> None:
     bare.after(lambda: bare.page.click("#undo"))
 
 
-def test_an_optimization_shows_the_best_values_and_leads_back(bare: Tab) -> None:
+def test_an_optimization_offers_better_values_alone_and_leads_back(bare: Tab) -> None:
+    """The starting values are no proposal; better ones are what the server would tell."""
     panel = bare.panel("Optimization")
-    panel.locator("input[aria-label=trials]").fill("4")
+    panel.locator("input[aria-label=trials]").fill("1")
     before = bare.page.evaluate("JSON.stringify(window.spinscope.settings.parameters)")
+    bare.page.evaluate("window.spinscope.connection.on('optimization', (message) => (window.found = message))")
     panel.locator("button.primary").first.click()
+    panel.get_by_text("nothing better is found").wait_for()
+    bare.until("window.found.state === 'done'")
+    assert panel.locator("progress").is_hidden()
     take = panel.get_by_text("Apply the best values")
-    take.wait_for()
-    panel.locator("progress").wait_for(state="hidden")
+    assert take.count() == 0
+    bare.page.evaluate(
+        """(() => {
+            const { content } = window.found, best = content.best / 2;
+            const found = { ...content, best, values: { "logo.pad_px": 3.1 } };
+            const message = { detail: { ...window.found, content: found } };
+            window.spinscope.connection.dispatchEvent(new CustomEvent("optimization", message));
+        })()"""
+    )
+    assert "No part was held out" in panel.locator(".found").inner_text()
     take.click()
+    assert bare.value("logo.pad_px") == 3.1
     panel.get_by_text("Restore the previous values").click()
     assert bare.page.evaluate("JSON.stringify(window.spinscope.settings.parameters)") == before
 
