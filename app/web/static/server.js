@@ -252,6 +252,7 @@ export class RunRequests extends EventTarget {
    */
   #change(settled) {
     this.#movedAt = settled ? -Infinity : performance.now();
+    this.viewer.rest(settled ? 0 : REST_MS);
     if (!settled || this.#dirty || this.#last !== this.#wanted) this.request(settled);
   }
 

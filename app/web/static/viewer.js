@@ -38,6 +38,9 @@ function keepPictures() {
   };
 }
 
+// The browser's own, past `Viewer.rest`.
+const nextFrame = globalThis.requestAnimationFrame.bind(globalThis);
+
 const storeOf = (/** @type {string} */ id) => `Recording:${APPLICATION}:${id}`;
 
 const CLICKED_MS = 300; // until a click on a tab has been painted
@@ -67,6 +70,8 @@ export class Viewer extends EventTarget {
   front = null;
   #isLaidOut = false; // before our first layout there is one of the viewer's own
   #isAlone = false;
+  #working = 0; // how much has been asked of it and is not done
+  #restsUntil = -Infinity;
 
   /**
    * Loads the viewer, when something has happened; whatever else is asked of it meanwhile waits.
@@ -84,6 +89,7 @@ export class Viewer extends EventTarget {
   async #start(/** @type {string} */ version, /** @type {HTMLElement} */ parent) {
     stayAtHome();
     keepPictures();
+    this.#holdFrames();
     const { WebViewer } = await import(`/rerun/${version}/widget.js`);
     const viewer = new WebViewer();
     const ready = new Promise((resolve) => viewer.once("ready", resolve));
@@ -110,13 +116,34 @@ export class Viewer extends EventTarget {
   }
 
   /**
+   * Paints nothing for so long, unless something is asked of it: without a graphics card each of its pictures takes the
+   * browser a second or two, in which the rest of the page stands still.
+   * @param {number} ms
+   */
+  rest(ms) {
+    this.#restsUntil = performance.now() + ms;
+  }
+
+  // The viewer paints when the browser gives it a frame: while it rests it gets none, and its last picture stays.
+  #holdFrames() {
+    globalThis.requestAnimationFrame = (paint) => {
+      const held = (/** @type {number} */ time) => {
+        if (this.#working || time >= this.#restsUntil) paint(time);
+        else nextFrame(held);
+      };
+      return nextFrame(held);
+    };
+  }
+
+  /**
    * Everything that touches the viewer, one after the other.
    * @template T
    * @param {() => T | Promise<T>} work
    * @returns {Promise<T>}
    */
   #next(work) {
-    const done = this.#queue.then(work);
+    this.#working++;
+    const done = this.#queue.then(work).finally(() => this.#working--);
     this.#queue = done.catch(() => {});
     return done;
   }
@@ -130,7 +157,7 @@ export class Viewer extends EventTarget {
       const { front } = this; // it was asked for before somebody turned to this tab
       this.#channel.send_rrd(content);
       if (!this.#isLaidOut) return;
-      const until = performance.now() + LAYOUT_MS;
+      const until = performance.now() + PATIENCE_MS;
       const present = async () => (await this.#viewer.get_blueprint()).blueprint["/viewport"]?.ViewportBlueprint;
       while ((await present())?.root_container !== root) { // one that was sent before may come late
         if (performance.now() > until) throw new Error("the viewer does not take the layout");
@@ -316,10 +343,15 @@ export class Viewer extends EventTarget {
    */
   async #layout(patience_ms = LAYOUT_MS) {
     const until = performance.now() + patience_ms;
-    for (;;) {
-      const { blueprint } = await this.#viewer.get_blueprint();
-      if (performance.now() > until || tabs(blueprint).some(({ title }) => title)) return blueprint;
-      await pause(POLL_MS);
+    this.#working++;
+    try {
+      for (;;) {
+        const { blueprint } = await this.#viewer.get_blueprint();
+        if (performance.now() > until || tabs(blueprint).some(({ title }) => title)) return blueprint;
+        await pause(POLL_MS);
+      }
+    } finally {
+      this.#working--;
     }
   }
 

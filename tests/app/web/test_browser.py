@@ -223,6 +223,52 @@ def test_a_tab_that_is_chosen_while_the_first_layout_is_awaited_is_in_front_of_i
     assert front == [True, "Coach", "Coach"]
 
 
+def test_while_a_slider_is_dragged_the_viewer_paints_only_what_is_asked_of_it(tab: Tab) -> None:
+    """In software its pictures would take the time in which the previews are to be seen."""
+    tab.settled("shown")
+    rests = tab.page.evaluate(
+        """(() => {
+            const { settings, viewer } = window.spinscope, rests = [], pad = settings.get("logo.pad_px");
+            viewer.rest = (ms) => rests.push(ms);
+            for (const settled of [false, true]) settings.set("logo.pad_px", pad + 0.1, settled);
+            delete viewer.rest;
+            return rests;
+        })()"""
+    )
+    assert rests[0] > 0 and rests[1] == 0
+    tab.settled("shown")
+    tab.page.evaluate(
+        """(() => {
+            const made = WebGL2RenderingContext.prototype;
+            for (const name of ["drawElements", "drawArrays", "drawElementsInstanced", "drawArraysInstanced"]) {
+                const draw = made[name];
+                made[name] = function (...given) {
+                    window.painted++;
+                    return draw.apply(this, given);
+                };
+            }
+        })()"""
+    )
+    moved = """(() => {
+        const place = { bubbles: true, clientX: 300 + Math.random(), clientY: 200 };
+        window.spinscope.viewer.api.canvas.dispatchEvent(new PointerEvent("pointermove", place));
+    })()"""
+    frames = """(async () => {
+        for (let i = 0; i < 3; i++) await document.body.animate([], 1).finished;
+    })()"""
+    tab.page.evaluate("window.spinscope.viewer.rest(1e9)")
+    tab.page.evaluate(frames)  # one may have been given to it before
+    tab.page.evaluate("window.painted = 0")
+    tab.page.evaluate(moved)
+    tab.page.evaluate(frames)
+    assert tab.page.evaluate("window.painted") == 0
+    tab.page.evaluate("window.spinscope.viewer.rest = () => {}")
+    tab.slide("logo.pad_px", what="shown")  # a picture is asked of it
+    tab.page.evaluate("delete window.spinscope.viewer.rest; window.spinscope.viewer.rest(0); window.painted = 0")
+    tab.page.evaluate(moved)
+    tab.until("window.painted > 0")
+
+
 def test_the_panes_follow_a_ball_that_is_fixed_and_flies_again(tab: Tab) -> None:
     """The layout is made anew for the mode, and the tab stays."""
     tab.settled("shown")
