@@ -165,6 +165,24 @@ VALUES = [
     ),
     Mutant(
         "pipeline/stages/track_contact.py",
+        "float(within_us[np.argmin(places.costs(within_us))])",
+        "float(times_us[np.argmin(costs)])",
+        "tests/pipeline/stages/test_track_contact.py -k known_at_once",
+    ),
+    Mutant(
+        "pipeline/stages/track_rim.py",
+        "PRINT_SHARE * max(self.mixed - USUAL_MIXED, 0.0) * radius_px",
+        "0.0",
+        "tests/pipeline/stages/test_track_rim.py -k half_painted",
+    ),
+    Mutant(
+        "pipeline/stages/track_initiation.py",
+        "if packet.end_us - since[0] >= parameters.contour_us:",
+        "if packet.end_us - since[0] >= 0:",
+        "tests/pipeline/stages/test_track.py -k seen_once",
+    ),
+    Mutant(
+        "pipeline/stages/track_contact.py",
         "lower.min() < min(costs.min() - LEAST_GAIN, costs.min() / STRAY_RATIO)",
         "lower.min() < 0.0",
         "tests/pipeline/stages/test_track_contact.py -k rackets_outline",
