@@ -80,7 +80,7 @@ class Rim:
         return math.hypot(RIM_ERROR * max(self._seen_px, 0.0), UNSEEN_ERROR * (1.0 - self.shown) * radius_px)
 
     def unsteady_px(self, radius_px: float) -> float:
-        """What a print at the rim moves the circle by from tick to tick (1 sigma)."""
+        """Error of the circle from tick to tick by a print at the rim (1 sigma)."""
         return PRINT_SHARE * max(self.mixed - USUAL_MIXED, 0.0) * radius_px
 
     @property
