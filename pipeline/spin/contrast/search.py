@@ -316,15 +316,13 @@ def maximise(
     return spin_rad_s, offsets_px, value, usual
 
 
-@numba.njit(cache=True, nogil=True)
 def maximise_each(objective: Objective, spins_rad_s: Floats, iterations: int) -> tuple[Floats, Floats, Floats]:
     """Local maxima (k, 3) reached from spins (k, 3), their scores (k,) and each event's share (k, n)."""
-    maxima, values, none = np.empty_like(spins_rad_s), np.empty(spins_rad_s.shape[0]), np.empty(0)
-    shares, here = np.empty((spins_rad_s.shape[0], objective.window.events.t_s.size)), np.zeros((1, 3))
-    for k in range(spins_rad_s.shape[0]):
-        best = maximise(objective, spins_rad_s[k], none, iterations)[0]
-        maxima[k, 0], maxima[k, 1], maxima[k, 2] = best[0], best[1], best[2]
-        values[k] = scores_near(shares[k : k + 1], objective, maxima[k], none, here)[0]
+    maxima, values = np.empty_like(spins_rad_s), np.empty(len(spins_rad_s))
+    shares, here = np.empty((len(spins_rad_s), objective.window.events.t_s.size)), np.zeros((1, 3))
+    for k, spin_rad_s in enumerate(spins_rad_s):
+        maxima[k] = maximise(objective, spin_rad_s, NO_OFFSETS, iterations)[0]
+        values[k] = scores_near(shares[k : k + 1], objective, maxima[k], NO_OFFSETS, here)[0]
     return maxima, values, shares
 
 
