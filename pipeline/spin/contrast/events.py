@@ -162,7 +162,7 @@ class BallUncertainty:
 
     @property
     def latency_std_px(self) -> float:
-        """What the centre moves in the time by which the logo's events come sooner or later than one another."""
+        """Way of the centre in the time by which the logo's events come sooner or later than one another."""
         return self.speed_px_s * LATENCY_SPREAD_S
 
 
