@@ -44,6 +44,8 @@ STAGES_US = (5000, 10_000, 20_000, 50_000)
 LATER = 1.5
 # After a refusal it is worth trying again with so many more events.
 MORE = 1.5
+# Visits that do not fit together may do so as soon as the logo comes back: some events of another visit tell.
+MORE_OF_VISIT = 1.05
 # A search over all spins is repeated with so many times the events of the last one.
 SEARCH_MORE = 2.0
 # An answer scanned over so many turns that beats its rivals so many times as clearly as asked for is not scanned for
@@ -250,7 +252,7 @@ def _due(state: ContrastState, age_us: int, count: int) -> bool:
         state.full_us = later[0] if later else LATER * age_us
         return True
     refused = state.answer is None or state.reason is not None
-    return refused and count >= MORE * state.tried
+    return refused and count >= (MORE_OF_VISIT if state.reason == UNLINKED else MORE) * state.tried
 
 
 def _estimate(

@@ -105,6 +105,12 @@ CONTRAST = [
         "tests/pipeline/spin/test_contrast_trust.py -k fit_together",
     ),
     Mutant(
+        "pipeline/spin/contrast/stage.py",
+        "(MORE_OF_VISIT if state.reason == UNLINKED else MORE)",
+        "MORE",
+        "tests/pipeline/stages/test_contrast_memory.py -k after_a_refusal",
+    ),
+    Mutant(
         "pipeline/spin/contrast/estimate.py",
         "margins if ball.is_flying else IN_PLACE * margins",
         "IN_PLACE * margins",
@@ -136,7 +142,7 @@ CONTRAST = [
     ),
     Mutant(
         "pipeline/spin/contrast/stage.py",
-        "return refused and count >= MORE * state.tried",
+        "return refused and count >= (MORE_OF_VISIT if state.reason == UNLINKED else MORE) * state.tried",
         "return refused",
         "tests/pipeline/stages/test_contrast_memory.py -k are_due",
     ),

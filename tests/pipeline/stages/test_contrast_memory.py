@@ -179,6 +179,8 @@ def test_full_estimates_are_due_by_age_and_after_a_refusal_by_events() -> None:
     assert ages_us == [5000, 10_000, 20_000, 50_000, 75_000, 113_000, 170_000]
     state.full_us, state.tried, state.reason = math.inf, 100, "in doubt"
     assert not contrast._due(state, 200_000, 149) and contrast._due(state, 200_000, 150)
+    state.reason = contrast.UNLINKED  # another visit may fit
+    assert not contrast._due(state, 200_000, 104) and contrast._due(state, 200_000, 105)
     state.reason = None
     assert not contrast._due(state, 200_000, 150)
 
