@@ -1,8 +1,7 @@
 """Spins of a live run: the work of its child process, behind the tracker.
 
 One thread sees the shots end, one tells their spins so far, tick by tick, one maximises contrast for these as fast as
-it can, and one answers the whole shots as `analyze` does. The last one rests while a ball is in flight: tracker and
-spins so far then have both cores, and Python's lock, to themselves.
+it can, and one answers the whole shots as `analyze` does, when no ball is in flight.
 """
 
 from __future__ import annotations
@@ -34,9 +33,7 @@ from .tick import Tick
 # After a shot's last events the spin so far is told, which may be from somewhat older ones: 50 ms are promised, of
 # which telling it takes up to 15.
 ANNOUNCED_S = 0.035
-# The final spins rest in so many ticks of a flight, longer than most shots, while fewer ticks with a ball wait for
-# them (half as many as the tracker waits for), and while ticks come.
-MOST_RESTED, MOST_RESTING, LAST_CAME_S = 100, 300, 0.1
+MOST_HELD = 100  # ticks held back from the final spins while a ball is in flight: longer than most shots
 ARRIVALS_KEPT = 4000  # ticks whose arrival is remembered: 20 s at 200 Hz, longer than any shot's end takes to be known
 # Python lets a thread run for 5 ms while another waits; with a tick's work in several threads that is many ticks.
 SWITCH_S = 0.0005
@@ -151,42 +148,6 @@ class _Ticks:
         return next((last_s for upto_us, last_s in self._arrivals if upto_us >= end_us), self._arrivals[-1][1])
 
 
-class RestingQueue:
-    """Messages for the final spins, which rest while a ball is in flight: they would hold up those so far."""
-
-    def __init__(self) -> None:
-        self._changed = threading.Condition()
-        self._messages = deque[Numbered]()
-        self._flying = 0  # ticks since the last one without a ball
-        self._with_ball = 0  # messages with a ball that wait
-        self._came_s = now_s()
-
-    def put(self, one: Numbered) -> None:
-        """Hand over a message."""
-        is_flying = has_ball(one.message)
-        with self._changed:
-            self._messages.append(one)
-            self._flying = self._flying + 1 if is_flying else 0
-            self._with_ball += is_flying
-            self._came_s = now_s()
-            self._changed.notify()
-
-    def get(self) -> Numbered:
-        """The next message, as soon as it may be worked on."""
-        with self._changed:
-            while not self._messages or self.is_resting:
-                self._changed.wait(LAST_CAME_S if self._messages else None)
-            one = self._messages.popleft()
-            self._with_ball -= has_ball(one.message)
-            return one
-
-    @property
-    def is_resting(self) -> bool:
-        """Whether no message may be worked on for now."""
-        few = 0 < self._flying <= MOST_RESTED and self._with_ball < MOST_RESTING
-        return few and now_s() - self._came_s < LAST_CAME_S
-
-
 class LiveSpins:
     """Spins of one run.
 
@@ -201,7 +162,7 @@ class LiveSpins:
     def __init__(self, run: SpinRun, send: Callable[[Answers | Exception], None]) -> None:
         self._run, self._send = run, send
         self._for_so_far: queue.SimpleQueue[Numbered] = queue.SimpleQueue()
-        self._for_final = RestingQueue()
+        self._for_final: queue.SimpleQueue[Numbered] = queue.SimpleQueue()
         self._spins: dict[int, SpinsInFlight] = {}  # by the number of the message that begins the stretch
         self._ended: list[_EndedShot] = []  # not announced yet
         self._lock = threading.Lock()
@@ -291,7 +252,7 @@ class LiveSpins:
                 self._for_final.put(ticks.end)
 
     def _tell(self, ticks: _Ticks) -> None:
-        """Tell the spins so far of a stretch, and hand its ticks on."""
+        """Tell the spins so far of a stretch, and hand its ticks on when no ball is in flight."""
         needed = {stage.name for stage in needed_stages(self._run.targets)}
         has_contrast = "contrast" in needed
         # Beside contrast maximisation only what it asks for: each further stage has it come later.
@@ -301,6 +262,7 @@ class LiveSpins:
         contrast = ContrastInFlight(ticks.parameters, chain, spins)
         thread = threading.Thread(target=self._guarded, args=(contrast.work, SO_FAR_NICENESS), name="contrast so far")
         thread.start()
+        held = list[Numbered]()
         for number, one in self._answered(chain, ticks, quick):
             for ball in one.tick.balls:
                 spins.add_tick(ball)
@@ -310,8 +272,11 @@ class LiveSpins:
                 self._tell_tick(number, one, spins)
             self._announce(number, is_complete=True)
             spins.keep_only(ball.track.shot for ball in one.tick.balls)
-            self._for_final.put(Numbered(number, one))
+            held.append(Numbered(number, one))
+            if not one.tick.balls or len(held) == MOST_HELD:
+                self._hand_on(held)
         self._announce(ticks.end.number, is_complete=True)
+        self._hand_on(held)
         contrast.close()
         thread.join()
 
@@ -324,6 +289,12 @@ class LiveSpins:
         end_us = one.tick.packet.end_us
         outputs = [(one.first_s, LiveSpin(shot, end_us, spin, None, 0.0)) for shot, spin in newest if spin is not None]
         self._send(Answers(number, False, tuple(outputs)))
+
+    def _hand_on(self, held: list[Numbered]) -> None:
+        """Let the final spins be worked on, which would hold up those so far, when no ball is in flight."""
+        for one in held:
+            self._for_final.put(one)
+        held.clear()
 
     def _answer_all(self) -> None:
         """Answer the shots as of a recording."""
@@ -353,11 +324,6 @@ class LiveSpins:
         for tick in chain.answer(ticks.parameters, tracked(), targets, forget=STAGES.names):
             number, one = at_work.popleft()
             yield number, one._replace(tick=tick)
-
-
-def has_ball(message: SegmentStart | TrackedTick | None) -> bool:
-    """Whether a message is a tick with a ball."""
-    return isinstance(message, TrackedTick) and message.tick.track.has_ball
 
 
 def _stretches(get: Callable[[], Numbered]) -> Iterator[_Ticks]:

@@ -16,7 +16,7 @@ from .cameras.clock import now_s
 from .child_process import ChildProcess, IdleProcesses
 from .errors import SpinscopeError
 from .live_outputs import LiveNotice, LiveOutput, LiveShot, LiveSpin
-from .live_spins import Answers, Numbered, SegmentStart, SpinRun, TrackedTick, has_ball, serve
+from .live_spins import Answers, Numbered, SegmentStart, SpinRun, TrackedTick, serve
 
 # Ticks with a ball that wait for their spins, at the most; then the tracker waits, too: 3 s of flight at 200 Hz, which
 # at 5 Mev/s is some 600 MB. Ticks without a ball take 5 kB each: 30 s of them.
@@ -105,7 +105,7 @@ class SpinProcess:
             )
             number = self._kept[-1].number + 1 if self._kept else self._done
             self._kept.append(Numbered(number, message))
-            self._flying += has_ball(message)
+            self._flying += _has_ball(message)
             self._changed.notify_all()
 
     @property
@@ -214,7 +214,7 @@ class SpinProcess:
                 LiveNotice("spins", f"{ended} again over the same events: the spins of {ticks} ticks are left out")
             )
         self._next = self._done = self._kept[0].number if self._kept else self._next
-        self._flying = sum(has_ball(one.message) for one in self._kept)
+        self._flying = sum(_has_ball(one.message) for one in self._kept)
         self._process = self._begun()
         self._changed.notify_all()
 
@@ -228,7 +228,7 @@ class SpinProcess:
             return
         with self._changed:
             while self._done <= answers.number:
-                self._flying -= has_ball(self._kept[self._done - self._kept[0].number].message)
+                self._flying -= _has_ball(self._kept[self._done - self._kept[0].number].message)
                 self._done += 1
             if self._done > self._furthest:
                 self._furthest, self._ends = self._done, 0
@@ -249,3 +249,7 @@ def _key(number: int, output: LiveSpin | LiveShot) -> _Key:
     if isinstance(output, LiveShot):
         return number, "shot", output.shot.number, True
     return number, "spin", output.shot, output.ended_by is not None
+
+
+def _has_ball(message: SegmentStart | TrackedTick | None) -> bool:
+    return isinstance(message, TrackedTick) and message.tick.track.has_ball

@@ -3,34 +3,20 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from spinscope.pipeline import live_spins, spin_process
+from spinscope.pipeline import spin_process
 from spinscope.pipeline.cameras import ArrivedTick, EventStream, ReplayCamera
 from spinscope.pipeline.child_process import ChildProcess
 from spinscope.pipeline.errors import SpinscopeError
 from spinscope.pipeline.live import LiveRun
 from spinscope.pipeline.live_outputs import LiveNotice, LiveOutput, LiveShot, LiveSpin
-from spinscope.pipeline.live_spins import (
-    LAST_CAME_S,
-    MOST_RESTED,
-    MOST_RESTING,
-    Answers,
-    LiveSpins,
-    Numbered,
-    RestingQueue,
-    SpinRun,
-    TrackedTick,
-    _EndedShot,
-)
+from spinscope.pipeline.live_spins import Answers, LiveSpins, SpinRun, _EndedShot
 from spinscope.pipeline.results import SpinEstimate
 from spinscope.pipeline.session import Session
-from spinscope.pipeline.spin_process import MOST_FLYING
 from spinscope.pipeline.spin_so_far import SpinsInFlight, SpinSoFar
 from spinscope.pipeline.tick import Tick
 
@@ -105,31 +91,6 @@ def test_events_that_end_two_processes_are_left_out_and_the_third_end_is_an_erro
     ends = 3
     with pytest.raises(SpinscopeError, match="3 times without an answer"):
         live(session)
-
-
-def test_final_spins_rest_in_a_flight_but_for_good_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Until no ball is in view; not for a ball that stays, nor where many wait for them, nor where no tick comes."""
-    clock_s = [0.0]
-    monkeypatch.setattr(live_spins, "now_s", lambda: clock_s[0])
-
-    def queue(balls: Iterable[bool], taken: int = 0) -> RestingQueue:
-        made = RestingQueue()
-        for number, ball in enumerate(balls):
-            track = SimpleNamespace(has_ball=ball)
-            made.put(Numbered(number, TrackedTick(Tick({"track": track}, None, ()), 0, 0.0, 0.0)))  # type: ignore[arg-type]
-        assert [made.get().number for _ in range(taken)] == list(range(taken))
-        return made
-
-    assert not queue([False]).is_resting and queue([False, True]).is_resting
-    assert not queue([True, True, False]).is_resting and queue([True, False, True]).is_resting
-    assert queue([True] * MOST_RESTED).is_resting and not queue([True] * (MOST_RESTED + 1)).is_resting
-    assert queue([True, False] * (MOST_RESTING - 2) + [True]).is_resting
-    many = [True, False] * (MOST_RESTING - 1) + [True]
-    assert not queue(many).is_resting and queue(many, taken=1).is_resting
-    assert MOST_RESTING < MOST_FLYING  # for which the tracker waits
-    silent = queue([False, True])
-    clock_s[0] += LAST_CAME_S
-    assert not silent.is_resting and [silent.get().number, silent.get().number] == [0, 1]
 
 
 def test_an_error_in_the_process_comes_out(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -180,13 +180,13 @@ def test_what_is_seen_at_the_playhead_comes_first_when_the_rest_takes_long(
 def test_a_dragged_slider_gets_a_picture_without_the_slowest_stage_first(
     client: Client, told: list[dict[str, Any]]
 ) -> None:
-    done = client.run({"logo": {"pad_px": 3.3}}, interactive=True)
+    done = client.run({"logo": {"pad_px": 3.37}}, interactive=True)
     assert set(done["metrics"]["shots"][0]["spin"]) == {"triplet", "normal_flow", "contrast", "trajectory", "combined"}
     (first,) = (m for m in told if m["state"] == "partial")
     assert set(first["metrics"]["shots"][0]["spin"]) == {"triplet", "normal_flow", "trajectory"}
     assert first["picture"]["end_us"] == done["picture"]["end_us"] and first["picture"]["id"] != done["picture"]["id"]
     told.clear()
-    client.run({"logo": {"pad_px": 3.3}}, interactive=True)
+    client.run({"logo": {"pad_px": 3.37}}, interactive=True)
     assert not [m for m in told if m["state"] == "partial"]
 
 
