@@ -32,6 +32,7 @@ from .terminal import (
     ignore_signals_at_exit,
     note,
     prepare_streams,
+    requested_status,
 )
 
 
@@ -97,6 +98,11 @@ def run(arguments: list[str]) -> int:
             raise
         drop_output()
         message = f"the output cannot be written ({error.strerror}): check free space"
+    except Exception as error:
+        requested = requested_status(error)
+        if requested is None:
+            raise
+        return requested
     else:
         return status or 0
     note(f"spinscope: {message}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import queue
 import signal
 import sys
 import threading
@@ -23,6 +24,7 @@ LOGGED_S = 30.0  # from line to line of a log: 120 lines an hour
 _ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 # Signals nearer to each other are one request: a shell, or `uv run`, hands on what the terminal has sent already.
 SAME_REQUEST_S = 0.5
+REPEAT_S = 0.05  # until a request that Python has dropped is made again
 _requested_s = -math.inf  # when the last request came
 FULL_DISK = (ENOSPC, EDQUOT, EFBIG, EIO)  # errors of writing that are the disk's
 
@@ -44,7 +46,8 @@ def exit_on_signals() -> None:
     """End as on an error when the user or the system asks the program to: half-written files are removed.
 
     A signal that comes while it ends, as from a shell that sends it to the whole group, would disturb that: it is
-    ignored. A program started to outlive its terminal (`nohup`) does.
+    ignored. A program started to outlive its terminal (`nohup`) does. Where Python drops the error, as in a finalizer,
+    the request is made again.
     """
 
     def end(number: int, _: object) -> None:
@@ -54,29 +57,73 @@ def exit_on_signals() -> None:
             raise KeyboardInterrupt
         sys.exit(128 + number)
 
-    for one in _ENDING:
-        if one == signal.SIGINT or signal.getsignal(one) is not signal.SIG_IGN:
+    chosen = [one for one in _ENDING if one == signal.SIGINT or signal.getsignal(one) is not signal.SIG_IGN]
+    report = sys.unraisablehook
+
+    def repeat(dropped: sys.UnraisableHookArgs) -> None:
+        number = (requested_status(dropped.exc_value) or 0) - 128
+        if number not in chosen:
+            report(dropped)
+            return
+        for one in chosen:
             signal.signal(one, end)
+        threading.Timer(REPEAT_S, os.kill, (os.getpid(), number)).start()
+
+    sys.unraisablehook = repeat
+    for one in chosen:
+        signal.signal(one, end)
+
+
+def requested_status(error: BaseException | None) -> int | None:
+    """Exit status that a request for the end asks for, where an error is that request; None for any other error.
+
+    Python raises another error from it where it comes while a module is loaded (`__set_name__` of an attribute).
+    """
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt):
+            return 128 + signal.SIGINT
+        if isinstance(error, SystemExit) and isinstance(error.code, int):
+            return error.code
+        error = error.__cause__
+    return None
+
+
+@contextmanager
+def until_interrupted() -> Iterator[None]:
+    """End a block, rather than the program, when the user interrupts it (Ctrl-C)."""
+    try:
+        yield
+    except (KeyboardInterrupt, Exception) as error:
+        if requested_status(error) != 128 + signal.SIGINT:
+            raise
 
 
 @contextmanager
 def ends_on_signals(end: Callable[[], None]) -> Iterator[None]:
-    """Have each request of the user or the system for the end call `end` in the main thread.
+    """Have each request of the user or the system for the end call `end`, in a thread of its own.
 
-    After the first one, further ones are ignored from the end of this block on, where the rest of the program ends. In
+    A signal comes between any two steps of the main thread, also while that holds a lock that `end` needs. After the
+    first request, further ones are ignored from the end of this block on, where the rest of the program ends. In
     another thread nothing is done.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
+    requests: queue.SimpleQueue[bool] = queue.SimpleQueue()  # may be filled by a handler at any moment
     is_asked = False
 
     def take(number: int, _: object) -> None:
         nonlocal is_asked
         if _is_another_request():
             is_asked = True
+            requests.put(True)
+
+    def call() -> None:
+        while requests.get():
             end()
 
+    thread = threading.Thread(target=call, name="requests for the end", daemon=True)
+    thread.start()
     before = {one: signal.signal(one, take) for one in _ENDING if signal.getsignal(one) is not signal.SIG_IGN}
     try:
         yield
@@ -86,6 +133,8 @@ def ends_on_signals(end: Callable[[], None]) -> Iterator[None]:
         else:
             for one, handler in before.items():
                 signal.signal(one, handler)
+        requests.put(False)
+        thread.join()
 
 
 def _is_another_request() -> bool:

@@ -13,8 +13,8 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Mapping
-from contextlib import ExitStack, suppress
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from io import FileIO
 from mmap import mmap
 from typing import Any, BinaryIO, ClassVar, Generic, TypeVar
@@ -27,6 +27,8 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
+# What a terminal or system sends to all processes at once is the parent's, which then ends the others.
+SIGNALS_OF_PARENT = {getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)}
 PIPE_BYTES = 1 << 20  # the most that Linux gives to everybody: a whole tick of a busy scene
 SHARED_BYTES = 4 << 20  # a part of a file takes 1.7 MB, and 3.3 MB where its pixels have 64 bits
 
@@ -100,6 +102,19 @@ def receive_value(file: BinaryIO, memory: SharedMemory | None = None) -> Any:
     return pickle.loads(pickled, buffers=buffers)
 
 
+@contextmanager
+def _signals_held_back() -> Iterator[None]:
+    """Hold `SIGNALS_OF_PARENT` back from this thread, and from a process that it starts until that ignores them."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS_OF_PARENT)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 class ChildProcess:
     """The parent's side of a child process.
 
@@ -125,14 +140,15 @@ class ChildProcess:
         self, program: str, environment: Mapping[str, str] | None = None, memory: SharedMemory | None = None
     ) -> None:
         path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-c", program],  # -P: what lies in the working folder is not imported
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            pass_fds=() if memory is None else (memory.file.fileno(),),
-            env={**os.environ, "PYTHONPATH": path, **(environment or {})},
-        )
+        with _signals_held_back():
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-c", program],  # -P: what lies in the working folder is not imported
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                pass_fds=() if memory is None else (memory.file.fileno(),),
+                env={**os.environ, "PYTHONPATH": path, **(environment or {})},
+            )
         self._memory = memory
         assert self._process.stdin is not None and self._process.stdout is not None
         self._requests: BinaryIO = self._process.stdin  # type: ignore[assignment]
@@ -221,11 +237,10 @@ class IdleProcesses(Generic[Kept]):
 def pipes_to_parent() -> tuple[BinaryIO, BinaryIO]:
     """Pipe of the parent's requests and pipe of the answers, in a child process; prints then go nowhere.
 
-    Signals that a terminal or system sends to all processes at once are the parent's, who then ends this one.
+    `SIGNALS_OF_PARENT` are ignored.
     """
-    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    for one in SIGNALS_OF_PARENT:
+        signal.signal(one, signal.SIG_IGN)
     requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     with open(os.devnull, "r+b") as nothing:  # a library that prints must not disturb the answers
         os.dup2(nothing.fileno(), 0)

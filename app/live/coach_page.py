@@ -21,6 +21,7 @@ from ..coach.session import KnownRecording, ShotSession
 from ..coach.session_analysis import SessionAnalysis
 from ..coach.session_folders import other_sessions
 from ..coach.shot_record import RecordingShots, live_record
+from ..terminal import until_interrupted
 from ..web.coach_application import CoachState
 from ..web.coach_schemas import CameraNotice
 from ..web.server import serve_coach
@@ -113,12 +114,13 @@ def run_with_coach(
     work = CameraThread(lambda: run_headless(chosen, choices, method, replace(to, table=table), observer), observer)
     work.start()
     try:
-        observer.has_begun.wait()
-        if observer.is_open:
-            analysis = SessionAnalysis(session, [folder], choices.for_others, jobs=1, is_playing=observer.is_playing)
-            sessions = [session, *other_sessions([session])]
-            serve_coach(CoachState(sessions, [analysis], observer.notice), place="live", **page)
-    except KeyboardInterrupt:
-        pass
+        with until_interrupted():
+            observer.has_begun.wait()
+            if observer.is_open:
+                analysis = SessionAnalysis(
+                    session, [folder], choices.for_others, jobs=1, is_playing=observer.is_playing
+                )
+                sessions = [session, *other_sessions([session])]
+                serve_coach(CoachState(sessions, [analysis], observer.notice), place="live", **page)
     finally:
         work.end()

@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 
 from spinscope.pipeline.session import Choices
 
-from ..terminal import note
+from ..terminal import note, until_interrupted
 from ..web import serve
 from .camera_thread import CameraThread
 from .camera_view import CameraView
@@ -47,16 +47,15 @@ def run_with_page(
         work = CameraThread(lambda: run_headless(chosen, choices, method, replace(to, table=table), view), view)
         work.start()
         try:
-            view.has_begun.wait()
-            if view.is_open:
-                note("the page opens as soon as events have come")
-            view.has_events.wait()
-            if view.is_open and view.opened.recent.span_us is not None:
-                if sys.platform == "linux":
-                    os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), PAGE_NICENESS)
-                first = view.save_window(kept_s)
-                serve(first, choices.for_others, port, open_browser=open_browser, hosts=hosts, live=view)
-        except KeyboardInterrupt:
-            pass
+            with until_interrupted():
+                view.has_begun.wait()
+                if view.is_open:
+                    note("the page opens as soon as events have come")
+                view.has_events.wait()
+                if view.is_open and view.opened.recent.span_us is not None:
+                    if sys.platform == "linux":
+                        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), PAGE_NICENESS)
+                    first = view.save_window(kept_s)
+                    serve(first, choices.for_others, port, open_browser=open_browser, hosts=hosts, live=view)
         finally:
             work.end()

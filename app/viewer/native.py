@@ -10,7 +10,7 @@ from pathlib import Path
 
 from spinscope.pipeline.errors import SpinscopeError
 
-from ..terminal import note
+from ..terminal import until_interrupted
 from .rerun_api import place_playhead, program, quiet_environment
 from .rrd import write_rrd
 from .run import ViewedRun
@@ -50,12 +50,11 @@ def show_native(run: ViewedRun, layout: str, *, window: tuple[str, ...] = ()) ->
             stderr=subprocess.DEVNULL,
             start_new_session=True,  # Ctrl-C in the terminal is for us
         )
+        status = 0
         try:
-            _place_playhead(run, port, process)
-            status = process.wait()
-        except KeyboardInterrupt:
-            note("")
-            return
+            with until_interrupted():
+                _place_playhead(run, port, process)
+                status = process.wait()
         finally:
             process.kill()
             process.wait()

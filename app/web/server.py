@@ -11,9 +11,9 @@ import sys
 import threading
 import webbrowser
 from collections.abc import Callable, Collection, Generator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import uvicorn
 from fastapi import FastAPI
@@ -24,9 +24,11 @@ from spinscope.pipeline.session import Choices
 
 from .app_state import AppState
 from .application import application
-from .coach_application import CoachState, coach_application
 from .live_schemas import LiveSource
 from .open_recording import OpenRecording
+
+if TYPE_CHECKING:
+    from .coach_application import CoachState
 
 HOST = "127.0.0.1"
 PORT = 8377  # free of well-known services; another one is taken when it is busy
@@ -90,29 +92,29 @@ def serve(
         For a recording or choices that cannot be used, or when no port can be opened.
     """
     shown: dict[str, Any] = {"tools": tools, "layout": layout, "followed": followed, "live": live, "labels": labels}
-    state = AppState(path, choices, folders=folders, **shown)
-    with ProgressBar() as bar:
-        recording = state.recording(on_progress=bar)
-    # While the browser loads the page and the viewer, which takes longer.
-    threading.Thread(target=_load_kernels, args=(recording,), name="kernels", daemon=True).start()
-    token = _new_token()
+    with closing(AppState(path, choices, folders=folders, **shown)) as state:
+        with ProgressBar() as bar:
+            recording = state.recording(on_progress=bar)
+        # While the browser loads the page and the viewer, which takes longer.
+        threading.Thread(target=_load_kernels, args=(recording,), name="kernels", daemon=True).start()
+        token = _new_token()
 
-    def announce(own_port: int) -> None:
-        address = _address(own_port, token)
-        tunnel = _tunnel(own_port)
-        if tools:
-            sys.stdout.write(f"{address}\n")
-            sys.stdout.flush()
-        is_open = open_browser and show_in_browser(address)
-        if not tools:
-            hint = "" if is_open else f" (no browser here: {tunnel}, `--save FILE.rrd` writes a file instead)"
-            note(f"the viewer is at {address}{hint}; Ctrl-C stops it")
-        elif not is_open:
-            note(f"open the address in a browser; from elsewhere, {tunnel}")
+        def announce(own_port: int) -> None:
+            address = _address(own_port, token)
+            tunnel = _tunnel(own_port)
+            if tools:
+                sys.stdout.write(f"{address}\n")
+                sys.stdout.flush()
+            is_open = open_browser and show_in_browser(address)
+            if not tools:
+                hint = "" if is_open else f" (no browser here: {tunnel}, `--save FILE.rrd` writes a file instead)"
+                note(f"the viewer is at {address}{hint}; Ctrl-C stops it")
+            elif not is_open:
+                note(f"open the address in a browser; from elsewhere, {tunnel}")
 
-    for warning in [] if tools else recording.session.warnings:
-        note(f"warning: {warning}")
-    run_application(application(state, token, hosts), port, state.close, announce)
+        for warning in [] if tools else recording.session.warnings:
+            note(f"warning: {warning}")
+        run_application(application(state, token, hosts), port, state.close, announce)
 
 
 def serve_coach(
@@ -124,17 +126,20 @@ def serve_coach(
     place: str = "shots",
 ) -> None:
     """Serve the coach's page, at first a place of it, until Ctrl-C; see `serve`."""
-    state.start()
-    token = _new_token()
+    from .coach_application import coach_application  # loads Matplotlib, for which no other page waits
 
-    def announce(own_port: int) -> None:
-        address = f"{_address(own_port, token)}#{place}"
-        sys.stdout.write(f"{address}\n")
-        sys.stdout.flush()
-        if not (open_browser and show_in_browser(address)):
-            note(f"open the address in a browser; from elsewhere, {_tunnel(own_port)}")
+    with closing(state):
+        state.start()
+        token = _new_token()
 
-    run_application(coach_application(state, token, hosts), port, state.close, announce)
+        def announce(own_port: int) -> None:
+            address = f"{_address(own_port, token)}#{place}"
+            sys.stdout.write(f"{address}\n")
+            sys.stdout.flush()
+            if not (open_browser and show_in_browser(address)):
+                note(f"open the address in a browser; from elsewhere, {_tunnel(own_port)}")
+
+        run_application(coach_application(state, token, hosts), port, state.close, announce)
 
 
 def run_application(app: FastAPI, port: int | None, close: Callable[[], None], announce: Callable[[int], None]) -> None:

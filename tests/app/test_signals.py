@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import subprocess
@@ -34,7 +35,10 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="a group of processes
 
 @contextmanager
 def program(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], Iterator[str]]]:
-    """The program in a group of its own, as a terminal starts it, and the lines that it prints, of both streams."""
+    """The program in a group of its own, as a terminal starts it, and the lines that it prints, of both streams.
+
+    Signals end it also where the tests were started to outlive their terminal.
+    """
     with subprocess.Popen(
         [sys.executable, "-m", "spinscope", *arguments],
         stdin=subprocess.DEVNULL,
@@ -42,6 +46,7 @@ def program(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], Iterator[s
         stderr=subprocess.STDOUT,
         text=True,
         start_new_session=True,
+        preexec_fn=lambda: [signal.signal(one, signal.SIG_DFL) for one in SIGNALS],
     ) as process:
         hanging = threading.Timer(PATIENCE_S, os.killpg, (process.pid, signal.SIGKILL))
         hanging.start()
@@ -138,14 +143,67 @@ def test_signals_of_one_request_are_one(monkeypatch: pytest.MonkeyPatch) -> None
     before = {one: signal.getsignal(one) for one in SIGNALS}
     try:
         with ends_on_signals(lambda: asked.append(now_s[0])):
-            for now_s[0] in (100.0, 100.01, 100.4, 101.0, 101.01):
+            for now_s[0], requests in ((100.0, 1), (100.01, 1), (100.4, 1), (101.0, 2), (101.01, 2)):
                 for one in SIGNALS:
                     signal.raise_signal(one)
+                while len(asked) < requests:  # by another thread
+                    time.sleep(0.001)
         signal.raise_signal(signal.SIGINT)  # nothing comes of it any more
     finally:
         for one, handler in before.items():
             signal.signal(one, handler)
     assert asked == [100.0, 101.0]
+
+
+def test_an_end_may_need_what_the_main_thread_holds_when_the_signal_comes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("spinscope.app.terminal._requested_s", -math.inf)
+    lock, ends = threading.Lock(), list[str]()
+
+    def end() -> None:
+        with lock:
+            ends.append(threading.current_thread().name)
+
+    before = {one: signal.getsignal(one) for one in SIGNALS}
+    try:
+        with ends_on_signals(end), lock:
+            signal.raise_signal(signal.SIGINT)
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+    assert ends == ["requests for the end"]
+
+
+@pytest.mark.parametrize(("one", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize("place", ["class Owner: name = Slow()", "Slow(); time.sleep(60)"])
+def test_an_error_that_python_wraps_or_drops_is_still_the_end_asked_for(
+    place: str, one: signal.Signals, status: int
+) -> None:
+    """While a class gets its attributes, as modules do that are being loaded, and in a finalizer."""
+    script = f"""
+import time
+from spinscope.app import cli
+
+class Slow:
+    def __set_name__(self, *_):
+        self.__del__()
+
+    def __del__(self):
+        print("here", flush=True)
+        time.sleep(60)
+
+def command(*_, **__):
+    {place}
+
+cli.cli.main = command
+cli.main()
+"""
+    with subprocess.Popen(
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None and process.stdout.readline() == "here\n"
+        process.send_signal(one)
+        said = process.communicate(timeout=PATIENCE_S)[1]
+    assert (process.returncode, said) == (status, "")
 
 
 def test_an_end_asked_for_while_it_starts_is_an_end(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ import pytest
 
 from spinscope.pipeline.child_process import (
     SHARED_BYTES,
+    SIGNALS_OF_PARENT,
     ChildProcess,
     IdleProcesses,
     SharedMemory,
@@ -57,6 +58,16 @@ def test_idle_processes_that_have_ended_are_not_given_out() -> None:
     processes[0].kill()
     processes[0].exit_status()
     assert idle.take() is None
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="signals cannot be held back")
+def test_signals_of_the_parent_end_no_child_that_has_just_been_started() -> None:
+    process = ChildProcess(f"import time; time.sleep(0.2)\n{ECHO}")
+    for one in SIGNALS_OF_PARENT:
+        os.kill(process._process.pid, one)
+    process.send("still there")
+    assert process.receive() == "still there"
+    process.end()
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
