@@ -70,7 +70,7 @@ class SurfaceResult(ReadOnlyArrays):
 
     def level_of(self, value: int) -> int:
         """The lowest level of at least this value."""
-        return int(np.searchsorted(self.table, value))
+        return int(self.table.searchsorted(value))
 
     def cleaned(self, x0_px: int, y0_px: int, x1_px: int, y1_px: int) -> NDArray[np.uint8]:
         """Values in the window [x0, x1) x [y0, y1), clipped to the image, without its isolated pixels.
@@ -117,12 +117,13 @@ class OrdinalSurface:
 
     def update(self, packet: Packet, events: EventBatch) -> SurfaceLevels:
         """Draw the tick's events and return the surface at its end."""
-        return self.drawn(events)
+        levels, table = self.drawn(events)
+        return levels.copy(), table
 
     def drawn(self, events: EventBatch) -> SurfaceLevels:
-        """Draw events and return the surface after the last one."""
+        """Draw events and return the surface after the last one, as a view: good until more are drawn."""
         eros.update(self._levels, self._width_px, self._k_px, len(self._table) - 1, events.x_px, events.y_px)
-        return eros.image_levels(self._levels, self._width_px, self._height_px).copy(), self._table
+        return eros.image_levels(self._levels, self._width_px, self._height_px), self._table
 
     def clear(self) -> None:
         """Forget all events."""

@@ -245,14 +245,26 @@ def _sighting(
 
 
 def sight(
-    events: EventBatch, end_us: int, camera: Camera, circle: Circle, fastest_radii_s: float, *, signed: bool = True
+    recent: EventBatch,
+    events: EventBatch,
+    end_us: int,
+    camera: Camera,
+    circle: Circle,
+    fastest_radii_s: float,
+    *,
+    signed: bool,
 ) -> Sighting | None:
     """The moving outline behind a Hough circle: velocity by vote, then the fit; None when there is none.
 
-    The fastest velocity voted for is given in radii a second. Signed: events vote by their polarity, as a ball brighter
-    or darker than all around it gives them.
+    Parameters
+    ----------
+    recent : EventBatch
+        The events of the last VOTE_US.
+    fastest_radii_s : float
+        The fastest velocity voted for, in radii a second.
+    signed : bool
+        Whether events vote by their polarity, as a ball brighter or darker than all around it gives them.
     """
-    recent = events.between(end_us - VOTE_US, end_us)
     ring, gate = _voted(recent, end_us, circle, fastest_radii_s, signed=signed)
     if math.isnan(ring[0]):
         return None
@@ -263,14 +275,13 @@ def sight(
 
 
 def sight_arcs(
-    events: EventBatch, end_us: int, camera: Camera, circle: Circle, fastest_radii_s: float
+    recent: EventBatch, events: EventBatch, end_us: int, camera: Camera, circle: Circle, fastest_radii_s: float
 ) -> Sighting | None:
     """The moving outline behind a Hough circle of which only arcs show; None when there is none.
 
     As `sight`, but fitted to the events of both halves that a darker or a brighter disc gives: it takes the arcs' whole
     span to fix the circle, and a logo beside them gives events of the other polarity as well.
     """
-    recent = events.between(end_us - VOTE_US, end_us)
     ring, gate = _voted(recent, end_us, circle, fastest_radii_s, signed=True)
     if math.isnan(ring[0]):
         return None

@@ -20,7 +20,7 @@ from .filter import STC_MODES
 from .surface import OrdinalSurface, SurfaceParameters, SurfaceResult
 from .track_hough import candidates, empty_votes
 from .track_limits import Limits
-from .track_outline import Sighting, disc_share, sight, sight_arcs
+from .track_outline import VOTE_US, Sighting, disc_share, sight, sight_arcs
 
 # Circles of the full-frame vote looked at in one tick, without a track and beside one.
 MOST_CANDIDATES, MOST_RIVALS = 4, 2
@@ -106,13 +106,13 @@ def look(
     if len(supported) < LEAST_EVENTS:
         return first, found, excluded
     levels, table = memory.drawing.drawn(supported)
-    memory.drawing.clear()
     drawn = SurfaceResult(levels, surface.cleaning, table)
     second, found, excluded_there = searching.circles(drawn, supported, stated, signed=False)
     excluded = excluded or excluded_there
     if not found and not excluded and stated != limits.possible_px:
         # Only to tell which setting to change.
         _, _, excluded = searching.circles(drawn, supported, limits.possible_px, signed=False)
+    memory.drawing.clear()
     return first or second, found, excluded
 
 
@@ -159,6 +159,7 @@ class _Searching:
         tried: list[Circle] = []
         found: Found = []
         excluded: Excluded = []
+        recent = events.between(self.end_us - VOTE_US, self.end_us)
         by_hough = candidates(surface, events, *radii_px, self.most, self.votes)
         first = next(by_hough, None)
         for circle in chain([] if first is None else [first], by_hough, self.expected):
@@ -167,7 +168,7 @@ class _Searching:
             if any(_is_same(circle, other) for other in tried):
                 continue
             tried.append(circle)
-            sighting = self._sighting(circle, events, signed=signed)
+            sighting = self._sighting(circle, recent, events, signed=signed)
             if sighting is None:
                 continue
             reason = self.limits.excluding(sighting)
@@ -178,13 +179,13 @@ class _Searching:
         found.sort(key=lambda one: (one[0].trusted, one[0].speed_px_s), reverse=True)
         return first, found, excluded
 
-    def _sighting(self, circle: Circle, events: EventBatch, *, signed: bool) -> Sighting | None:
+    def _sighting(self, circle: Circle, recent: EventBatch, events: EventBatch, *, signed: bool) -> Sighting | None:
         """The outline behind a circle that may be a ball's, None if there is none."""
         fastest_radii_s = self.limits.speed_max_radii_s
-        sighting = sight(events, self.end_us, self.camera, circle, fastest_radii_s, signed=signed)
+        sighting = sight(recent, events, self.end_us, self.camera, circle, fastest_radii_s, signed=signed)
         if sighting is not None and self._is_likely(sighting, events, signed=signed):
             return sighting
-        arcs = None if signed else sight_arcs(events, self.end_us, self.camera, circle, fastest_radii_s)
+        arcs = None if signed else sight_arcs(recent, events, self.end_us, self.camera, circle, fastest_radii_s)
         is_likely = arcs is not None and disc_share(arcs.ring, events, self.end_us) >= ISOLATED_SHARE
         return arcs if is_likely else None
 
