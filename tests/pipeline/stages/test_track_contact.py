@@ -92,6 +92,11 @@ def hit(seed: int, at_s: float = 0.0605) -> tuple[Trajectory, Camera]:
     return Trajectory(*joined), ABOVE
 
 
+def hit_at_random(seed: int) -> tuple[Trajectory, Camera]:
+    """A hit at any instant of a tick."""
+    return hit(seed, float(np.random.default_rng([seed, 6]).uniform(0.055, 0.06)))
+
+
 def contact_s(flown: Trajectory) -> float:
     """Time of the jump of velocity."""
     jumps = np.abs(np.diff(flown.velocity_m_s, axis=0)).max(axis=1)
@@ -129,7 +134,7 @@ def test_the_ball_that_a_racket_sends_back_is_known_at_once() -> None:
     """Its instant to 0.1 ms: at 15 m/s between both velocities that is 1.5 mm of place, a pixel and more."""
     late_ms, off_px = [], []
     for seed in range(97_300, 97_320):
-        way, camera = hit(seed, float(np.random.default_rng([seed, 6]).uniform(0.055, 0.06)))
+        way, camera = hit_at_random(seed)
         contact = first_contact(path_of(way, camera, rng_of(seed)), camera)
         assert contact is not None
         late_ms.append(contact.path.hinge_us * 1e-3 - contact_s(way) * 1e3)
@@ -274,17 +279,20 @@ def with_stray(path: list[PathPoint], at_us: float, strays: int) -> tuple[list[P
     return path[:first] + ahead + path[first + strays :], first
 
 
-@pytest.mark.parametrize("seed", range(5300, 5310))
-def test_a_rackets_outline_on_the_old_path_does_not_delay_a_hit(seed: int) -> None:
-    way, camera = hit(seed)
-    at_us = contact_s(way) * 1e6
-    path, stray = with_stray(path_of(way, camera, rng_of(seed)), at_us, 1)
-    contact = first_contact(path, camera)
-    assert contact is not None and contact.kind == "hit"
-    assert contact.stray_us == path[stray].end_us and abs(contact.time_us - at_us) < 500
-    x, y, radius = camera.silhouette(way.at(np.array([path[stray].end_us * 1e-6])).position_m, 0.02)
-    off_px = contact.path.state(path[stray].end_us)[[0, 1, 4]] - [x[0], y[0], radius[0]]
-    assert np.abs(off_px).max() < 1.2  # 0.1 ms of the instant make as much
+def test_a_rackets_outline_on_the_old_path_does_not_delay_a_hit() -> None:
+    off_px = []
+    for seed in range(97_500, 97_520):
+        way, camera = hit_at_random(seed)
+        at_us = contact_s(way) * 1e6
+        path, stray = with_stray(path_of(way, camera, rng_of(seed)), at_us, 1)
+        contact = first_contact(path, camera)
+        assert contact is not None and contact.kind == "hit"
+        assert contact.stray_us == path[stray].end_us and abs(contact.time_us - at_us) < 500
+        x, y, radius = camera.silhouette(way.at(np.array([path[stray].end_us * 1e-6])).position_m, 0.02)
+        off_px.append(np.abs(contact.path.state(path[stray].end_us)[[0, 1, 4]] - [x[0], y[0], radius[0]]).max())
+    # 0.1 ms of the instant make a pixel.
+    assert np.median(off_px) < 0.6
+    assert np.max(off_px) < 1.5
 
 
 def test_no_circle_of_the_ball_is_taken_for_a_rackets() -> None:
