@@ -16,6 +16,8 @@ from .arrays import Floats
 
 TERMS = 6
 SMOOTH_TERMS = 4
+# What bends a flight and what turns it: gravity in m/s^2, lift and drag coefficients in 1/m, jump of velocity in m/s.
+Allowed = tuple[float, float, float, float]
 
 
 @njit(cache=True, nogil=True)
@@ -132,3 +134,61 @@ def path_costs(
             for j in range(count):
                 cost -= solution[j] * moment[j]
             costs[h] += cost
+
+
+@njit(cache=True, nogil=True)
+def _precisions(speed_px_s: float, radius_px: float, focal_px: float, ball_radius_m: float, allowed: Allowed) -> Floats:
+    """One over the variances (3, 6) of each channel's coefficients: what flight and contacts allow."""
+    gravity_m_s2, lift_1_m, drag_1_m, jump_m_s = allowed
+    depth_m = focal_px * ball_radius_m / radius_px
+    across, along = radius_px / ball_radius_m, radius_px / depth_m  # px a metre across the view, and along it
+    speed_m_s = speed_px_s / across
+    acceleration = 2.0 * (gravity_m_s2 + (lift_1_m + drag_1_m) * speed_m_s**2)
+    # Drag falls with the speed that it takes, and a depth that changes by gravity bends the path in perspective.
+    jerk = 3.0 * acceleration * max(speed_m_s, 1.0) / depth_m + 2.0 * drag_1_m**2 * speed_m_s**3
+    # A contact changes the image's acceleration by perspective, as it changes the speed towards the camera.
+    largest = (1e6, 1e6, acceleration / 2, jerk / 6, jump_m_s, acceleration / 4)
+    precisions = np.empty((3, TERMS))
+    for channel in range(3):
+        for k, most in enumerate(largest):
+            precisions[channel, k] = 1.0 / ((along if channel == 2 else across) * most) ** 2
+    return precisions
+
+
+@njit(cache=True, nogil=True)
+def smooth_path(
+    rows: Floats,
+    noises: Floats,
+    errors_px2: Floats,
+    focal_px: float,
+    ball_radius_m: float,
+    allowed: Allowed,
+) -> tuple[Floats, Floats, Floats, Floats, float]:
+    """Channels of measured circles, and the least cost of a path through them without a hinge.
+
+    Parameters
+    ----------
+    rows : (n, 5) float64
+        Times in s, x, y and radius in px, and 1 sigma in px by which the place was shaken.
+    noises : (n, 3, 3) float64
+        Covariances of x, y and radius.
+    errors_px2 : (3,) float64
+        Variance of each channel beyond these.
+
+    Returns
+    -------
+    times_s, values, weights, precisions
+        As `path_costs` takes them.
+    cost : float
+    """
+    n = rows.shape[0]
+    times_s, errors = np.empty(n), np.empty((n, 3))
+    for i in range(n):
+        times_s[i] = rows[i, 0]
+        for channel in range(3):
+            errors[i, channel] = errors_px2[channel] + (rows[i, 4] ** 2 if channel < 2 else 0.0)
+    values, weights, speed_px_s = edge_channels(times_s, rows[:, 1:4].copy(), noises, errors)
+    precisions = _precisions(speed_px_s, rows[n - 1, 3], focal_px, ball_radius_m, allowed)
+    cost = np.empty(1)
+    path_costs(cost, times_s, values, weights, precisions, np.empty(0))
+    return times_s, values, weights, precisions, cost[0]

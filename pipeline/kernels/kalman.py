@@ -92,28 +92,6 @@ def observation_noise(covariance: Floats, scatter_px2: float, times: float) -> F
 
 
 @njit(cache=True, nogil=True)
-def widened(covariance: Floats, shifts_px: Floats, variances: Floats) -> Floats:
-    """Covariance (5, 5) with more errors, as a new array.
-
-    Parameters
-    ----------
-    shifts_px : (m, 2) float64
-        1 sigma each by which the place is off along a direction.
-    variances : (k, 5) float64
-        Of independent errors, added in this order.
-    """
-    spread = covariance.copy()
-    for m in range(shifts_px.shape[0]):
-        for i in range(2):
-            for j in range(2):
-                spread[i, j] += shifts_px[m, i] * shifts_px[m, j]
-    for m in range(variances.shape[0]):
-        for i in range(STATES):
-            spread[i, i] += variances[m, i]
-    return spread
-
-
-@njit(cache=True, nogil=True)
 def _transformed(matrix: Floats, covariance: Floats) -> Floats:
     """Covariance M C M^T of a matrix M (m, n) times what has this covariance C (n, n)."""
     rows, n = matrix.shape

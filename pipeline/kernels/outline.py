@@ -28,6 +28,8 @@ ON_OUTLINE_PX = 1.2
 # Behind, the ball's shading fires up to a fifth of the radius before the edge comes.
 EARLY_SHARE = 0.2
 SECTORS = 32
+# Of the angles between the sectors of an eighth of a circle.
+TANGENTS = tuple(math.tan(2.0 * math.pi * n / SECTORS) for n in range(1, SECTORS // 8))
 # Where the motion passes an outline at a smaller |cos| than this, few events tell its place.
 GRAZING = 0.25
 # Events that vote for the velocity: a circle of them stands out among some 200 velocities.
@@ -133,7 +135,7 @@ def support(
         else:
             behind += 1
             behind_on += on[i]
-        counts[int((math.atan2(dy, dx) / (2.0 * math.pi) + 1.0) * SECTORS) % SECTORS] += 1
+        counts[_sector(dx, dy)] += 1
     speed = math.hypot(circle[2], circle[3]) + 1e-9
     least = 2 if ahead + behind >= 3 * SECTORS else 1
     seen, visible = np.zeros(2), np.zeros(2)
@@ -156,6 +158,24 @@ def support(
     found[3], found[4] = seen[0] / max(visible[0], 1.0), seen[1] / max(visible[1], 1.0)
     found[5], found[6], found[7] = in_view / SECTORS, outside, inside
     return found
+
+
+@njit(cache=True, nogil=True)
+def _sector(dx_px: float, dy_px: float) -> int:
+    """Sector of SECTORS, by growing angle, in which this direction lies.
+
+    By comparisons with the angles between them: with its arc tangent `support` takes twice as long.
+    """
+    across, down = abs(dx_px), abs(dy_px)
+    near, far = min(across, down), max(across, down)
+    step = 0
+    for tangent in TANGENTS:
+        step += near >= far * tangent
+    if down > across:
+        step = SECTORS // 4 - 1 - step
+    if dx_px < 0.0:
+        step = SECTORS // 2 - 1 - step
+    return SECTORS - 1 - step if dy_px < 0.0 else step
 
 
 @njit(cache=True, nogil=True)
@@ -252,6 +272,45 @@ def evidence(
     tau_s, x, y, on = relative_events(around, events, reference_us)
     found = support(circle, ellipticity, tau_s, x, y, on, width_px, height_px)
     return found, distance_behind(circle, ellipticity, tau_s, x, y, on, found[1] > found[2])
+
+
+@njit(cache=True, nogil=True)
+def ellipticity_at(x_px: float, y_px: float, optics_px: tuple[float, float, float]) -> Floats:
+    """Departure (2,) from a circle of a sphere's outline around this pixel, see `moving_circle`.
+
+    The semi-axes are as 1 to cos(theta), the longer one pointing away from the principal point (`Camera`). The optics
+    are focal length and principal point.
+    """
+    focal_px, principal_x_px, principal_y_px = optics_px
+    x, y = x_px - principal_x_px, y_px - principal_y_px
+    square = x * x + y * y
+    ellipticity = np.zeros(2)
+    if square >= 1.0:
+        ratio = math.sqrt(1.0 + square / (focal_px * focal_px))
+        strength = (ratio - 1.0) / (ratio + 1.0) / square
+        ellipticity[0], ellipticity[1] = (x * x - y * y) * strength, 2.0 * x * y * strength
+    return ellipticity
+
+
+@njit(cache=True, nogil=True)
+def measured_outline(
+    expected: Floats,
+    prior_std: Floats,
+    optics_px: tuple[float, float, float],
+    events: Events,
+    reference_us: int,
+    gate_px: float,
+    part: int,
+    width_px: int,
+    height_px: int,
+) -> tuple[Floats, Floats, float, Floats, float]:
+    """Outline by `fit_outline` and its `evidence`, which is not set where there is none: in one call, a tenth faster."""
+    ellipticity = ellipticity_at(expected[0], expected[1], optics_px)
+    circle, covariance, scatter_px = fit_outline(expected, prior_std, ellipticity, events, reference_us, gate_px, part)
+    if math.isnan(circle[0]):
+        return circle, covariance, scatter_px, np.empty(0), np.nan
+    found, behind_px = evidence(circle, ellipticity, events, reference_us, width_px, height_px)
+    return circle, covariance, scatter_px, found, behind_px
 
 
 @njit(cache=True, nogil=True)

@@ -16,7 +16,7 @@ from ..kernels.moving_circle import HALF_AHEAD
 from ..kernels.take_events import take_events
 from ..results import Circle, Packet
 from .track_contact import Contact
-from .track_kalman import OBSERVED, BallFilter, observation_noise, widened
+from .track_kalman import OBSERVED, BallFilter, observation_noise
 from .track_outline import FREE, LEAST_ARC, Edge, Sighting, measure
 from .track_path import PathPoint
 from .track_result import BallTrack, BeganBy
@@ -321,15 +321,16 @@ class TrackedBall:
 
         And a further one of place and radius.
         """
-        vx, vy = self.filter.mean[2:4].tolist()
-        shifts, variances = [[vx * LATENCY_STD_US * 1e-6, vy * LATENCY_STD_US * 1e-6]], []
+        _, _, vx, vy, _ = self.filter.mean.tolist()
+        covariance: Floats = self.filter.covariance + COMMON_COVARIANCE
+        _shift(covariance, vx * LATENCY_STD_US * 1e-6, vy * LATENCY_STD_US * 1e-6)
         if self.part != HALF_AHEAD:
             speed = math.hypot(vx, vy)
-            shifts.append([vx / speed * ARCS_LAG_STD_PX, vy / speed * ARCS_LAG_STD_PX])
-            variances.append([0.0, 0.0, 0.0, 0.0, ARCS_RADIUS_STD_PX**2])
-        more = observed_std_px**2
-        variances.append([more, more, 0.0, 0.0, more])
-        return widened(self.filter.covariance + COMMON_COVARIANCE, np.array(shifts), np.array(variances))
+            _shift(covariance, vx / speed * ARCS_LAG_STD_PX, vy / speed * ARCS_LAG_STD_PX)
+            covariance[4, 4] += ARCS_RADIUS_STD_PX**2
+        if observed_std_px > 0.0:
+            covariance[OBSERVED, OBSERVED] += observed_std_px**2
+        return covariance
 
     def track(self, end_us: int, latency_us: float, outline_px: float, earlier: tuple[BallTrack, ...]) -> BallTrack:
         """Its present state, to the ball's rim; with `outline_px` = 0 to where the events ahead lie."""
@@ -373,3 +374,11 @@ class TrackedBall:
         self.path.append(point)
         while self.path[0].end_us < point.end_us - JUDGED_US:
             del self.path[0]
+
+
+def _shift(covariance: Floats, x_px: float, y_px: float) -> None:
+    """Add an error of the place by this, 1 sigma, to a covariance (5, 5)."""
+    covariance[0, 0] += x_px * x_px
+    covariance[0, 1] += x_px * y_px
+    covariance[1, 0] += y_px * x_px
+    covariance[1, 1] += y_px * y_px

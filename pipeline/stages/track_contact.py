@@ -36,6 +36,7 @@ FEWEST_CIRCLES = 3
 # Errors of the outline's edge ahead and of the circle's radius from tick to tick that the test must bear, in clutter.
 EDGE_STD_PX, RADIUS_STD_PX = 0.1, 0.15
 ERRORS_PX2 = np.array([EDGE_STD_PX, EDGE_STD_PX, RADIUS_STD_PX]) ** 2
+ALLOWED = (GRAVITY_M_S2, LIFT_1_M, DRAG_1_M, JUMP_M_S)
 # Gain in chi^2 that a hinge must bring. 300 simulated flights of 3 to 22 m/s and up to 120 rps without a contact stay
 # below 33, whatever the time of the hinge; bounces reach 100 to 5000, hits 10^5.
 LEAST_GAIN = 60.0
@@ -195,7 +196,7 @@ def _gains_of_hinges(points: list[PathPoint], camera: Camera, ball_radius_m: flo
 
 
 class _PathFit:
-    """Least-squares paths through measured circles, in the channels of `kernels.edge_channels`.
+    """Least-squares paths through measured circles, in the channels of `kernels.smooth_path`.
 
     Parameters
     ----------
@@ -205,15 +206,15 @@ class _PathFit:
 
     def __init__(self, points: list[PathPoint], camera: Camera, ball_radius_m: float) -> None:
         self.origin_us = points[-1].end_us
-        self._times_s = np.array([(point.end_us - self.origin_us) * 1e-6 for point in points])
-        circles = np.array([(c.x_px, c.y_px, c.radius_px) for point in points if (c := point.circle)])
-        noises = np.array([point.noise for point in points])
-        shakes_px2 = np.array([point.shake_px for point in points])[:, None] ** 2 * [1.0, 1.0, 0.0]
-        self._values, self._weights, speed_px_s = kernels.edge_channels(
-            self._times_s, circles, noises, ERRORS_PX2 + shakes_px2
+        rows = [
+            ((point.end_us - self.origin_us) * 1e-6, c.x_px, c.y_px, c.radius_px, point.shake_px)
+            for point in points
+            if (c := point.circle)
+        ]
+        noises = np.concatenate([point.noise for point in points]).reshape(-1, 3, 3)
+        self._times_s, self._values, self._weights, self._precisions, self.smooth_cost = kernels.smooth_path(
+            np.array(rows), noises, ERRORS_PX2, camera.focal_px, ball_radius_m, ALLOWED
         )
-        self._precisions = _precisions(speed_px_s, float(circles[-1, 2]), camera, ball_radius_m)
-        self.smooth_cost = float(self._costs(np.empty(0))[0])
 
     def gains(self, hinges_us: Floats) -> Floats:
         """Gains (m,) in chi^2 by a hinge at these times (m,).
@@ -229,19 +230,6 @@ class _PathFit:
         costs = np.empty(1 + hinges_s.size)
         kernels.path_costs(costs, self._times_s, self._values, self._weights, self._precisions, hinges_s)
         return costs
-
-
-def _precisions(speed_px_s: float, radius_px: float, camera: Camera, ball_radius_m: float) -> Floats:
-    """(3, 6) float64 one over the variances of each channel's coefficients: what flight and contacts allow."""
-    depth_m = camera.focal_px * ball_radius_m / radius_px
-    across, along = radius_px / ball_radius_m, radius_px / depth_m  # px a metre across the view, and along it
-    speed_m_s = speed_px_s / across
-    acceleration = 2.0 * (GRAVITY_M_S2 + (LIFT_1_M + DRAG_1_M) * speed_m_s**2)
-    # Drag falls with the speed that it takes, and a depth that changes by gravity bends the path in perspective.
-    jerk = 3.0 * acceleration * max(speed_m_s, 1.0) / depth_m + 2.0 * DRAG_1_M**2 * speed_m_s**3
-    # A contact changes the image's acceleration by perspective, as it changes the speed towards the camera.
-    largest = np.array([1e6, 1e6, acceleration / 2, jerk / 6, JUMP_M_S, acceleration / 4])
-    return 1.0 / np.outer([across, across, along], largest) ** 2
 
 
 def _kind(before_m_s: Floats, after_m_s: Floats, unsure_m_s: Floats, up: Floats) -> Kind:

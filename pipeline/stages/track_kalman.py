@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..kernels import kalman
 
 Floats = NDArray[np.float64]
-OBSERVED, observation_noise, widened = kalman.OBSERVED, kalman.observation_noise, kalman.widened
+OBSERVED, observation_noise = kalman.OBSERVED, kalman.observation_noise
 
 
 class BallFilter:

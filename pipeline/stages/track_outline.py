@@ -180,18 +180,8 @@ def disc_share(ring: Floats, events: EventBatch, end_us: int) -> float:
     return on_disc / around if around else 0.0
 
 
-def oval_of(camera: Camera, x_px: float, y_px: float) -> Floats:
-    """(2,) float64 departure from a circle of a sphere's outline around this pixel (see kernels.moving_circle).
-
-    The semi-axes are as 1 to cos(theta), the longer one pointing away from the principal point (`Camera`).
-    """
-    x, y = x_px - camera.principal_x_px, y_px - camera.principal_y_px
-    square = x * x + y * y
-    if square < 1.0:
-        return np.zeros(2)
-    ratio = math.sqrt(1.0 + square / camera.focal_px**2)
-    strength = (ratio - 1.0) / (ratio + 1.0) / square
-    return np.array([(x * x - y * y) * strength, 2.0 * x * y * strength])
+def _optics_px(camera: Camera) -> tuple[float, float, float]:
+    return camera.focal_px, camera.principal_x_px, camera.principal_y_px
 
 
 def measure(
@@ -214,19 +204,17 @@ def measure(
     part : int
         Part of the outline that is fitted, see `kernels.moving_circle.near_outline`.
     """
-    columns, oval = events.columns, oval_of(camera, expected[0], expected[1])
-    ring, covariance, scatter_px = kernels.fit_outline(expected, prior_std, oval, columns, end_us, gate_px, part)
-    if math.isnan(ring[0]):
-        return None
-    evidence = kernels.evidence(ring, oval, columns, end_us, camera.width_px, camera.height_px)
-    return _sighting(ring, covariance, scatter_px, evidence, part)
+    size, optics_px = (camera.width_px, camera.height_px), _optics_px(camera)
+    ring, covariance, scatter_px, *evidence = kernels.measured_outline(
+        expected, prior_std, optics_px, events.columns, end_us, gate_px, part, *size
+    )
+    return None if math.isnan(ring[0]) else _sighting(ring, covariance, scatter_px, *evidence, part)
 
 
 def _sighting(
-    ring: Floats, covariance: Floats, scatter_px: float, evidence: tuple[Floats, float], part: int
+    ring: Floats, covariance: Floats, scatter_px: float, found: Floats, behind_px: float, part: int
 ) -> Sighting:
     """The outline of a fit, with its evidence as `kernels.outline.evidence` gives it."""
-    found, behind_px = evidence
     events_on, ahead_on, behind_on, ahead, behind, visible, outside, _ = found.tolist()
     return Sighting(
         ring,
@@ -286,17 +274,18 @@ def sight_arcs(
     if math.isnan(ring[0]):
         return None
     columns, size = events.columns, (camera.width_px, camera.height_px)
-    oval = oval_of(camera, ring[0], ring[1])
+    optics_px = _optics_px(camera)
+    oval = kernels.ellipticity_at(ring[0], ring[1], optics_px)
     for part in (OF_DARK, OF_BRIGHT):
         first, _, _ = kernels.fit_outline(ring, FREE, oval, recent.columns, end_us, 1.5 * gate, part)
         if math.isnan(first[0]):
             continue
-        first_oval = oval_of(camera, first[0], first[1])
+        first_oval = kernels.ellipticity_at(first[0], first[1], optics_px)
         fitted, covariance, scatter_px = kernels.fit_outline(first, FREE, first_oval, columns, end_us, 3.0, part)
         if math.isnan(fitted[0]) or not _is_fixed_by_arcs(fitted, covariance):
             continue  # before its support is counted, which takes as long as the fit
         evidence = kernels.evidence(fitted, first_oval, columns, end_us, *size)
-        sighting = _sighting(fitted, covariance, scatter_px, evidence, part)
+        sighting = _sighting(fitted, covariance, scatter_px, *evidence, part)
         if sighting.in_arcs:
             return sighting
     return None

@@ -19,6 +19,17 @@ def edge_channels(times_s: Floats, circles: Floats, noises: Floats, errors_px2: 
     return circles @ channels.T, 1.0 / variances, float(np.hypot(*steps.T).sum() / (times_s[-1] - times_s[0]))
 
 
+def flight_precisions(speed_px_s: float, radius_px: float, focal_px: float, ball_radius_m: float) -> Floats:
+    """One over the variances: gravity, lift 0.07 / m, drag 0.16 / m, jumps of 30 m/s, in px a metre across and along."""
+    depth_m = focal_px * ball_radius_m / radius_px
+    per_m = np.array([radius_px / ball_radius_m, radius_px / ball_radius_m, radius_px / depth_m])
+    speed_m_s = speed_px_s / per_m[0]
+    acceleration = 2 * (9.81 + (0.07 + 0.16) * speed_m_s**2)
+    jerk = 3 * acceleration * max(speed_m_s, 1) / depth_m + 2 * 0.16**2 * speed_m_s**3
+    largest = np.array([1e6, 1e6, acceleration / 2, jerk / 6, 30.0, acceleration / 4])
+    return 1.0 / np.outer(per_m, largest) ** 2
+
+
 def path_costs(times_s: Floats, circles: Floats, weights: Floats, precisions: Floats, hinges_s: Floats) -> Floats:
     """Each channel's least squares by `lstsq`, the priors as further rows."""
     costs = []

@@ -41,6 +41,26 @@ def test_channels_equal_the_twins(seed: int, count: int, stays: bool) -> None:
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
 
 
+@given(seed=st.integers(0, 2**32 - 1), count=st.integers(4, 25))
+def test_a_smooth_path_is_that_of_the_channels_with_what_a_flight_allows(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    times_s, shakes_px = np.cumsum(rng.uniform(1e-3, 6e-3, count)), rng.uniform(0, 1, count)
+    circles = rng.uniform(5, 30, (1, 3)) + rng.uniform(-3000, 3000, (1, 3)) * [1, 1, 0] * times_s[:, None]
+    roots = rng.normal(size=(count, 3, 3))
+    noises, errors_px2 = roots @ np.swapaxes(roots, 1, 2), rng.uniform(0.01, 0.1, 3)
+    rows = np.column_stack([times_s, circles, shakes_px])
+    *found, cost = hinged_path.smooth_path(rows, noises, errors_px2, 1646.0, 0.02, (9.81, 0.07, 0.16, 30.0))
+    values, weights, speed_px_s = reference.edge_channels(
+        times_s, circles, noises, errors_px2 + shakes_px[:, None] ** 2 * [1.0, 1.0, 0.0]
+    )
+    precisions = reference.flight_precisions(speed_px_s, circles[-1, 2], 1646.0, 0.02)
+    for one, expected in zip(found, (times_s, values, weights, precisions), strict=True):
+        np.testing.assert_allclose(one, expected, rtol=1e-9, atol=1e-30)
+    costs = np.empty(1)
+    hinged_path.path_costs(costs, *found, np.empty(0))
+    assert cost == costs[0]
+
+
 @given(seed=st.integers(0, 2**32 - 1), balls=st.integers(1, 3))
 def test_the_nearest_outline_is_the_twins(seed: int, balls: int) -> None:
     rng = np.random.default_rng(seed)

@@ -73,12 +73,7 @@ def test_an_observation_farther_off_than_allowed_changes_nothing(share: float, e
 
 
 @given(seed=SEEDS, times=st.floats(1.0, 5.0))
-def test_more_errors_add_their_variances(seed: int, times: float) -> None:
-    rng = np.random.default_rng(seed)
-    _, covariance = state(rng)
-    shifts, variances = rng.normal(size=(2, 2)), rng.random((3, 5))
-    expected = covariance + np.diag(variances.sum(axis=0))
-    expected[:2, :2] += shifts.T @ shifts
-    np.testing.assert_allclose(kalman.widened(covariance, shifts, variances), expected, rtol=1e-12, atol=1e-12)
+def test_an_observations_noise_is_the_states_and_its_own(seed: int, times: float) -> None:
+    _, covariance = state(np.random.default_rng(seed))
     noise = kalman.observation_noise(covariance, 0.04, times)
     np.testing.assert_allclose(noise, (covariance[np.ix_([0, 1, 4], [0, 1, 4])] + 0.04 * np.eye(3)) * times, rtol=1e-12)
