@@ -204,8 +204,8 @@ def peak(votes: Pixels, radius0_px: int, least_support: float = 0.0) -> tuple[fl
     """Best supported circle: (support, a, b, k), its indices in the votes; of equal ones the first.
 
     The support is votes^2 / (2 pi radius): the number of votes times the share of the outline that they fill,
-    so that neither a short arc of a large circle nor a full but tiny one wins. (0, 0, 0, 0) without votes; one with less
-    than the least support need not be found.
+    so that neither a short arc of a large circle nor a full but tiny one wins. (0, 0, 0, 0) without votes; one with
+    less than the least support need not be found.
     """
     best, best_n = 0.0, 0
     radii, cells = votes.shape[2], votes.reshape(-1)

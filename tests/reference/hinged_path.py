@@ -20,7 +20,7 @@ def edge_channels(times_s: Floats, circles: Floats, noises: Floats, errors_px2: 
 
 
 def flight_precisions(speed_px_s: float, radius_px: float, focal_px: float, ball_radius_m: float) -> Floats:
-    """One over the variances: gravity, lift 0.07 / m, drag 0.16 / m, jumps of 30 m/s, in px a metre across and along."""
+    """One over the variances: gravity, lift 0.07 / m, drag 0.16 / m, jumps of 30 m/s, in px across and along."""
     depth_m = focal_px * ball_radius_m / radius_px
     per_m = np.array([radius_px / ball_radius_m, radius_px / ball_radius_m, radius_px / depth_m])
     speed_m_s = speed_px_s / per_m[0]
