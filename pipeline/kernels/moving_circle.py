@@ -13,9 +13,11 @@ import math
 import numpy as np
 from numba import njit
 
-from .arrays import Events, Flags, Floats, Integers, Pixels
+from .arrays import Events, Flags, Floats, Integers
 from .small_matrices import inverse_matrix
 
+# First and last column, first and last row in px.
+Box = tuple[float, float, float, float]
 # Parts of an outline: all of it, the half that moves outwards, or the events of both halves as a disc brighter or
 # darker than the ground gives them (ON where a bright one moves outwards and OFF where it moves inwards).
 WHOLE, HALF_AHEAD, OF_BRIGHT, OF_DARK = range(4)
@@ -29,15 +31,30 @@ def near_outline(
 
     The parts are WHOLE, HALF_AHEAD, OF_BRIGHT and OF_DARK.
     """
+    around = in_box(events, box_around(circle, events, reference_us, circle[4] + gate_px))
+    return near_outline_of(around, circle, events, reference_us, gate_px, most_events, part)
+
+
+@njit(cache=True, nogil=True)
+def near_outline_of(
+    around: Integers,
+    circle: Floats,
+    events: Events,
+    reference_us: int,
+    gate_px: float,
+    most_events: int,
+    part: int,
+) -> Integers:
+    """`near_outline` of events around it, (n,) int64: all in its `box_around`, and any others."""
     t_us, x_px, y_px, on = events
     x0, y0, vx, vy = circle[0], circle[1], circle[2], circle[3]
     is_whole, is_half, of_bright = part == WHOLE, part == HALF_AHEAD, part == OF_BRIGHT
     inner = max(circle[4] - gate_px, 0.0) ** 2
     outer = (circle[4] + gate_px) ** 2
-    chosen = _around_circle(circle, events, reference_us, circle[4] + gate_px)
+    chosen = np.empty(around.size, np.int64)
     m = 0
-    for n in range(chosen.size):
-        i = np.uint64(chosen[n])
+    for n in range(around.size):
+        i = np.uint64(around[n])
         tau = np.int32(t_us[i] - reference_us) * 1e-6
         dx, dy = x_px[i] - (x0 + vx * tau), y_px[i] - (y0 + vy * tau)
         square = dx * dx + dy * dy
@@ -50,31 +67,27 @@ def near_outline(
 
 
 @njit(cache=True, nogil=True)
-def _around_circle(circle: Floats, events: Events, reference_us: int, reach_px: float) -> Integers:
-    """Indices (m,) int64 of events in the columns and rows that a moving circle of this radius passes, and some more.
-
-    The processor compares 16 whole numbers at once: in clutter twice as fast as the distances of all events.
-    """
-    t_us, x_px, y_px, _ = events
+def box_around(circle: Floats, events: Events, reference_us: int, reach_px: float) -> Box:
+    """Columns and rows that a moving circle of this radius passes during the events, and some more; none without."""
+    t_us, _, _, _ = events
     if t_us.size == 0:
-        return np.empty(0, np.int64)
+        return 0.0, -1.0, 0.0, -1.0
     first_s, last_s = (t_us[0] - reference_us) * 1e-6, (t_us[-1] - reference_us) * 1e-6
     first_x, last_x = circle[0] + circle[2] * first_s, circle[0] + circle[2] * last_s
     first_y, last_y = circle[1] + circle[3] * first_s, circle[1] + circle[3] * last_s
     reach_px += 1.0  # more than any rounding
-    return _in_box(
-        x_px,
-        y_px,
-        min(first_x, last_x) - reach_px,
-        max(first_x, last_x) + reach_px,
-        min(first_y, last_y) - reach_px,
-        max(first_y, last_y) + reach_px,
-    )
+    left_px, right_px = min(first_x, last_x) - reach_px, max(first_x, last_x) + reach_px
+    return left_px, right_px, min(first_y, last_y) - reach_px, max(first_y, last_y) + reach_px
 
 
 @njit(cache=True, nogil=True)
-def _in_box(x_px: Pixels, y_px: Pixels, left_px: float, right_px: float, top_px: float, bottom_px: float) -> Integers:
-    """Indices (m,) int64 of events in these columns and rows, the limits included."""
+def in_box(events: Events, box: Box) -> Integers:
+    """Indices (m,) int64 of events in these columns and rows, the limits included.
+
+    The processor compares 16 whole numbers at once: in clutter twice as fast as the distances of all events.
+    """
+    _, x_px, y_px, _ = events
+    left_px, right_px, top_px, bottom_px = box
     left, top = np.int64(math.ceil(_pixel(left_px))), np.int64(math.ceil(_pixel(top_px)))
     width, height = np.int64(math.floor(_pixel(right_px))) - left, np.int64(math.floor(_pixel(bottom_px))) - top
     if right_px < 0.0 or bottom_px < 0.0 or width < 0 or height < 0:
@@ -266,7 +279,7 @@ def inside_circles(circles: Floats, events: Events, reference_us: int, margins_p
     for m in range(margins_px.size):
         x0, y0, vx, vy = circles[m, 0], circles[m, 1], circles[m, 2], circles[m, 3]
         reach_px = circles[m, 4] + margins_px[m]
-        for row in _around_circle(circles[m], events, reference_us, reach_px):
+        for row in in_box(events, box_around(circles[m], events, reference_us, reach_px)):
             i = np.uint64(row)
             tau = np.int32(t_us[i] - reference_us) * 1e-6
             dx, dy = x_px[i] - (x0 + vx * tau), y_px[i] - (y0 + vy * tau)
@@ -275,11 +288,9 @@ def inside_circles(circles: Floats, events: Events, reference_us: int, margins_p
 
 
 @njit(cache=True, nogil=True)
-def in_square(x_px: Pixels, y_px: Pixels, centre_x_px: float, centre_y_px: float, reach_px: float) -> Integers:
-    """Indices (m,) int64 of events within reach_px of a place, in both columns and rows."""
-    return _in_box(
-        x_px, y_px, centre_x_px - reach_px, centre_x_px + reach_px, centre_y_px - reach_px, centre_y_px + reach_px
-    )
+def box_within(inner: Box, outer: Box) -> bool:
+    """Whether a box lies within another one."""
+    return inner[0] >= outer[0] and inner[1] <= outer[1] and inner[2] >= outer[2] and inner[3] <= outer[3]
 
 
 @njit(cache=True, nogil=True)

@@ -10,14 +10,26 @@ import math
 import numpy as np
 from numba import njit
 
-from .arrays import Events, Flags, Floats
-from .moving_circle import WHOLE, fit_circle, in_square, near_outline, relative_events, residuals
+from .arrays import Events, Flags, Floats, Integers
+from .moving_circle import (
+    WHOLE,
+    box_around,
+    box_within,
+    fit_circle,
+    in_box,
+    near_outline,
+    near_outline_of,
+    relative_events,
+    residuals,
+)
 from .order_statistics import value_of_rank
 
 # Events used for a fit: beyond this the pixels' common errors outweigh the statistical, 0.1 px / sqrt(n).
 MOST_EVENTS = 200
 # Events looked at around a fitted outline, for what supports it.
 MOST_AROUND = 400
+# A fit seldom moves an outline, or changes its radius, by more.
+MOVED_PX = 2.0
 # Fewer are no outline.
 LEAST_EVENTS, LEAST_WEIGHT = 12, 8.0
 # A circle's scatter above this is no outline but a band of events.
@@ -246,6 +258,20 @@ def fit_outline(
         1 sigma of the residuals.
     """
     chosen = near_outline(expected, events, reference_us, gate_px, MOST_EVENTS, part)
+    return _fit_chosen(chosen, expected, prior_std, ellipticity, events, reference_us, gate_px)
+
+
+@njit(cache=True, nogil=True)
+def _fit_chosen(
+    chosen: Integers,
+    expected: Floats,
+    prior_std: Floats,
+    ellipticity: Floats,
+    events: Events,
+    reference_us: int,
+    gate_px: float,
+) -> tuple[Floats, Floats, float]:
+    """`fit_outline` with the events chosen for it, (n,) int64."""
     nothing = np.full(5, np.nan), np.zeros((5, 5)), 0.0
     if chosen.size < LEAST_EVENTS:
         return nothing
@@ -267,9 +293,28 @@ def evidence(
 
     The disc is taken for bright where more of the events ahead than of those behind are ON.
     """
-    around_px = max(4.0 * ON_OUTLINE_PX, EARLY_SHARE * circle[4])
-    around = near_outline(circle, events, reference_us, around_px, MOST_AROUND, WHOLE)
-    tau_s, x, y, on = relative_events(around, events, reference_us)
+    chosen = near_outline(circle, events, reference_us, _around_px(circle), MOST_AROUND, WHOLE)
+    return _evidence_of(chosen, circle, ellipticity, events, reference_us, width_px, height_px)
+
+
+@njit(cache=True, nogil=True)
+def _around_px(circle: Floats) -> float:
+    """Distance from an outline within which events are evidence for it."""
+    return max(4.0 * ON_OUTLINE_PX, EARLY_SHARE * circle[4])
+
+
+@njit(cache=True, nogil=True)
+def _evidence_of(
+    chosen: Integers,
+    circle: Floats,
+    ellipticity: Floats,
+    events: Events,
+    reference_us: int,
+    width_px: int,
+    height_px: int,
+) -> tuple[Floats, float]:
+    """`evidence` of the events chosen for it, (n,) int64."""
+    tau_s, x, y, on = relative_events(chosen, events, reference_us)
     found = support(circle, ellipticity, tau_s, x, y, on, width_px, height_px)
     return found, distance_behind(circle, ellipticity, tau_s, x, y, on, found[1] > found[2])
 
@@ -304,12 +349,25 @@ def measured_outline(
     width_px: int,
     height_px: int,
 ) -> tuple[Floats, Floats, float, Floats, float]:
-    """Outline by `fit_outline`, and its `evidence`, empty and NaN where there is none."""
+    """Outline by `fit_outline`, and its `evidence`, empty and NaN where there is none.
+
+    The events around it are mostly looked for once for both.
+    """
     ellipticity = ellipticity_at(expected[0], expected[1], optics_px)
-    circle, covariance, scatter_px = fit_outline(expected, prior_std, ellipticity, events, reference_us, gate_px, part)
+    box = box_around(expected, events, reference_us, expected[4] + max(gate_px, _around_px(expected)) + MOVED_PX)
+    around = in_box(events, box)
+    chosen = near_outline_of(around, expected, events, reference_us, gate_px, MOST_EVENTS, part)
+    circle, covariance, scatter_px = _fit_chosen(
+        chosen, expected, prior_std, ellipticity, events, reference_us, gate_px
+    )
     if math.isnan(circle[0]):
         return circle, covariance, scatter_px, np.empty(0), np.nan
-    found, behind_px = evidence(circle, ellipticity, events, reference_us, width_px, height_px)
+    gate_px = _around_px(circle)
+    new_box = box_around(circle, events, reference_us, circle[4] + gate_px)
+    if not box_within(new_box, box):
+        around = in_box(events, new_box)
+    chosen = near_outline_of(around, circle, events, reference_us, gate_px, MOST_AROUND, WHOLE)
+    found, behind_px = _evidence_of(chosen, circle, ellipticity, events, reference_us, width_px, height_px)
     return circle, covariance, scatter_px, found, behind_px
 
 
@@ -346,7 +404,8 @@ def find_moving_circle(
     """
     circle = np.zeros(5)
     circle[0], circle[1], circle[4] = x_px, y_px, radius_px
-    chosen = in_square(events[1], events[2], x_px, y_px, 1.3 * radius_px + fastest_px_s * span_s)
+    reach_px = 1.3 * radius_px + fastest_px_s * span_s
+    chosen = in_box(events, (x_px - reach_px, x_px + reach_px, y_px - reach_px, y_px + reach_px))
     chosen = chosen[:: max(1, chosen.size // MOST_VOTERS) | 1].copy()
     gate, span = 0.3 * radius_px, fastest_px_s
     if chosen.size < LEAST_EVENTS:

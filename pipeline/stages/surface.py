@@ -125,9 +125,11 @@ class OrdinalSurface:
         eros.update(self._levels, self._width_px, self._k_px, len(self._table) - 1, events.x_px, events.y_px)
         return eros.image_levels(self._levels, self._width_px, self._height_px), self._table
 
-    def clear(self) -> None:
-        """Forget all events."""
-        self._levels[:] = 0
+    def clear(self, drawn: EventBatch) -> None:
+        """Forget these events, all that were drawn since the surface was empty."""
+        if len(drawn):
+            rows, columns = (slice(int(one.min()), int(one.max()) + 1) for one in (drawn.y_px, drawn.x_px))
+            eros.image_levels(self._levels, self._width_px, self._height_px)[rows, columns] = 0
 
 
 class LastEventSurface:

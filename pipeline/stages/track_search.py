@@ -112,7 +112,7 @@ def look(
     if not found and not excluded and stated != limits.possible_px:
         # Only to tell which setting to change.
         _, _, excluded = searching.circles(drawn, supported, limits.possible_px, signed=False)
-    memory.drawing.clear()
+    memory.drawing.clear(supported)
     return first or second, found, excluded
 
 

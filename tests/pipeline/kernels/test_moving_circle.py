@@ -176,9 +176,37 @@ def test_an_oval_outline_is_known() -> None:
     assert scatter < 0.02
 
 
-def test_squares_hold_their_border() -> None:
-    x, y = read_only(np.array([0, 5, 10, 11, 5], np.uint16), np.array([5, 5, 10, 5, 11], np.uint16))
-    assert outline.in_square(x, y, 5.0, 5.0, 5.0).tolist() == [0, 1, 2]
+def test_boxes_hold_their_border() -> None:
+    x, y = np.array([0, 5, 10, 11, 5], np.uint16), np.array([5, 5, 10, 5, 11], np.uint16)
+    events = read_only(np.arange(5), x, y, np.ones(5, np.bool_))
+    assert moving_circle.in_box(events, (0.0, 10.0, 0.0, 10.0)).tolist() == [0, 1, 2]
+
+
+@given(seed=st.integers(0, 2**32 - 1), off_px=st.floats(-6.0, 6.0), gate_px=st.floats(1.0, 9.0))
+def test_a_measured_outline_is_the_fit_and_its_evidence(seed: int, off_px: float, gate_px: float) -> None:
+    """Also where the fit moves the outline out of the events that were looked at for it."""
+    ring, tau, x, y, on = scene(seed)
+    inside = (x >= 0) & (y >= 0)
+    columns = (tau * 1e6).astype(np.int64), np.round(x).astype(np.uint16), np.round(y).astype(np.uint16)
+    events = read_only(*(column[inside] for column in (*columns, on)))
+    expected, optics = ring.copy(), (1646.0, 40.0, 30.0)
+    expected[[0, 4]] += off_px, -off_px / 2
+    oval = outline.ellipticity_at(expected[0], expected[1], optics)
+    found = outline.measured_outline(expected, FREE, optics, events, 0, gate_px, HALF_AHEAD, 100, 80)
+    fitted = outline.fit_outline(expected, FREE, oval, events, 0, gate_px, HALF_AHEAD)
+    for one, other in zip(found[:3], fitted, strict=True):
+        assert np.array_equal(one, other, equal_nan=True)
+    if np.isfinite(fitted[0]).all():
+        support, behind_px = outline.evidence(fitted[0], oval, events, 0, 100, 80)
+        assert np.array_equal(found[3], support) and np.array_equal(found[4], behind_px, equal_nan=True)
+
+
+def test_an_outline_off_the_axis_is_an_ellipse_along_the_radius() -> None:
+    """A sphere's outline: semi-axes as 1 to cos(theta), theta = 20 degrees off the axis, towards the diagonal."""
+    off_px = 1000.0 * math.tan(math.radians(20.0)) / math.sqrt(2.0)
+    cosine, sine = outline.ellipticity_at(50.0 + off_px, 40.0 + off_px, (1000.0, 50.0, 40.0))
+    assert abs(cosine) < 1e-12
+    assert np.isclose((1 + sine) / (1 - sine), 1 / math.cos(math.radians(20.0)))
 
 
 @pytest.mark.parametrize("bright", [True, False])

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from spinscope.pipeline.camera import Camera, CameraParameters
 from spinscope.pipeline.errors import ParameterError
 from spinscope.pipeline.events import EventBatch
+from spinscope.pipeline.kernels import eros
 from spinscope.pipeline.results import Packet
 from spinscope.pipeline.stage import Context
 from spinscope.pipeline.stages import filter as filter_stage
@@ -96,6 +97,17 @@ def test_results_are_fresh_and_read_only(kind: str) -> None:
         assert result.level_of(128) == np.flatnonzero(result.table >= 128)[0]
         window = result.cleaned(0, 0, WIDTH, HEIGHT)
         assert not np.shares_memory(window, result.levels)
+
+
+@pytest.mark.parametrize("k_px", [1, 10, 49])
+def test_a_surface_without_its_events_is_empty(k_px: int) -> None:
+    surface = stage.OrdinalSurface(SurfaceParameters(k_px=k_px), WIDTH, HEIGHT, table=eros.value_table)
+    events = packets()[0].events
+    for drawn in (EventBatch.empty(), *(events[n : n + 3] for n in range(len(events))), events):
+        levels, _ = surface.drawn(drawn)
+        assert levels.any() == bool(len(drawn))
+        surface.clear(drawn)
+        assert not levels.any(), "a view"
 
 
 @pytest.mark.parametrize("cleaning", ["off", "isolated", "printed"])
