@@ -1,7 +1,7 @@
 """Spins of a live run: the work of its child process, behind the tracker.
 
 One thread sees the shots end, one tells their spins so far, tick by tick, one maximises contrast for these as fast as
-it can, and one answers the whole shots as `analyze` does, when no ball is in flight.
+it can, and one answers the whole shots as `analyze` does. The last one rests while a ball is in flight.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import os
 import queue
 import sys
 import threading
+import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Collection, Iterator
@@ -33,7 +34,10 @@ from .tick import Tick
 # After a shot's last events the spin so far is told, which may be from somewhat older ones: 50 ms are promised, of
 # which telling it takes up to 15.
 ANNOUNCED_S = 0.035
-MOST_HELD = 100  # ticks held back from the final spins while a ball is in flight: longer than most shots
+# The final spins rest for so long after a tick with a ball, while fewer ticks wait for them: half as many as have the
+# tracker wait.
+REST_S, MOST_RESTING = 0.1, 300
+LOOK_S = 0.005  # after which they look again whether they still rest
 ARRIVALS_KEPT = 4000  # ticks whose arrival is remembered: 20 s at 200 Hz, longer than any shot's end takes to be known
 # Python lets a thread run for 5 ms while another waits; with a tick's work in several threads that is many ticks.
 SWITCH_S = 0.0005
@@ -163,6 +167,7 @@ class LiveSpins:
         self._run, self._send = run, send
         self._for_so_far: queue.SimpleQueue[Numbered] = queue.SimpleQueue()
         self._for_final: queue.SimpleQueue[Numbered] = queue.SimpleQueue()
+        self._resting_until_s = 0.0
         self._spins: dict[int, SpinsInFlight] = {}  # by the number of the message that begins the stretch
         self._ended: list[_EndedShot] = []  # not announced yet
         self._lock = threading.Lock()
@@ -252,7 +257,7 @@ class LiveSpins:
                 self._for_final.put(ticks.end)
 
     def _tell(self, ticks: _Ticks) -> None:
-        """Tell the spins so far of a stretch, and hand its ticks on when no ball is in flight."""
+        """Tell the spins so far of a stretch, and hand its ticks on."""
         needed = {stage.name for stage in needed_stages(self._run.targets)}
         has_contrast = "contrast" in needed
         # Beside contrast maximisation only what it asks for: each further stage has it come later.
@@ -262,8 +267,8 @@ class LiveSpins:
         contrast = ContrastInFlight(ticks.parameters, chain, spins)
         thread = threading.Thread(target=self._guarded, args=(contrast.work, SO_FAR_NICENESS), name="contrast so far")
         thread.start()
-        held = list[Numbered]()
         for number, one in self._answered(chain, ticks, quick):
+            self._resting_until_s = now_s() + REST_S if one.tick.balls else 0.0
             for ball in one.tick.balls:
                 spins.add_tick(ball)
             if has_contrast:
@@ -272,11 +277,8 @@ class LiveSpins:
                 self._tell_tick(number, one, spins)
             self._announce(number, is_complete=True)
             spins.keep_only(ball.track.shot for ball in one.tick.balls)
-            held.append(Numbered(number, one))
-            if not one.tick.balls or len(held) == MOST_HELD:
-                self._hand_on(held)
+            self._for_final.put(Numbered(number, one))
         self._announce(ticks.end.number, is_complete=True)
-        self._hand_on(held)
         contrast.close()
         thread.join()
 
@@ -290,15 +292,19 @@ class LiveSpins:
         outputs = [(one.first_s, LiveSpin(shot, end_us, spin, None, 0.0)) for shot, spin in newest if spin is not None]
         self._send(Answers(number, False, tuple(outputs)))
 
-    def _hand_on(self, held: list[Numbered]) -> None:
-        """Let the final spins be worked on, which would hold up those so far, when no ball is in flight."""
-        for one in held:
-            self._for_final.put(one)
-        held.clear()
+    def _take_rested(self) -> Numbered:
+        """The next message for the final spins, which would hold up tracker and spins so far in a flight.
+
+        They rest for REST_S after the last tick with a ball at the longest: nothing need come for them to go on.
+        """
+        one = self._for_final.get()
+        while now_s() < self._resting_until_s and self._for_final.qsize() < MOST_RESTING:
+            time.sleep(LOOK_S)
+        return one
 
     def _answer_all(self) -> None:
         """Answer the shots as of a recording."""
-        for ticks in _stretches(self._for_final.get):
+        for ticks in _stretches(self._take_rested):
             log, last = ShotLog(), None
             for number, one in self._answered(self._new_chain(), ticks, self._run.targets):
                 log.add(one.tick)

@@ -2,21 +2,35 @@
 
 from __future__ import annotations
 
+import queue
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from spinscope.pipeline import spin_process
+from spinscope.pipeline import live_spins, spin_process
 from spinscope.pipeline.cameras import ArrivedTick, EventStream, ReplayCamera
 from spinscope.pipeline.child_process import ChildProcess
 from spinscope.pipeline.errors import SpinscopeError
 from spinscope.pipeline.live import LiveRun
 from spinscope.pipeline.live_outputs import LiveNotice, LiveOutput, LiveShot, LiveSpin
-from spinscope.pipeline.live_spins import Answers, LiveSpins, SpinRun, _EndedShot
+from spinscope.pipeline.live_spins import (
+    MOST_RESTING,
+    REST_S,
+    Answers,
+    LiveSpins,
+    Numbered,
+    SegmentStart,
+    SpinRun,
+    TrackedTick,
+    _EndedShot,
+    _Ticks,
+)
 from spinscope.pipeline.results import SpinEstimate
 from spinscope.pipeline.session import Session
+from spinscope.pipeline.spin_process import MOST_FLYING
 from spinscope.pipeline.spin_so_far import SpinsInFlight, SpinSoFar
 from spinscope.pipeline.tick import Tick
 
@@ -91,6 +105,57 @@ def test_events_that_end_two_processes_are_left_out_and_the_third_end_is_an_erro
     ends = 3
     with pytest.raises(SpinscopeError, match="3 times without an answer"):
         live(session)
+
+
+def test_final_spins_rest_in_a_flight_and_never_for_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Until no ball is in view, or many ticks wait; where nothing comes any more, for a time that ends by itself."""
+    spins, clock_s, looks = LiveSpins(SpinRun((QUICK,), False, 4, 4), lambda answers: None), 0.0, 0
+
+    def look(seconds: float) -> None:
+        nonlocal clock_s, looks
+        clock_s, looks = clock_s + seconds, looks + 1
+        if looks == calm_after:
+            spins._resting_until_s = 0.0
+
+    monkeypatch.setattr(live_spins, "now_s", lambda: clock_s)
+    monkeypatch.setattr(live_spins, "time", SimpleNamespace(sleep=look))
+
+    def seconds_rested(waiting: int) -> float:
+        nonlocal looks
+        begin_s, looks = clock_s, 0
+        for number in range(waiting + 1):
+            spins._for_final.put(Numbered(number, None))
+        assert spins._take_rested().number == 0
+        spins._for_final = queue.SimpleQueue()
+        return clock_s - begin_s
+
+    calm_after = -1
+    assert seconds_rested(waiting=0) == 0.0  # before the first ball
+    spins._resting_until_s = clock_s + REST_S
+    assert seconds_rested(waiting=0) == pytest.approx(REST_S, abs=live_spins.LOOK_S)
+    assert seconds_rested(waiting=0) == 0.0  # no more until another tick has a ball
+    spins._resting_until_s = clock_s + REST_S
+    assert seconds_rested(waiting=MOST_RESTING) == 0.0 and MOST_RESTING < MOST_FLYING  # for which the tracker waits
+    calm_after = 3
+    assert seconds_rested(waiting=MOST_RESTING - 1) == pytest.approx(3 * live_spins.LOOK_S)
+
+
+def test_final_spins_are_to_rest_from_a_shots_first_tick_to_its_last(samples: Path) -> None:
+    session = Session.open(samples / "own/rally.h5").clip(3_200_000, 3_400_000)
+    spins, ticks = LiveSpins(SpinRun((QUICK,), False, 1280, 720), lambda answers: None), list(session.ticks(("track",)))
+    rests = list[tuple[bool, bool]]()
+
+    class Final:
+        def put(self, one: Numbered) -> None:
+            assert isinstance(one.message, TrackedTick)
+            rests.append((bool(one.message.tick.balls), spins._resting_until_s > 0.0))
+
+    spins._for_final = Final()  # type: ignore[assignment]
+    messages = [TrackedTick(tick, 0, 0.0, 0.0) for tick in ticks]
+    coming = iter([Numbered(number, message) for number, message in enumerate((*messages, None), 1)])
+    spins._spins[0] = SpinsInFlight()
+    spins._tell(_Ticks(Numbered(0, SegmentStart(session.parameters)), lambda: next(coming)))
+    assert len(rests) == len(ticks) and set(rests) == {(True, True), (False, False)}
 
 
 def test_an_error_in_the_process_comes_out(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
