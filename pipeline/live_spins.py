@@ -25,6 +25,7 @@ from .errors import SpinscopeError
 from .event_source import EventsInMemory
 from .events import EventBatch
 from .live_outputs import LiveShot, LiveSpin
+from .niceness import lower_priority
 from .registry import STAGES, Parameters, needed_stages, quick_stages
 from .session import SAMPLES, Session
 from .shots import Shot, ShotLog
@@ -192,8 +193,7 @@ class LiveSpins:
 
     def _guarded(self, work: Callable[[], None], niceness: int) -> None:
         """Body of a thread that lets those go first that matter more; its error ends the run."""
-        if sys.platform == "linux":
-            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), niceness)
+        lower_priority(niceness)
         try:
             work()
         except SpinscopeError as error:
@@ -265,7 +265,8 @@ class LiveSpins:
         quick = tuple(stage.name for stage in needed_stages(so_far) if stage.name in quick_stages())
         chain, spins = self._new_chain(), self._spins.pop(ticks.begin.number)
         contrast = ContrastInFlight(ticks.parameters, chain, spins)
-        thread = threading.Thread(target=self._guarded, args=(contrast.work, SO_FAR_NICENESS), name="contrast so far")
+        # As nice as this thread, of which it has its priority.
+        thread = threading.Thread(target=self._guarded, args=(contrast.work, 0), name="contrast so far")
         thread.start()
         for number, one in self._answered(chain, ticks, quick):
             self._resting_until_s = now_s() + REST_S if one.tick.balls else 0.0

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
@@ -21,6 +19,7 @@ from spinscope.pipeline.evaluation.tables import Row
 from spinscope.pipeline.evaluation.tasks import Task, TaskContext, digest, performed
 from spinscope.pipeline.evaluation.workers import processor_count, task_workers
 from spinscope.pipeline.live_spins import load_stages
+from spinscope.pipeline.niceness import lower_priority
 from spinscope.pipeline.recording_folders import recordings_in
 from spinscope.pipeline.recordings.recording import file_identity
 from spinscope.pipeline.session import Choices
@@ -105,8 +104,7 @@ class SessionAnalysis:
         self._tell(AnalysisProgress(len(pending), self.progress.done, False))
 
     def _follow(self) -> None:
-        if sys.platform == "linux":
-            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
+        lower_priority(NICENESS)
         waited_s = 0.0
         while not self._ended.done():
             if self._is_playing() and waited_s < MOST_WAIT_S:
