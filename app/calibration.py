@@ -30,6 +30,7 @@ from spinscope.pipeline.shots import ShotLog
 from spinscope.pipeline.stages.track_parameters import TrackParameters
 from spinscope.pipeline.toml import toml_tables
 
+COARSE_PERCENT = 3.0  # uncertainty of a focal length of which the user is warned
 LATENCY_RANGE_US, OUTLINE_RANGE_PX = 10_000.0, 5.0  # of `track.latency_us` and `track.outline_px`
 
 
@@ -93,7 +94,11 @@ def calibrate_by_ball(
     focal_mm, error = focal_px * pixel_um / 1000.0, 100 * track.fixed_std_px / radius
     _write(out, {"focal_length_mm": focal_mm, "pixel_um": pixel_um})
     known = f"focal length {focal_mm:.3f} mm +- {error:.1f} % by the circle's radius of {radius:.2f} px"
-    return [known, f"wrote {out}"]
+    coarse = (
+        f"warning: distances and speeds will be as uncertain, {error:.0f} %: give the circle as a picture shows it by "
+        "--fixed-ball X_PX Y_PX RADIUS_PX, bring the ball nearer, or take a chessboard (--board)"
+    )
+    return [known, *([coarse] if error > COARSE_PERCENT else []), f"wrote {out}"]
 
 
 def calibrate_table(

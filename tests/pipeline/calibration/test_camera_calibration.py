@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import tomllib
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from spinscope.app.calibration import calibrate_by_ball, calibrate_by_board, calibrate_table
+from spinscope.app.calibration import COARSE_PERCENT, calibrate_by_ball, calibrate_by_board, calibrate_table
 from spinscope.app.cli import cli
 from spinscope.pipeline.calibration.board import Board, BoardView, board_views, flash_image
 from spinscope.pipeline.calibration.camera_calibration import calibrate_camera, focal_length_px
@@ -199,6 +200,25 @@ def test_focal_length_by_a_ball(tmp_path: Path) -> None:
     distance_m = float(np.linalg.norm(truth.position_m[0]))
     calibrate_by_ball(tmp_path / "ball.h5", distance_m, 40.0, circle, 4.86, ReadingOptions(), tmp_path / "camera.toml")
     assert tomllib.loads((tmp_path / "camera.toml").read_text())["camera"]["focal_length_mm"] == pytest.approx(12.0)
+
+
+def test_a_focal_length_by_a_ball_says_how_uncertain_it_is(samples: Path, tmp_path: Path) -> None:
+    recording, out = samples / "own/spinner_side.h5", tmp_path / "camera.toml"
+    session = Session.open(recording)
+    assert session.truth is not None
+    x, y, radius = session.truth.x_px[0], session.truth.y_px[0], session.truth.radius_px[0]
+    distance_m = float(np.linalg.norm(session.truth.position_m[0]))
+
+    def calibrated(circle: tuple[float, float, float] | str) -> tuple[float, float, str]:
+        said = "\n".join(calibrate_by_ball(recording, distance_m, 40.0, circle, 4.86, ReadingOptions(), out))
+        (percent,) = re.findall(r"\+- (\S+) %", said)
+        return tomllib.loads(out.read_text())["camera"]["focal_length_mm"], float(percent), said
+
+    focal_mm, percent, said = calibrated("auto")
+    assert percent > COARSE_PERCENT and "warning: distances and speeds will be as uncertain" in said
+    assert focal_mm == pytest.approx(8.0, rel=2 * percent / 100)
+    _, percent, said = calibrated((x, y, 2 * radius))  # as of a ball at half the distance: its circle is as exact
+    assert percent < COARSE_PERCENT and "warning" not in said
 
 
 @pytest.mark.parametrize("seed", range(77_010, 77_014))
