@@ -33,8 +33,8 @@ from .spin_so_far import ContrastInFlight, SpinsInFlight
 from .tick import Tick
 
 # After a shot's last events the spin so far is told, which may be from somewhat older ones: 50 ms are promised, of
-# which telling it takes up to 15.
-ANNOUNCED_S = 0.035
+# which telling it takes up to 20 on a busy machine.
+ANNOUNCED_S = 0.03
 # The final spins rest for so long after a tick with a ball, while fewer ticks wait for them: half as many as have the
 # tracker wait.
 REST_S, MOST_RESTING = 0.1, 300
@@ -42,8 +42,9 @@ LOOK_S = 0.005  # after which they look again whether they still rest
 ARRIVALS_KEPT = 4000  # ticks whose arrival is remembered: 20 s at 200 Hz, longer than any shot's end takes to be known
 # Python lets a thread run for 5 ms while another waits; with a tick's work in several threads that is many ticks.
 SWITCH_S = 0.0005
-# A half and a third of the tracker's share where they want one core.
-SO_FAR_NICENESS, FINAL_NICENESS = 3, 5
+# A half and a third of the tracker's share where they want one core; contrast so far has a third of the other methods'
+# share, of which its thread comes.
+SO_FAR_NICENESS, FINAL_NICENESS, CONTRAST_NICENESS = 3, 5, 5
 PARENT_GONE_EXIT = 3
 
 
@@ -265,8 +266,7 @@ class LiveSpins:
         quick = tuple(stage.name for stage in needed_stages(so_far) if stage.name in quick_stages())
         chain, spins = self._new_chain(), self._spins.pop(ticks.begin.number)
         contrast = ContrastInFlight(ticks.parameters, chain, spins)
-        # As nice as this thread, of which it has its priority.
-        thread = threading.Thread(target=self._guarded, args=(contrast.work, 0), name="contrast so far")
+        thread = threading.Thread(target=self._guarded, args=(contrast.work, CONTRAST_NICENESS), name="contrast so far")
         thread.start()
         for number, one in self._answered(chain, ticks, quick):
             self._resting_until_s = now_s() + REST_S if one.tick.balls else 0.0

@@ -11,6 +11,7 @@ from ...event_source import EventsInMemory
 from ...events import EventBatch
 from ...live import LiveRun, load_kernels
 from ...live_outputs import LiveShot, LiveSpin, LiveStatus
+from ...live_spins import ANNOUNCED_S
 from ...results import spin_errors
 from ...session import DEFAULT_SAMPLE, Session
 from .. import paper
@@ -136,9 +137,10 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
             lines,
             "Track: from the arrival of a tick's first events to its track, the tick of 5 ms included; spin so far: to "
             "that of each tick of a flying ball. Announced: from the arrival of a shot's last events to the newest "
-            "spin so far, told when its end is known and 35 ms have passed, sooner where all its ticks are answered; "
-            "final: to that of the whole shot. Apart: the median difference of the two. Identical: the first round's "
-            "shots are those of the same events read at once. The paper computes spins afterwards.",
+            f"spin so far, told when its end is known and {1000 * ANNOUNCED_S:.0f} ms have passed, sooner where all "
+            "its ticks are answered; final: to that of the whole shot. Apart: the median difference of the two. "
+            "Identical: the first round's shots are those of the same events read at once. The paper computes spins "
+            "afterwards.",
         )
     ]
 
