@@ -35,8 +35,8 @@ from .tick import Tick
 # After a shot's last events the spin so far is told, which may be from somewhat older ones: 50 ms are promised, of
 # which telling it takes up to 20 on a busy machine.
 ANNOUNCED_S = 0.03
-# The final spins rest for so long after a tick with a ball, while fewer ticks wait for them: half as many as have the
-# tracker wait.
+# The final spins rest for so long after a tick with a ball, while fewer such ticks wait for them: half as many as have
+# the tracker wait.
 REST_S, MOST_RESTING = 0.1, 300
 LOOK_S = 0.005  # after which they look again whether they still rest
 ARRIVALS_KEPT = 4000  # ticks whose arrival is remembered: 20 s at 200 Hz, longer than any shot's end takes to be known
@@ -170,6 +170,7 @@ class LiveSpins:
         self._for_so_far: queue.SimpleQueue[Numbered] = queue.SimpleQueue()
         self._for_final: queue.SimpleQueue[Numbered] = queue.SimpleQueue()
         self._resting_until_s = 0.0
+        self._handed_on = self._taken = 0  # ticks with a ball for the final spins; each is counted by one thread
         self._spins: dict[int, SpinsInFlight] = {}  # by the number of the message that begins the stretch
         self._ended: list[_EndedShot] = []  # not announced yet
         self._lock = threading.Lock()
@@ -278,6 +279,7 @@ class LiveSpins:
                 self._tell_tick(number, one, spins)
             self._announce(number, is_complete=True)
             spins.keep_only(ball.track.shot for ball in one.tick.balls)
+            self._handed_on += bool(one.tick.balls)
             self._for_final.put(Numbered(number, one))
         self._announce(ticks.end.number, is_complete=True)
         contrast.close()
@@ -299,8 +301,9 @@ class LiveSpins:
         They rest for REST_S after the last tick with a ball at the longest: nothing need come for them to go on.
         """
         one = self._for_final.get()
-        while now_s() < self._resting_until_s and self._for_final.qsize() < MOST_RESTING:
+        while now_s() < self._resting_until_s and self._handed_on - self._taken < MOST_RESTING:
             time.sleep(LOOK_S)
+        self._taken += isinstance(one.message, TrackedTick) and bool(one.message.tick.balls)
         return one
 
     def _answer_all(self) -> None:

@@ -120,20 +120,19 @@ def test_final_spins_rest_in_a_flight_and_never_for_long(monkeypatch: pytest.Mon
     monkeypatch.setattr(live_spins, "now_s", lambda: clock_s)
     monkeypatch.setattr(live_spins, "time", SimpleNamespace(sleep=look))
 
-    def seconds_rested(waiting: int) -> float:
+    def seconds_rested(*, waiting: int) -> float:
         nonlocal looks
         begin_s, looks = clock_s, 0
-        for number in range(waiting + 1):
-            spins._for_final.put(Numbered(number, None))
-        assert spins._take_rested().number == 0
-        spins._for_final = queue.SimpleQueue()
+        spins._handed_on = spins._taken + waiting
+        spins._for_final.put(Numbered(waiting, None))
+        assert spins._take_rested().number == waiting
         return clock_s - begin_s
 
     calm_after = -1
     assert seconds_rested(waiting=0) == 0.0  # before the first ball
     spins._resting_until_s = clock_s + REST_S
-    assert seconds_rested(waiting=0) == pytest.approx(REST_S, abs=live_spins.LOOK_S)
-    assert seconds_rested(waiting=0) == 0.0  # no more until another tick has a ball
+    assert seconds_rested(waiting=1) == pytest.approx(REST_S, abs=live_spins.LOOK_S)
+    assert seconds_rested(waiting=1) == 0.0  # no more until another tick has a ball
     spins._resting_until_s = clock_s + REST_S
     assert seconds_rested(waiting=MOST_RESTING) == 0.0 and MOST_RESTING < MOST_FLYING  # for which the tracker waits
     calm_after = 3
@@ -156,6 +155,12 @@ def test_final_spins_are_to_rest_from_a_shots_first_tick_to_its_last(samples: Pa
     spins._spins[0] = SpinsInFlight()
     spins._tell(_Ticks(Numbered(0, SegmentStart(session.parameters)), lambda: next(coming)))
     assert len(rests) == len(ticks) and set(rests) == {(True, True), (False, False)}
+    assert spins._handed_on == sum(bool(tick.balls) for tick in ticks)
+    spins._for_final, spins._resting_until_s = queue.SimpleQueue(), 0.0
+    for message in messages:
+        spins._for_final.put(Numbered(0, message))
+        spins._take_rested()
+    assert spins._taken == spins._handed_on
 
 
 def test_an_error_in_the_process_comes_out(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
