@@ -10,7 +10,13 @@ from spinscope.pipeline.errors import SpinscopeError
 
 STATIC = Path(__file__).parent / "static"
 CLASS = "\nvar WebViewer = class {"
-EXPORT = "\nexport { WebViewer };\n"
+# The viewer asks the window for its frames; through this object the page decides when it has them.
+FRAMES = ("requestAnimationFrame", "cancelAnimationFrame")
+EXPORT = """
+var viewerFrames = window;
+function setFrames(frames) { viewerFrames = frames; }
+export { WebViewer, setFrames };
+"""
 
 
 def viewer_version() -> str:
@@ -30,13 +36,18 @@ def viewer_wasm() -> Path:
 
 
 def viewer_script() -> str:
-    """Script of the viewer with its class exported; raises SpinscopeError when the class is not in it."""
+    """Script of the viewer with its class exported, and with frames that can be held by `setFrames`.
+
+    Raises SpinscopeError when the class or what asks for frames is not in it.
+    """
     try:
         script = (_folder("rerun_notebook") / "static" / "widget.js").read_text(encoding="utf-8")
     except OSError as error:
         raise SpinscopeError(f"the viewer's script cannot be read ({error.strerror}): run `uv sync`") from None
-    if CLASS not in script:
-        raise SpinscopeError("the viewer's script holds no WebViewer: rerun-notebook must be 0.41.0, run `uv sync`")
+    if CLASS not in script or any(script.count(f"arg0.{name}(arg1)") != 1 for name in FRAMES):
+        raise SpinscopeError("the viewer's script is another one: rerun-notebook must be 0.41.0, run `uv sync`")
+    for name in FRAMES:
+        script = script.replace(f"arg0.{name}(arg1)", f"viewerFrames.{name}(arg1)")
     return script + EXPORT
 
 

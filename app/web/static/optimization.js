@@ -24,7 +24,7 @@ const spread = (all) =>
 export class Optimization {
   /** @type {string[]} */
   #names = [];
-  /** @type {Values | null} parameters before the optimization */
+  /** @type {Values | null} parameters before values were applied */
   #before = null;
   #cost = new Chart();
   #answers = new Chart();
@@ -58,6 +58,7 @@ export class Optimization {
     this.stop = element("button", { hidden: true, onclick: cancel }, "Cancel");
     this.progress = element("progress", { hidden: true, max: 1, value: 0 });
     this.found = element("div.found");
+    this.back = element("button", { hidden: true, onclick: () => this.#restore() }, "Restore the previous values");
     parent.append(
       element("div.row", {}, this.add),
       this.chips,
@@ -65,6 +66,7 @@ export class Optimization {
       element("div.row", {}, "on", this.where, "in", this.trials, "trials"),
       element("div.row", {}, this.start, this.stop, this.progress),
       this.found,
+      element("div.row", {}, this.back),
     );
     for (const name of opening.suggested) this.#add(name);
     connection.on("optimization", (message) => this.#receive(message));
@@ -83,7 +85,6 @@ export class Optimization {
   }
 
   async #start() {
-    this.#before = structuredClone(this.settings.parameters);
     const wanted = { names: this.#names, objective: this.objective.value, trials: Number(this.trials.value) || 0 };
     const clips_us = this.where.value === "shots" ? this.#shots() : [];
     const recordings = this.where.value === "folder" ? await this.#recordings() : [];
@@ -126,8 +127,6 @@ export class Optimization {
     const rows = Object.entries(values)
       .map(([name, value]) => element("tr", {}, element("th", {}, name), element("td", {}, number(value))));
     const take = element("button.primary", { onclick: () => this.#take(values) }, "Apply the best values");
-    const undo = { onclick: () => this.#before && this.settings.setAll(this.#before), disabled: !this.#before };
-    const back = element("button", undo, "Restore the previous values");
     const refused = trials.filter(({ objection }) => objection).length;
     const isBetter = best !== null && best < first.cost;
     const where = clips === 1 ? "one clip" : `${clips} clips`;
@@ -140,7 +139,7 @@ export class Optimization {
       trials.length === total && (isBetter || held_out) ? heldOut(held_out) : "",
       ...skipped.map((text) => `Left out: ${text}`),
     ];
-    const proposal = [element("table.numbers", {}, ...rows), element("div.row", {}, take, back)];
+    const proposal = [element("table.numbers", {}, ...rows), element("div.row", {}, take)];
     this.found.replaceChildren(
       ...texts.filter(Boolean).map((text) => element("p.note", {}, text)),
       ...(isBetter ? proposal : []),
@@ -170,7 +169,17 @@ export class Optimization {
       const [group, field] = name.split(".");
       (changes[group] ??= {})[field] = value;
     }
+    const before = structuredClone(this.settings.parameters);
     this.settings.setAll(changes);
+    if (JSON.stringify(before) === JSON.stringify(this.settings.parameters)) return; // applied a second time
+    this.#before = before;
+    this.back.hidden = false;
+  }
+
+  #restore() {
+    if (this.#before) this.settings.setAll(this.#before);
+    this.#before = null;
+    this.back.hidden = true;
   }
 }
 

@@ -1,6 +1,7 @@
 // The embedded viewer: shows one recording after another at the same playhead.
 
 import { pause } from "./elements.js";
+import { HeldFrames } from "./held_frames.js";
 
 const TIMELINE = "t";
 const POLL_MS = 15;
@@ -37,9 +38,6 @@ function keepPictures() {
     );
   };
 }
-
-// The browser's own, past `Viewer.rest`.
-const nextFrame = globalThis.requestAnimationFrame.bind(globalThis);
 
 const storeOf = (/** @type {string} */ id) => `Recording:${APPLICATION}:${id}`;
 
@@ -89,8 +87,9 @@ export class Viewer extends EventTarget {
   async #start(/** @type {string} */ version, /** @type {HTMLElement} */ parent) {
     stayAtHome();
     keepPictures();
-    this.#holdFrames();
-    const { WebViewer } = await import(`/rerun/${version}/widget.js`);
+    const { WebViewer, setFrames } = await import(`/rerun/${version}/widget.js`);
+    // It paints when it is given a frame: while it rests it gets none, and its last picture stays.
+    setFrames(new HeldFrames((time) => !this.#working && time < this.#restsUntil));
     const viewer = new WebViewer();
     const ready = new Promise((resolve) => viewer.once("ready", resolve));
     const base_url = new URL(`/rerun/${version}/`, location.href).toString();
@@ -122,17 +121,6 @@ export class Viewer extends EventTarget {
    */
   rest(ms) {
     this.#restsUntil = performance.now() + ms;
-  }
-
-  // The viewer paints when the browser gives it a frame: while it rests it gets none, and its last picture stays.
-  #holdFrames() {
-    globalThis.requestAnimationFrame = (paint) => {
-      const held = (/** @type {number} */ time) => {
-        if (this.#working || time >= this.#restsUntil) paint(time);
-        else nextFrame(held);
-      };
-      return nextFrame(held);
-    };
   }
 
   /**

@@ -255,7 +255,7 @@ def test_the_viewer_is_served_with_its_class_and_its_program(tuner: Served) -> N
     version = httpx.post(f"{tuner.address}api/sessions", json={}).json()["viewer_version"]
     script = httpx.get(f"{tuner.address}rerun/{version}/widget.js")
     assert script.headers["content-type"].startswith("text/javascript")
-    assert script.text.rstrip().endswith("export { WebViewer };")
+    assert script.text.rstrip().endswith("export { WebViewer, setFrames };")
     with httpx.stream("GET", f"{tuner.address}rerun/{version}/re_viewer_bg.wasm") as program:
         assert program.headers["content-type"] == "application/wasm"
         assert next(program.iter_raw())[:4] == b"\0asm"

@@ -262,6 +262,7 @@ def test_while_a_slider_is_dragged_the_viewer_paints_only_what_is_asked_of_it(ta
     tab.page.evaluate(moved)
     tab.page.evaluate(frames)
     assert tab.page.evaluate("window.painted") == 0
+    tab.page.evaluate("new Promise(requestAnimationFrame)")  # the rest of the page does not rest
     tab.page.evaluate("window.spinscope.viewer.rest = () => {}")
     tab.slide("logo.pad_px", what="shown")  # a picture is asked of it
     tab.page.evaluate("delete window.spinscope.viewer.rest; window.spinscope.viewer.rest(0); window.painted = 0")

@@ -266,8 +266,38 @@ def test_an_optimization_offers_better_values_alone_and_leads_back(bare: Tab) ->
     assert "No part was held out" in panel.locator(".found").inner_text()
     take.click()
     assert bare.value("logo.pad_px") == 3.1
-    panel.get_by_text("Restore the previous values").click()
+    take.click()  # once more: that is no way back to where one is
+    panel.locator("button.primary").first.click()
+    panel.get_by_text("nothing better is found").wait_for()
+    bare.until("window.found.state === 'done'")
+    assert take.count() == 0
+    back = panel.get_by_text("Restore the previous values")
+    back.click()
+    assert back.is_hidden()
     assert bare.page.evaluate("JSON.stringify(window.spinscope.settings.parameters)") == before
+
+
+def test_a_frame_that_is_held_comes_later_or_is_cancelled_and_no_other_one_waits(bare: Tab) -> None:
+    """By the number that was given out, however often the frame was put off."""
+    came = bare.page.evaluate(
+        """(async () => {
+            const { HeldFrames } = await import("/static/held_frames.js");
+            let isHeld = true;
+            const frames = new HeldFrames(() => isHeld), came = [];
+            const frame = () => new Promise(requestAnimationFrame);
+            frames.cancelAnimationFrame(7); // there is none
+            for (const name of ["early", "cancelled"]) {
+                const number = frames.requestAnimationFrame(() => came.push(name));
+                for (let i = 0; i < 3; i++) await frame();
+                if (name === "cancelled") frames.cancelAnimationFrame(number);
+            }
+            came.push("held");
+            isHeld = false;
+            await new Promise((resolve) => frames.requestAnimationFrame(resolve));
+            return came;
+        })()"""
+    )
+    assert came == ["held", "early"]
 
 
 def test_settings_are_found_by_words_and_what_differs_is_in_sight(browser: Any, tuner: Served) -> None:
