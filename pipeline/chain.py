@@ -20,6 +20,7 @@ from functools import lru_cache
 from itertools import islice
 from typing import Any
 
+from .call_cache import CallCache
 from .camera import Camera
 from .column_cache import CACHE_BYTES, MAX_COLUMNS, Column, ColumnCache, StageKey
 from .errors import ParameterError
@@ -77,6 +78,7 @@ class Chain:
         self.stages = default_stages(rivals)
         self.seconds = dict.fromkeys(STAGES.names, 0.0)
         self._cache = ColumnCache(budget_bytes, max_columns)
+        self._calls = CallCache()
         self._key = lru_cache(max_columns)(StageKey)  # equal keys are one object: nothing is compared with its inputs
         self._clock = clock
 
@@ -103,6 +105,7 @@ class Chain:
             self.camera(parameters),
             parameters.ball.diameter_mm / 2000.0,
             {name: parameters.value(name) for name in stage.reads},
+            self._calls,
         )
 
     def start(self, parameters: Parameters, stage: Stage) -> Any:

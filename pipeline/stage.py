@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
 
+from .call_cache import CallCache
 from .camera import Camera
 from .parameters import ParameterGroup
 from .results import SpinEstimate
@@ -24,11 +25,14 @@ class Context:
         Radius of the ball, m.
     values : Mapping[str, Any]
         Parameters of other groups by `group.field`: those that the stage declares in `Stage.reads`, no others.
+    calls : CallCache
+        What slow functions of a stage have returned under these and under other parameters.
     """
 
     camera: Camera
     ball_radius_m: float
     values: Mapping[str, Any] = field(default_factory=dict)
+    calls: CallCache = field(default_factory=CallCache, compare=False, repr=False)
 
     def __getitem__(self, name: str) -> Any:
         """Value of a declared parameter of another group; raises KeyError for one that the stage does not declare."""

@@ -118,9 +118,10 @@ def period_of(
     slowest_rps = max(fewest_turns / max(span_s, 1e-9), SLOWEST_RPS)
     if slowest_rps >= max_spin_rps:
         return PatternPeriod.nothing("the shot is too short for a period")
-    # Neighbours differ by a quarter of a bin at the last return.
-    count = math.ceil(math.log(max_spin_rps / slowest_rps) / (0.25 * bin_s / span_s))
-    spins_rps = slowest_rps * (max_spin_rps / slowest_rps) ** (np.arange(count + 1) / count)
+    # Neighbours differ by a quarter of a bin at the last return; they are the same ones whatever the fastest is.
+    step = 0.25 * bin_s / span_s
+    count = math.ceil(math.log(max_spin_rps / slowest_rps) / step)
+    spins_rps = slowest_rps * np.exp(step * np.arange(count + 1))
     squares, sums, bounds = np.zeros((3, count + 1))
     for pattern in kept:
         varying = deviations(pattern)

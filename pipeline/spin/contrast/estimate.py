@@ -44,8 +44,6 @@ SCAN_LOW, SCAN_HIGH, SCAN_STEP, SCAN_MAGNITUDES = 0.45, 2.2, 0.1, 300
 # 20 degrees apart: visits of the logo one turn apart fix the axis only within each visit, that is roughly.
 SCAN_DIRECTIONS = 100
 ALIASES = 6  # magnitudes at which all axes are looked at
-# A spin a little above the highest looked for is found from its neighbours, and must not lose to an alias below.
-BEYOND = 1.1
 GROW_FROM_TURNS, GROW_RATIO = 1.6, 2.5
 LEAST_PERMUTED = 300
 STARTS_KEPT = 2
@@ -265,9 +263,7 @@ def alias_scan(
         near = math.log(factors[1] / factors[0])
         best = factors[local_maxima(along)[:2]]
         for one in np.linalg.norm(spin) * np.concatenate([[1.0, 0.5, 2.0], best]):
-            if one <= BEYOND * settings.fastest_rps * TURN and all(
-                abs(math.log(one / other)) > near for other in magnitudes
-            ):
+            if one <= settings.fastest_rps * TURN and all(abs(math.log(one / other)) > near for other in magnitudes):
                 magnitudes.append(float(one))
     directions = spread_directions(SCAN_DIRECTIONS)
     looked_at = [*magnitudes[:ALIASES], *(rhythms_rps * TURN)]

@@ -35,6 +35,8 @@ class ContrastSettings:
 
     Attributes
     ----------
+    fastest_rps : float
+        The highest magnitude looked for.
     sigma_rad : float
         Kernel of the refinement; 1.5 and 2 times that for what leads up to it. A pixel of a 17 px ball is 0.06 rad;
         pixels report within about 0.1 ms, 0.03 rad at 50 rps.
@@ -48,7 +50,7 @@ class ContrastSettings:
         Number of events that tell the same (the events of one edge at one pixel and its neighbours).
     """
 
-    fastest_rps: float = 150.0
+    fastest_rps: float = 170.0
     sigma_rad: float = 0.04
     floor: float = 1.5
     min_events: int = 40

@@ -42,6 +42,8 @@ SLOWEST_RPS = 3.0
 SEARCH_TURNS = 0.2
 SEARCH_SIGMA_RAD = 0.12
 MAGNITUDE_RATIO = 1.4
+# A spin a little above the highest asked for must not lose to an alias below.
+BEYOND = 1.1
 DIRECTIONS = 64
 DIRECTION_SPACING_RAD = math.sqrt(4.0 * math.pi / DIRECTIONS)
 # Halvings of the best cells, how many are kept, and how the kernel shrinks: four bring 0.2 to 3.2 turns.
@@ -111,11 +113,19 @@ def distinct(spins: Floats, apart: float, most: int, crowd: int) -> Integers:
     return rows[:count].copy()
 
 
+def last_of_grid_rps(rps: float) -> float:
+    """The lowest magnitude of the search's grid that is BEYOND times this one or more."""
+    return SLOWEST_RPS * MAGNITUDE_RATIO ** max(0, math.ceil(math.log(BEYOND * rps / SLOWEST_RPS, MAGNITUDE_RATIO)))
+
+
 def grid_search(events: EventColumns, fastest_rps: float, floor: float, max_events: int, keep: int) -> Floats:
-    """At most `keep` distinct spins (k, 3) in rad/s of all directions and speeds up to fastest_rps, best first."""
+    """At most `keep` distinct spins (k, 3) in rad/s of all directions and speeds up to fastest_rps, best first.
+
+    The magnitudes are the same ones whatever the fastest is.
+    """
     span_s = float(events.t_s[-1] - events.t_s[0])
-    count = max(1, math.ceil(math.log(fastest_rps / SLOWEST_RPS) / math.log(MAGNITUDE_RATIO)))
-    magnitudes = np.geomspace(min(SLOWEST_RPS, fastest_rps), fastest_rps, count + 1) * TURN
+    count = max(0, round(math.log(fastest_rps / SLOWEST_RPS, MAGNITUDE_RATIO)))
+    magnitudes = SLOWEST_RPS * MAGNITUDE_RATIO ** np.arange(count + 1.0) * TURN
     spins = np.concatenate([spread_directions(DIRECTIONS) * magnitude for magnitude in magnitudes])
     turns, sigma_rad = SEARCH_TURNS, SEARCH_SIGMA_RAD
     values = _scores_over_turns(events, spins, turns, sigma_rad, floor, max_events, SEGMENT_EVENTS // 2)

@@ -36,6 +36,7 @@ from .events import (
     ScoreMap,
     SphereEvents,
 )
+from .search import last_of_grid_rps
 
 METHOD, FLOW_METHOD = "contrast", "normal_flow"
 # Full estimates when the shot is so old, then each time it is half as old again; in between the last answer is
@@ -46,6 +47,9 @@ LATER = 1.5
 MORE = 1.5
 # Visits that do not fit together may do so as soon as the logo comes back: some events of another visit tell.
 MORE_OF_VISIT = 1.05
+# The normal flow's spin, some 1 rps off, serves as a start to this: where its parameters move it by less, all that
+# follows is the same to the last bit, and known already.
+START_STEP_RPS = 0.5
 # A search over all spins is repeated with so many times the events of the last one.
 SEARCH_MORE = 2.0
 # An answer scanned over so many turns that beats its rivals so many times as clearly as asked for is not scanned for
@@ -181,14 +185,14 @@ def step(
         return ContrastResult.nothing(SpinEstimate.refused(METHOD, reason, count))
     full = _due(state, age_us, count)
     settings = ContrastSettings(
-        fastest_rps=state.context["spin.max_spin_rps"],
+        fastest_rps=last_of_grid_rps(state.context["spin.max_spin_rps"]),
         sigma_rad=parameters.kernel_rad,
         floor=parameters.floor_events,
         min_events=parameters.fewest_events,
     )
-    events = _joined(state)
+    events, calls = _joined(state), state.context.calls
     if not full and state.answer is not None and state.reason is None:
-        state.answer = follow_spin(events, _uncertainty(state.ball_stds), settings, state.answer)
+        state.answer = calls.result(follow_spin, events, _uncertainty(state.ball_stds), settings, state.answer)
         state.reason = doubt(parameters, state.answer)
         full = state.answer.contrast < LOST * state.followed_contrast or state.answer.linked_share < LEAST_LINKED
         full = full or state.scanned_turns < RETURNED_TURNS <= state.answer.turns
@@ -197,7 +201,8 @@ def step(
     if full:
         _estimate(parameters, state, events, settings, rate.period_spins_rps, normal_flow.estimate)
         state.tried, state.followed_contrast = count, 0.0
-        state.score_map = score_map(events, state.answer, settings) if parameters.curves else ScoreMap.empty()
+        empty = not parameters.curves
+        state.score_map = ScoreMap.empty() if empty else calls.result(score_map, events, state.answer, settings)
     return _result(parameters, state, count, full, rate, normal_flow.estimate)
 
 
@@ -264,15 +269,17 @@ def _estimate(
     normal_flow: SpinEstimate,
 ) -> None:
     """A full estimate: first from what is known already, and from a search where that does not convince."""
-    starts = []
+    starts, calls = [], state.context.calls
     if state.answer is not None and state.answer.spin_rps is not None:
         starts += [state.answer.spin_rps, *state.answer.rivals_rps]
-    if normal_flow.vector_rps is not None and np.any(normal_flow.vector_rps):
-        starts.append(normal_flow.vector_rps)
+    if normal_flow.vector_rps is not None:
+        near_it = START_STEP_RPS * np.round(normal_flow.vector_rps / START_STEP_RPS)
+        starts += [near_it] if np.any(near_it) else []
     starts_rps, ball = np.array(starts).reshape(-1, 3), _uncertainty(state.ball_stds)
     answer, scanning = None, not is_settled(parameters, state)
     if starts:
-        answer = estimate_spin(
+        answer = calls.result(
+            estimate_spin,
             events,
             ball,
             settings,
@@ -284,7 +291,7 @@ def _estimate(
     worth_it = len(events) >= SEARCH_MORE * state.searched
     if answer is None or (worth_it and not _convinces(parameters, answer, normal_flow)):
         state.searched, scanning = len(events), True
-        answer = estimate_spin(events, ball, settings, starts_rps=starts_rps, rhythms_rps=rhythms_rps)
+        answer = calls.result(estimate_spin, events, ball, settings, starts_rps=starts_rps, rhythms_rps=rhythms_rps)
     if scanning:
         state.scanned_turns = answer.turns
     state.answer, state.reason, state.changes = answer, doubt(parameters, answer), False
@@ -292,7 +299,7 @@ def _estimate(
     if state.reason is None and ball.is_flying:
         ticks = max(1, len(state.ball_stds) // PARTS)
         balls = _uncertainty(state.ball_stds[:ticks]), _uncertainty(state.ball_stds[-ticks:])
-        ends = estimates_of_ends(events, balls, settings, answer)
+        ends = calls.result(estimates_of_ends, events, balls, settings, answer)
         state.reason = change_doubt(parameters, *ends) if ends else None
         state.changes = state.reason is not None
 
