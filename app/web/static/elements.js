@@ -96,6 +96,10 @@ export async function attempt(work) {
   }
 }
 
+// The title of a dialog that may be longer than the page: the focus goes there, not to the button at its end.
+export const dialogTitle = (/** @type {string} */ text, properties = {}) =>
+  element("h2", { ...properties, tabIndex: -1, autofocus: true }, text);
+
 /**
  * Asks a question with some answers; null where it is closed without one.
  * @param {string} question

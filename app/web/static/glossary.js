@@ -1,6 +1,6 @@
 // Entries of the glossary in a dialog.
 
-import { element } from "./elements.js";
+import { dialogTitle, element } from "./elements.js";
 
 /** @type {Promise<Map<string, string>> | null} */
 let loading = null;
@@ -39,7 +39,7 @@ export async function explain(title, help, terms) {
   const known = await glossary();
   const list = terms.flatMap((term) => [element("dt", {}, term), element("dd", {}, known.get(term) ?? "")]);
   const close = element("button", { onclick: () => dialog.close() }, "Close");
-  const parts = [element("h2", {}, title), help ? element("p", {}, help) : null, element("dl", {}, ...list), close];
+  const parts = [dialogTitle(title), help ? element("p", {}, help) : null, element("dl", {}, ...list), close];
   const dialog = element("dialog.glossary", { "aria-label": title, onclose: () => dialog.remove() }, ...parts);
   document.body.append(dialog);
   dialog.showModal();

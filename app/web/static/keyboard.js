@@ -1,6 +1,6 @@
 // Keys of the page, their list, and the ways out of the viewer, whose canvas keeps every key that reaches it.
 
-import { byId, element } from "./elements.js";
+import { byId, dialogTitle, element } from "./elements.js";
 
 /**
  * @typedef {object} Key
@@ -34,7 +34,7 @@ export class Keyboard {
       element("tr", {}, element("th", {}, element("kbd", {}, shown)), element("td", {}, label))
     );
     const close = element("button", { onclick: () => this.list.close() }, "Close");
-    const title = element("h2", { id: "keys-title" }, "Keys");
+    const title = dialogTitle("Keys", { id: "keys-title" });
     const table = element("table.numbers", {}, element("tbody", {}, ...rows));
     this.list = element("dialog.keys", { id: "keys", "aria-labelledby": "keys-title" }, title, table, close);
     document.body.append(this.list);

@@ -1,6 +1,6 @@
 // List of all notices since the page was opened, behind the button that counts those not yet looked at.
 
-import { byId, element } from "./elements.js";
+import { byId, dialogTitle, element } from "./elements.js";
 
 export class Notices {
   #unread = 0;
@@ -8,7 +8,7 @@ export class Notices {
   constructor() {
     this.button = byId("all-notices");
     this.rows = element("tbody");
-    const title = element("h2", { id: "notices-title" }, "Notices");
+    const title = dialogTitle("Notices", { id: "notices-title" });
     const close = element("button", { onclick: () => this.list.close() }, "Close");
     const properties = { id: "notices-list", "aria-labelledby": "notices-title" };
     this.list = element("dialog", properties, title, element("table.numbers", {}, this.rows), close);

@@ -40,3 +40,32 @@ def test_folded_panels_make_room_and_stay_folded(bare: Tab) -> None:
     page.click("#fold-side")
     assert page.locator("#controls").is_visible() and page.locator("#side").is_visible()
     assert page.locator("#fold-side").get_attribute("aria-pressed") == "true"
+
+
+def test_long_lists_open_at_their_beginning_at_a_zoom_of_150_percent(bare: Tab) -> None:
+    """Their only button is at the end; Escape closes them."""
+    page = bare.page
+    page.set_viewport_size({"width": 911, "height": 512})
+    page.evaluate(
+        """(() => {
+            const detail = { text: "one of many", kind: "info" };
+            for (let i = 0; i < 30; i++) document.dispatchEvent(new CustomEvent("notice", { detail }));
+        })()"""
+    )
+    for opens in ("#help", "#all-notices", "[data-title=Essentials] > button.help"):
+        page.locator(opens).first.click()
+        dialog = page.locator("dialog[open]")
+        assert dialog.evaluate("(one) => one.scrollHeight > one.clientHeight"), opens
+        title, box = dialog.locator("h2").bounding_box(), dialog.bounding_box()
+        assert title["y"] >= box["y"], opens
+        page.keyboard.press("Escape")
+        assert page.locator("dialog[open]").count() == 0
+
+
+def test_the_circle_of_a_fixed_ball_is_read_whole(bare: Tab) -> None:
+    panel = bare.panel("Fixed ball")
+    for size in SIZES:
+        bare.page.set_viewport_size({"width": size[0], "height": size[1]})
+        for box in panel.locator("input.number").all():
+            box.fill("427.68")
+            assert box.evaluate("(one) => one.scrollWidth <= one.clientWidth"), size
