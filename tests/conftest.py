@@ -13,6 +13,7 @@ import gc
 import os
 import sys
 from collections import Counter
+from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
@@ -56,12 +57,24 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     return 0
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(
+    collector: pytest.Collector,
+) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """Have each worker import from another place on, so that it finds byte code that the others have compiled."""
+    report = yield
+    if isinstance(collector, pytest.Directory) and (worker := os.environ.get("PYTEST_XDIST_WORKER")):
+        start = len(report.result) * int(worker.removeprefix("gw")) // WORKERS
+        report.result = report.result[start:] + report.result[:start]
+    return report
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put the files named in FIRST first, then those with most tests; spread those with a browser among them."""
     folder = Path(__file__).parent
     rank = {folder / name: number for number, name in enumerate(FIRST)}
     count = Counter(item.path for item in items)
-    files = sorted(count, key=lambda path: (rank.get(path, len(rank)), -count[path]))
+    files = sorted(count, key=lambda path: (rank.get(path, len(rank)), -count[path], path))
     browsers = {item.path for item in items if item.get_closest_marker("browser")} - rank.keys()
     place: dict[Path, float] = {path: at for at, path in enumerate(path for path in files if path not in browsers)}
     for number, path in enumerate((path for path in files if path in browsers), start=1):
