@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import sys
-import threading
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from spinscope.pipeline.niceness import lower_priority
 from spinscope.pipeline.session import Choices
 
 from ..terminal import note, until_interrupted
@@ -53,8 +51,7 @@ def run_with_page(
                     note("the page opens as soon as events have come")
                 view.has_events.wait()
                 if view.is_open and view.opened.recent.span_us is not None:
-                    if sys.platform == "linux":
-                        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), PAGE_NICENESS)
+                    lower_priority(PAGE_NICENESS)
                     first = view.save_window(kept_s)
                     serve(first, choices.for_others, port, open_browser=open_browser, hosts=hosts, live=view)
         finally:
