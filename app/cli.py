@@ -98,7 +98,7 @@ def run(arguments: list[str]) -> int:
             raise
         drop_output()
         message = f"the output cannot be written ({error.strerror}): check free space"
-    except Exception as error:
+    except (KeyboardInterrupt, Exception) as error:
         requested = requested_status(error)
         if requested is None:
             raise

@@ -174,7 +174,7 @@ def test_an_end_may_need_what_the_main_thread_holds_when_the_signal_comes(monkey
 
 
 @pytest.mark.parametrize(("one", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-@pytest.mark.parametrize("place", ["class Owner: name = Slow()", "Slow(); time.sleep(60)"])
+@pytest.mark.parametrize("place", ["class Owner: name = Loaded()", "Dropped(); time.sleep(60)"])
 def test_an_error_that_python_wraps_or_drops_is_still_the_end_asked_for(
     place: str, one: signal.Signals, status: int
 ) -> None:
@@ -183,13 +183,15 @@ def test_an_error_that_python_wraps_or_drops_is_still_the_end_asked_for(
 import time
 from spinscope.app import cli
 
-class Slow:
-    def __set_name__(self, *_):
-        self.__del__()
+def wait(*_):
+    print("here", flush=True)
+    time.sleep(60)
 
-    def __del__(self):
-        print("here", flush=True)
-        time.sleep(60)
+class Loaded:
+    __set_name__ = wait
+
+class Dropped:
+    __del__ = wait
 
 def command(*_, **__):
     {place}
