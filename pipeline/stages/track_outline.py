@@ -31,6 +31,8 @@ LEAST_EXPLAINED = 0.7
 LEAST_ARC, MOST_RADIUS_ERROR, MOST_OUTSIDE = 0.2, 0.03, 0.02
 # The velocity vote looks this far back in time; longer bends the test, shorter leaves too few events.
 VOTE_US = 1500
+# Rings (2, 5) by both votes, NaN with too few events, and the width of the vote in px.
+MovingCircles = tuple[Floats, float]
 # 1 sigma (5,) of an expected ring that holds nothing.
 FREE = np.full(5, 1e9)
 
@@ -205,10 +207,10 @@ def measure(
         Part of the outline that is fitted, see `kernels.moving_circle.near_outline`.
     """
     size, optics_px = (camera.width_px, camera.height_px), _optics_px(camera)
-    ring, covariance, scatter_px, *evidence = kernels.measured_outline(
+    ring, covariance, scatter_px, found, behind_px = kernels.measured_outline(
         expected, prior_std, optics_px, events.columns, end_us, gate_px, part, *size
     )
-    return None if math.isnan(ring[0]) else _sighting(ring, covariance, scatter_px, *evidence, part)
+    return None if math.isnan(ring[0]) else _sighting(ring, covariance, scatter_px, found, behind_px, part)
 
 
 def _sighting(
@@ -232,45 +234,47 @@ def _sighting(
     )
 
 
-def sight(
-    recent: EventBatch,
-    events: EventBatch,
-    end_us: int,
-    camera: Camera,
-    circle: Circle,
-    fastest_radii_s: float,
-    *,
-    signed: bool,
-) -> Sighting | None:
-    """The moving outline behind a Hough circle: velocity by vote, then the fit; None when there is none.
+def moving_circles(recent: EventBatch, end_us: int, circle: Circle, fastest_radii_s: float) -> MovingCircles:
+    """The rings of a Hough circle that move as most events say, up to so many radii a second.
 
     Parameters
     ----------
     recent : EventBatch
         The events of the last VOTE_US.
-    fastest_radii_s : float
-        The fastest velocity voted for, in radii a second.
-    signed : bool
-        Whether events vote by their polarity, as a ball brighter or darker than all around it gives them.
     """
-    ring, gate = _voted(recent, end_us, circle, fastest_radii_s, signed=signed)
-    if math.isnan(ring[0]):
+    radius = circle.radius_px
+    return kernels.find_moving_circle(
+        circle.x_px, circle.y_px, radius, recent.columns, end_us, VOTE_US * 1e-6, fastest_radii_s * radius
+    )
+
+
+def sight(
+    moving: MovingCircles, recent: EventBatch, events: EventBatch, end_us: int, camera: Camera, *, signed: bool
+) -> Sighting | None:
+    """The outline of a moving circle: fitted to the events of the last VOTE_US, then to all; None when there is none.
+
+    The circle is that of the signed or of the unsigned vote, see `kernels.outline.vote_velocity`.
+    """
+    circles, gate_px = moving
+    expected = circles[kernels.SIGNED if signed else kernels.UNSIGNED]
+    if math.isnan(expected[0]):
         return None
-    first = measure(recent, end_us, camera, ring, 1.5 * gate, FREE)
+    first = measure(recent, end_us, camera, expected, 1.5 * gate_px, FREE)
     if first is None or first.ahead < 0.3:
         return None
     return measure(events, end_us, camera, first.ring, 3.0, FREE)
 
 
 def sight_arcs(
-    recent: EventBatch, events: EventBatch, end_us: int, camera: Camera, circle: Circle, fastest_radii_s: float
+    moving: MovingCircles, recent: EventBatch, events: EventBatch, end_us: int, camera: Camera
 ) -> Sighting | None:
-    """The moving outline behind a Hough circle of which only arcs show; None when there is none.
+    """The outline of a moving circle of which only arcs show; None when there is none.
 
-    As `sight`, but fitted to the events of both halves that a darker or a brighter disc gives: it takes the arcs' whole
-    span to fix the circle, and a logo beside them gives events of the other polarity as well.
+    As `sight` with the signed vote, but fitted to the events of both halves that a darker or a brighter disc gives: it
+    takes the arcs' whole span to fix the circle, and a logo beside them gives events of the other polarity as well.
     """
-    ring, gate = _voted(recent, end_us, circle, fastest_radii_s, signed=True)
+    circles, gate = moving
+    ring = circles[kernels.SIGNED]
     if math.isnan(ring[0]):
         return None
     columns, size = events.columns, (camera.width_px, camera.height_px)
@@ -289,20 +293,3 @@ def sight_arcs(
         if sighting.in_arcs:
             return sighting
     return None
-
-
-def _voted(
-    recent: EventBatch, end_us: int, circle: Circle, fastest_radii_s: float, *, signed: bool
-) -> tuple[Floats, float]:
-    """The ring (5,) of a Hough circle that moves as most events say, NaN with too few, and the width of the vote."""
-    radius = circle.radius_px
-    return kernels.find_moving_circle(
-        circle.x_px,
-        circle.y_px,
-        radius,
-        recent.columns,
-        end_us,
-        VOTE_US * 1e-6,
-        fastest_radii_s * radius,
-        signed,
-    )

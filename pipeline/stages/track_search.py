@@ -20,7 +20,7 @@ from .filter import STC_MODES
 from .surface import OrdinalSurface, SurfaceParameters, SurfaceResult
 from .track_hough import candidates, empty_votes
 from .track_limits import Limits
-from .track_outline import VOTE_US, Sighting, disc_share, sight, sight_arcs
+from .track_outline import VOTE_US, Sighting, disc_share, moving_circles, sight, sight_arcs
 
 # Circles of the full-frame vote looked at in one tick, without a track and beside one.
 MOST_CANDIDATES, MOST_RIVALS = 4, 2
@@ -181,11 +181,11 @@ class _Searching:
 
     def _sighting(self, circle: Circle, recent: EventBatch, events: EventBatch, *, signed: bool) -> Sighting | None:
         """The outline behind a circle that may be a ball's, None if there is none."""
-        fastest_radii_s = self.limits.speed_max_radii_s
-        sighting = sight(recent, events, self.end_us, self.camera, circle, fastest_radii_s, signed=signed)
+        moving = moving_circles(recent, self.end_us, circle, self.limits.speed_max_radii_s)
+        sighting = sight(moving, recent, events, self.end_us, self.camera, signed=signed)
         if sighting is not None and self._is_likely(sighting, events, signed=signed):
             return sighting
-        arcs = None if signed else sight_arcs(recent, events, self.end_us, self.camera, circle, fastest_radii_s)
+        arcs = None if signed else sight_arcs(moving, recent, events, self.end_us, self.camera)
         is_likely = arcs is not None and disc_share(arcs.ring, events, self.end_us) >= ISOLATED_SHARE
         return arcs if is_likely else None
 
