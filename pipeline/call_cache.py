@@ -34,7 +34,7 @@ class CallCache:
         self._lock = threading.Lock()
 
     def result(self, function: Callable[Given, Returned], *arguments: Given.args, **options: Given.kwargs) -> Returned:
-        """What the function returns: frozen, for it is given out again.
+        """The function's result, frozen, for it is given out again.
 
         Arguments are numbers, strings, None, arrays, and tuples and dataclasses of these; others raise TypeError.
         """

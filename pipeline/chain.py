@@ -6,8 +6,9 @@ recording | camera | simulator -> packets of one tick
 
 A column (`column_cache.py`) is one stage's results so far plus the state to go on. Its key is the source's identity and
 the chain of (stage, parameter values) up to it, compared by value: a changed parameter re-runs its stage and those that
-read it, nothing else, and going back to earlier values finds their columns still there. Stages of one ball have a
-column for each shot. A shot whose start is known late, at a contact or where a ball must be seen more than once, gets
+read it, nothing else, and going back to earlier values finds their columns still there. Where a stage's inputs turn out
+to be the same all the same, its slow functions' results are known (`call_cache.py`). Stages of one ball have a column
+for each shot. A shot whose start is known late, at a contact or where a ball must be seen more than once, gets
 its results of the earlier ticks in the tick in which it is announced.
 """
 

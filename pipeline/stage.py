@@ -26,7 +26,7 @@ class Context:
     values : Mapping[str, Any]
         Parameters of other groups by `group.field`: those that the stage declares in `Stage.reads`, no others.
     calls : CallCache
-        What slow functions of a stage have returned under these and under other parameters.
+        Results of a stage's slow functions, under these and under other parameters.
     """
 
     camera: Camera

@@ -22,6 +22,9 @@ def test_all_of_the_page_is_inside_the_window(bare: Tab, size: tuple[int, int]) 
             assert box["x"] + box["width"] <= width + 1 and box["y"] + box["height"] <= height + 1, part
     viewer = bare.page.locator("#viewer").bounding_box()
     assert viewer["width"] >= min(0.63 * width, 1200) and viewer["height"] >= 0.45 * height
+    bare.page.evaluate("import('/static/elements.js').then(({ notice }) => notice('one that is to be read'))")
+    note, bar = bare.page.locator("#notices").bounding_box(), bare.page.locator("#bar").bounding_box()
+    assert note["y"] + note["height"] <= bar["y"] or note["y"] >= bar["y"] + bar["height"]
     overflow = "(one) => one.scrollWidth - one.clientWidth"
     assert bare.page.locator("#controls").evaluate(overflow) <= 0 and bare.page.locator("#side").evaluate(overflow) <= 0
 
