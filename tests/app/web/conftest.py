@@ -16,7 +16,7 @@ import uvicorn
 from spinscope.app.web.app_state import AppState
 from spinscope.app.web.application import application
 from spinscope.app.web.server import listening_socket
-from spinscope.pipeline.session import Choices
+from spinscope.pipeline.session import Choices, Session
 
 from .browser_tab import CHROMIUM, FLAGS, SIZE, Tab, bare_tab
 
@@ -84,7 +84,8 @@ def flight(samples: Path) -> Path:
 
 @pytest.fixture(scope="session")
 def tuner(flight: Path) -> Iterator[Served]:
-    """A tuner on the default sample."""
+    """A tuner on the default sample; the kernels are compiled by now, however long that takes: pages have a limit."""
+    Session.open(flight).estimate()
     made = served(flight)
     yield made
     made.stop()
