@@ -60,7 +60,8 @@ def _motion(run: ViewedRun) -> list[Chunk]:
         until_us = run.ends_us[index + 1] if index + 1 < len(run.ticks) else run.end_us + 1
         t_us = np.arange(tick.packet.end_us, until_us, MOTION_US)
         ahead = np.zeros((t_us.size, 5))
-        ahead[:, :2] = tick.track.mean[2:4] * ((t_us - tick.packet.end_us) * 1e-6)[:, None]
+        ahead_s = (t_us - tick.packet.end_us) * 1e-6
+        ahead[:, :2] = tick.track.mean[2:4] * ahead_s[:, None]
         times.append(t_us)
         places.append(run.centre_m(tick.track.mean + ahead))
         quaternions.append(_turned_by(vector_of(shown_estimate(tick)[0]), (t_us - start_us) * 1e-6))
@@ -80,7 +81,8 @@ def _turned_by(spin_rps: Floats, seconds: Floats) -> Floats:
     magnitude = float(np.linalg.norm(spin_rps))
     half = np.pi * magnitude * seconds
     axis = spin_rps / magnitude if magnitude else np.array([0.0, 0.0, 1.0])
-    return np.column_stack([np.sin(half)[:, None] * axis, np.cos(half)])
+    sines, cosines = np.sin(half), np.cos(half)
+    return np.column_stack([sines[:, None] * axis, cosines])
 
 
 def _arrows(run: ViewedRun) -> list[Chunk]:

@@ -43,7 +43,8 @@ def filter_chunks(run: ViewedRun) -> list[Chunk]:
         is_kept = _are_among(events, kept, start_us)[chosen]
         positions.append(np.stack([events.x_px[chosen], events.y_px[chosen]], axis=1))
         is_flicker = _are_among(events, tick.filter.flicker_events, start_us)[chosen]
-        classes.append(4 * is_flicker.astype(np.uint16) + 2 * is_kept + events.on[chosen])
+        flicker = 4 * is_flicker.astype(np.uint16)
+        classes.append(flicker + 2 * is_kept + events.on[chosen])
     width, height = run.camera.width_px, run.camera.height_px
     frame = rr.Boxes2D(mins=[[-0.5, -0.5]], sizes=[[width, height]], colors=[at.MASK_COLOUR], radii=[-0.5])
     names = _names(run, at.POLARITY_NAMES, {"ON": at.ON, "OFF": at.OFF})

@@ -63,7 +63,8 @@ def _ball_of(recording: SimulatedRecording, shot: Shot) -> int | None:
         truth = truth_of(recording.scene, recording.camera, recording.truth.label, ball)
         path = (np.interp(shot.t_us, truth.t_us, column) for column in (truth.x_px, truth.y_px, truth.radius_px))
         x, y, radius = path
-        distances.append(float(np.median(np.hypot(shot.state[:, 0] - x, shot.state[:, 1] - y) / radius)))
+        away_px = np.hypot(shot.state[:, 0] - x, shot.state[:, 1] - y)
+        distances.append(float(np.median(away_px / radius)))
     nearest = int(np.argmin(distances)) if distances else 0
     return nearest if distances and distances[nearest] < 1 else None
 

@@ -145,7 +145,8 @@ def _flash(white: Floats, threshold: Floats, on: bool, sensor: SensorModel) -> t
         pixels.append(alive)
         free_us[alive] = when + sensor.dead_us
         change = np.exp(-free_us[alive] / tau_us)
-        reference[alive] = np.log(BLACK + white[alive] * (1 - change if on else change))
+        bright = 1 - change if on else change
+        reference[alive] = np.log(BLACK + white[alive] * bright)
     if not times:
         return np.empty(0), np.empty(0, np.int64)
     return np.concatenate(times), np.concatenate(pixels)
