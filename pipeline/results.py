@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from .events import ColumnBatch, EventBatch
 
 Vector = NDArray[np.float64]
+# An error of more than this tells nothing of whether a spin is one of those looked for.
+BEYOND = 0.02
 PLAIN = frozenset({bool, int, float, str, type(None)})  # types of values that hold no array
 
 
@@ -86,9 +88,11 @@ class SpinEstimate(ReadOnlyArrays):
     def up_to(self, max_spin_rps: float, against: str | None = None) -> SpinEstimate:
         """The estimate, refused where its magnitude is above the highest spin that is looked for.
 
-        `against` names a less accurate method that is not to be trusted then either.
+        Not so where it is by 1 sigma at most, and by no more than the share BEYOND. `against` names a less accurate
+        method that is not to be trusted then either.
         """
-        if self.magnitude_rps is None or self.magnitude_rps <= max_spin_rps:
+        beyond_rps = min(self.magnitude_std_rps or 0.0, BEYOND * max_spin_rps)
+        if self.magnitude_rps is None or self.magnitude_rps <= max_spin_rps + beyond_rps:
             return self
         reason = f"the spin is above spin.max_spin_rps = {max_spin_rps:g} rps: {self.magnitude_rps:.4g} rps"
         return SpinEstimate.refused(self.method, reason, self.events, against)

@@ -57,7 +57,7 @@ def costs_ms(ticks: list[Tick], context: Context) -> tuple[list[float], list[flo
 
 def test_the_score(benchmark: Any) -> None:
     events = dotted_ball(SPIN_RAD_S / (2 * np.pi), events=300)
-    window = whole_window(events.columns, 1)
+    window = whole_window(events.columns, 1, 0.0)
     ratios = np.empty(len(events))
     benchmark.pedantic(lambda: score(ratios, SPIN_RAD_S, window, 0.06, 1.5), rounds=200, warmup_rounds=2)
     started = time.thread_time()

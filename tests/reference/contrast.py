@@ -69,6 +69,7 @@ def naive_score(
     times_each: int,
     cell: float,
     floor: float,
+    apart_s: float = 0.0,
 ) -> tuple[float, Floats]:
     """The score and each event's share, straight from its definition; normals (3, n)."""
     spin_rps = spin_rad_s / (2 * np.pi)
@@ -82,9 +83,10 @@ def naive_score(
     for segment, (first, last) in enumerate(itertools.pairwise(starts)):
         others = permuted[segment]
         blurred = turned(normals.T[[row for _, row in others]], -spin_rps, np.array([time for time, _ in others]))
-        weight = (last - first - 1) / max(len(others), 1)
         for i in range(first, last):
-            sharp = [(places[k], 1.0) for k in range(first, last) if k != i and polarity[k] == polarity[i]]
+            apart = [k for k in range(first, last) if k != i and (apart_s == 0.0 or abs(t_s[k] - t_s[i]) > apart_s)]
+            weight = len(apart) / max(len(others), 1)
+            sharp = [(places[k], 1.0) for k in apart if polarity[k] == polarity[i]]
             blur = [
                 (place, weight)
                 for place, (_, row) in zip(_on_map(blurred, pole, cell), others, strict=True)

@@ -81,11 +81,18 @@ class EventColumns(NamedTuple):
 
 
 class ScoreWindow(NamedTuple):
-    """Events, and the same events at other times of their segment: `permuted` holds those of index `rows` (m,)."""
+    """Events, and the same events at other times of their segment: `permuted` holds those of index `rows` (m,).
+
+    Attributes
+    ----------
+    apart_s : float
+        Events no farther apart in time than this are not compared with each other; 0: each with all others.
+    """
 
     events: EventColumns
     permuted: EventColumns
     rows: Integers
+    apart_s: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -385,10 +392,10 @@ def take_columns(table: Floats, rows: Integers) -> Floats:
 
 
 @numba.njit(cache=True, nogil=True)
-def whole_window(events: EventColumns, times_each: int) -> ScoreWindow:
-    """The events in the segments they have, each permuted `times_each` times."""
+def whole_window(events: EventColumns, times_each: int, apart_s: float) -> ScoreWindow:
+    """The events in the segments they have, each permuted `times_each` times; `apart_s` as in `ScoreWindow`."""
     permuted, rows = time_permuted(events, times_each)
-    return ScoreWindow(events, permuted, rows)
+    return ScoreWindow(events, permuted, rows, apart_s)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -433,7 +440,7 @@ def segmented_window(events: EventColumns, segment_s: float, max_events: int, se
     for i in range(kept):
         thinned_s[i] = t_s[rows[i]]
     normals, polarity = take_columns(events.normals, rows), _taken(events.polarity, rows)
-    return whole_window(EventColumns(thinned_s, normals, polarity, starts[: count + 1]), 1)
+    return whole_window(EventColumns(thinned_s, normals, polarity, starts[: count + 1]), 1, 0.0)
 
 
 @numba.njit(cache=True, nogil=True)

@@ -183,6 +183,44 @@ def _set_ratios(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
+def _set_ratios_apart(
+    ratios: Floats,
+    splats: Splats,
+    t_s: Floats,
+    sharp: Floats,
+    blurred: Floats,
+    first: int,
+    last: int,
+    size: int,
+    added: float,
+    apart_s: float,
+) -> None:
+    """Write (I + added) / (B + added) of the events [first, last) into `ratios` (n,), I and B of distant events alone.
+
+    `blurred` is the mean of the permuted events; events no farther than `apart_s` in time are taken out of `sharp`.
+    """
+    cells, weights = splats
+    removed = kept = first  # events [kept, removed) are out of the map
+    for i in range(first, last):
+        while removed < last and t_s[removed] <= t_s[i] + apart_s:
+            _add_splats(sharp, splats, removed, removed + 1, size, -1.0)
+            removed += 1
+        while t_s[kept] < t_s[i] - apart_s:
+            _add_splats(sharp, splats, kept, kept + 1, size, 1.0)
+            kept += 1
+        density = expected = 0.0
+        at = np.uint64(cells[i])
+        for row in range(3, 6):
+            for column in range(3):
+                part = weights[row, i] * weights[column, i]
+                density += part * sharp[at + np.uint64(column)]
+                expected += part * blurred[at + np.uint64(column)]
+            at += np.uint64(size)
+        others = last - first - (removed - kept)
+        ratios[i] = (max(density, 0.0) + added) / (others * expected + added)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def take_logarithms(values: Floats) -> float:
     """Replace positive numbers (n,) by their natural logarithms; return the sum of these.
 
@@ -238,6 +276,10 @@ def score(log_ratios: Floats, spin_rad_s: Floats, window: ScoreWindow, cell_rad:
             sharp[:] = 0.0
             blurred[:] = 0.0
         _add_splats(sharp, splats, first, last, size, 1.0)
+        if window.apart_s > 0.0:
+            _add_splats(blurred, permuted_splats, begin, end, size, 1.0 / max(end - begin, 1))
+            _set_ratios_apart(log_ratios, splats, events.t_s, sharp, blurred, first, last, size, added, window.apart_s)
+            continue
         # An event has no share in the density that it is compared with: count - 1 others.
         weight = (last - first - 1) / max(end - begin, 1)
         _add_splats(blurred, permuted_splats, begin, end, size, weight)
@@ -267,7 +309,7 @@ def burst_mask(events: SphereEvents) -> Flags:
     every = np.tile(rows, starts.size - 1)
     everywhere = np.ascontiguousarray(normals[:, every])
     usual = EventColumns(np.zeros(every.size), everywhere, polarity[every], np.arange(starts.size) * rows.size)
-    window = ScoreWindow(EventColumns(t_s, normals, polarity, starts), usual, every)
+    window = ScoreWindow(EventColumns(t_s, normals, polarity, starts), usual, every, 0.0)
     log_ratios = np.empty(t_s.size)
     score(log_ratios, np.zeros(3), window, BURST_SIGMA_RAD * CELLS_PER_SIGMA, BURST_FLOOR)
     return log_ratios > BURST_LOG_RATIO
@@ -335,7 +377,7 @@ def scores_near(
         values[m] = score(
             shares[m],
             changed_spin(spin_rad_s, axes, changes[m, :3]),
-            ScoreWindow(events, permuted, window.rows),
+            ScoreWindow(events, permuted, window.rows, window.apart_s),
             objective.sigma_rad * CELLS_PER_SIGMA,
             objective.floor,
         )

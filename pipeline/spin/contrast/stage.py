@@ -36,7 +36,7 @@ from .events import (
     ScoreMap,
     SphereEvents,
 )
-from .search import last_of_grid_rps
+from .search import LEAST_LINKED, last_of_grid_rps
 
 METHOD, FLOW_METHOD = "contrast", "normal_flow"
 # Full estimates when the shot is so old, then each time it is half as old again; in between the last answer is
@@ -58,10 +58,6 @@ SETTLED_TURNS, SETTLED = 2.0, 3.0
 # A spin that is off by one turn between the logo's visits fits those seen, not the next one: where following loses so
 # much of the contrast that it had, a full estimate is due at once, with a scan.
 LOST = 0.85
-# A spin that brings the logo's visits to different places on the ball is told by one of them alone, and so is another
-# spin at which they meet. Of 125 answers on simulated flights seven have a linked share below 0.3: six are wrong by
-# more than 2 rps, and at the seventh's truth the visits meet. Of the others, at 0.52 and more, one is wrong.
-LEAST_LINKED = 0.4
 UNLINKED = "the logo's visits do not fit together: no spin found brings them to one place on the ball"
 # Before the logo has come back for the first time the magnitude rests on how far it moved.
 RETURNED_TURNS = 1.2

@@ -112,6 +112,18 @@ CONTRAST = [
     ),
     Mutant(
         "pipeline/spin/contrast/estimate.py",
+        "stretch, APART_S)",
+        "stretch, 0.0)",
+        "tests/pipeline/spin/test_contrast_uncertainty.py -k visits_meet",
+    ),
+    Mutant(
+        "pipeline/spin/contrast/score.py",
+        "others = last - first - (removed - kept)",
+        "others = last - first - 1",
+        "tests/pipeline/spin/test_contrast_score.py -k twins",
+    ),
+    Mutant(
+        "pipeline/spin/contrast/estimate.py",
         "margins if ball.is_flying else IN_PLACE * margins",
         "IN_PLACE * margins",
         "tests/pipeline/spin/test_contrast_score.py -k in_place",

@@ -58,8 +58,9 @@ def assert_same(spin: np.ndarray | None, expected: np.ndarray, part: float = 0.0
     times_each=st.integers(1, 3),
     cell=st.sampled_from([0.03, 0.1, 0.2]),
     floor=st.floats(0.1, 5.0),
+    apart_s=st.sampled_from([0.0, 0.002]),
 )
-def test_the_score_is_its_twins(seed, count, speed, spread, segment_s, times_each, cell, floor) -> None:
+def test_the_score_is_its_twins(seed, count, speed, spread, segment_s, times_each, cell, floor, apart_s) -> None:
     random = np.random.default_rng(seed)
     normals = np.array([[0.0], [0.2], [-1.0]]) + spread * random.standard_normal((3, count))
     normals /= np.linalg.norm(normals, axis=0)
@@ -68,13 +69,13 @@ def test_the_score_is_its_twins(seed, count, speed, spread, segment_s, times_eac
     direction = random.standard_normal(3)
     spin = speed * direction / np.linalg.norm(direction)
     if segment_s == 1.0:
-        window = whole_window(events, times_each)
+        window = whole_window(events, times_each, apart_s)
     else:
         window = segmented_window(events, segment_s, 10_000, 10_000)
-        times_each = 1
+        times_each, apart_s = 1, 0.0
     ratios = np.empty(count)
     total = score(ratios, spin, window, cell, floor)
-    expected, shares = naive_score(spin, *window.events, times_each, cell, floor)
+    expected, shares = naive_score(spin, *window.events, times_each, cell, floor, apart_s)
     np.testing.assert_allclose(ratios, shares, atol=2e-4)
     assert total == pytest.approx(expected, abs=2e-4 * count)
 
@@ -95,7 +96,7 @@ def test_a_stamp_counts_as_much_on_either_side_of_the_ball(turned_rad) -> None:
             np.repeat(t_s, repeated), normals, np.repeat(polarity, repeated), np.array([0, 400 * repeated])
         )
         ratios = np.empty(400 * repeated)
-        score(ratios, spin, whole_window(events, 3), 0.04, 1.5)
+        score(ratios, spin, whole_window(events, 3, 0.0), 0.04, 1.5)
         return ratios.reshape(400, repeated).sum(axis=0)
 
     (alone,) = shares(np.ascontiguousarray(seen), 1)
@@ -343,7 +344,7 @@ from tests.reference.contrast import dotted_ball
 events = dotted_ball(np.array([20.0, 5.0, 5.0]), duration_s=0.01, events=30)
 slopes = offset_slopes(events.normals, events.facing, events.radius_px)
 spin = 2 * np.pi * np.array([19.0, 5.0, 6.0])
-objective = Objective(whole_window(events.columns, 2), slopes, 0.08, 1.5, np.full(3, 0.3), 0.1)
+objective = Objective(whole_window(events.columns, 2, 0.0), slopes, 0.08, 1.5, np.full(3, 0.3), 0.1)
 spin, offsets, value, model = maximise(objective, spin, np.zeros(3), 1)
 grid = grid_search(events.columns, 4.0, 1.5, 30, 1)
 print(json.dumps([*spin, *offsets, value, *model.curvature.ravel(), *grid[0]]))

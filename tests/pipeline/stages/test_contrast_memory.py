@@ -134,8 +134,8 @@ def test_only_where_nothing_turns_is_normal_flow_doubted_with_contrast() -> None
 
 def test_a_spin_above_the_limit_leaves_no_normal_flow_below_it() -> None:
     flow = SpinEstimate("normal_flow", np.array([147.0, 0.0, 0.0]), 4.0 * np.eye(3), None)
-    beyond = judged(answered(spin_rps=np.array([150.5, 0.0, 0.0])), flow)
-    assert beyond.status == "refused" and "150.5 rps" in str(beyond.reason) and beyond.against == "normal_flow"
+    beyond = judged(answered(spin_rps=np.array([153.5, 0.0, 0.0])), flow)
+    assert beyond.status == "refused" and "153.5 rps" in str(beyond.reason) and beyond.against == "normal_flow"
 
 
 @pytest.mark.parametrize(("magnitude_rps", "against"), [(50.0, None), (25.0, None), (37.0, "normal_flow")])
