@@ -74,10 +74,10 @@ def best_circles(
 ) -> tuple[Floats, Integers]:
     """Circles through pixels (n,), n > 0, by `vote` and `peak`, without votes around a better one; best first.
 
-    Pixels that are too lonely for a circle with enough votes do not vote. Where fewer votes are given than
-    there are, only circles with enough are looked at, and where far fewer, only those given are set to zero again: on
-    the few cells of a large image that noise activates 9 x faster than new votes and `peak`. Where more are given, as
-    along an edge, `peak` is a third faster.
+    Pixels that are too lonely for a circle with enough votes do not vote. Where fewer votes are given than the image
+    that they span has places, only circles with enough are looked at, and where far fewer, only those places are set to
+    zero again: on the few cells of a large image that noise activates 9 x faster than new votes and `peak`. Where more
+    are given, as along an edge, `peak` is a third faster.
 
     Parameters
     ----------
