@@ -15,6 +15,8 @@ KEPT_EVENTS = 1 << 25  # 436 MB
 class _Kept(NamedTuple):
     clock: int
     events: EventBatch
+    first_us: int
+    last_us: int
     passed_us: int  # time of the last event, counted on over all clocks
 
 
@@ -39,11 +41,12 @@ class RecentEvents:
         """Take events; called by the camera's thread."""
         if not len(events):
             return
+        first_us, last_us = int(events.t_us[0]), int(events.t_us[-1])
         with self._lock:
             if clock != self._clock:
-                self._clock, self._shift_us = clock, self._passed_us - int(events.t_us[0])
-            self._passed_us = int(events.t_us[-1]) + self._shift_us
-            self._kept.append(_Kept(clock, events, self._passed_us))
+                self._clock, self._shift_us = clock, self._passed_us - first_us
+            self._passed_us = last_us + self._shift_us
+            self._kept.append(_Kept(clock, events, first_us, last_us, self._passed_us))
             self._events += len(events)
             while self._events > KEPT_EVENTS or self._is_past(self._kept[0]):
                 self._events -= len(self._kept.popleft().events)
@@ -55,7 +58,7 @@ class RecentEvents:
     def _is_past(self, one: _Kept) -> bool:
         if one.passed_us >= self._passed_us - self._kept_us:
             return False
-        return self._needed is None or (one.clock, int(one.events.t_us[-1])) < self._needed
+        return self._needed is None or (one.clock, one.last_us) < self._needed
 
     @property
     def span_us(self) -> tuple[int, int, int] | None:
@@ -63,12 +66,13 @@ class RecentEvents:
         with self._lock:
             if not self._kept:
                 return None
-            clock, newest, _ = self._kept[-1]
-            oldest = next(one.events for one in self._kept if one.clock == clock)
-        return clock, int(oldest.t_us[0]), int(newest.t_us[-1]) + 1
+            newest = self._kept[-1]
+            oldest = next(one for one in self._kept if one.clock == newest.clock)
+        return newest.clock, oldest.first_us, newest.last_us + 1
 
     def between(self, clock: int, start_us: int, end_us: int) -> EventBatch:
         """The events of [start_us, end_us) by a clock, as far as they are kept."""
-        with self._lock:
-            kept = [one.events for one in self._kept if one.clock == clock]
-        return EventBatch.concatenate(part for events in kept if len(part := events.between(start_us, end_us)))
+        with self._lock:  # many thousands are kept, few of which are cut
+            of_clock = (one for one in self._kept if one.clock == clock)
+            kept = [one for one in of_clock if one.first_us < end_us and one.last_us >= start_us]
+        return EventBatch.concatenate(part for one in kept if len(part := one.events.between(start_us, end_us)))

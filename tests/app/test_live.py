@@ -370,6 +370,23 @@ def test_recent_events_are_bounded() -> None:
     assert not len(recent.between(1, 0, 20_000_000))
 
 
+def test_few_of_the_recent_packets_are_cut(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Thirty seconds are 30,000 packets: each that is cut takes Python's lock from the tracker. Late ones are found."""
+    recent, cut, between = RecentEvents(), list[int](), EventBatch.between
+    for start_us in (*range(0, 1_000_000, 1000), 500_200):  # the last one is late
+        times = [start_us, start_us + 999]
+        recent(0, EventBatch.checked(times, [1, 1], [1, 1], [True, True], width_px=4, height_px=4))
+
+    def counted(events: EventBatch, start_us: int, end_us: int) -> EventBatch:
+        cut.append(int(events.t_us[0]))
+        return between(events, start_us, end_us)
+
+    monkeypatch.setattr(EventBatch, "between", counted)
+    found = recent.between(0, 499_999, 502_000)
+    assert found.t_us.tolist() == [499_999, 500_000, 500_999, 501_000, 501_999, 500_200, 501_199]
+    assert cut == [499_000, 500_000, 501_000, 500_200]
+
+
 def test_events_of_shots_without_their_spin_are_kept() -> None:
     """As long as the spins are behind, also over another clock; and what nobody needs is not."""
     recent = RecentEvents(1_000_000)
