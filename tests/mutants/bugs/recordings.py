@@ -263,8 +263,8 @@ CAMERAS = [
     ),
     Mutant(
         "pipeline/cameras/recent_events.py",
-        "kept = [one.events for one in self._kept if one.clock == clock]",
-        "kept = [one.events for one in self._kept]",
+        "of_clock = (one for one in self._kept if one.clock == clock)",
+        "of_clock = (one for one in self._kept)",
         "tests/app/test_live.py -k bounded",
     ),
     Mutant(
