@@ -33,6 +33,10 @@ class CallCache:
         self._results: dict[bytes, Any] = {}
         self._lock = threading.Lock()
 
+    def __deepcopy__(self, _: object) -> CallCache:
+        """The same one: copies of a stage's state know the same calls."""
+        return self
+
     def result(self, function: Callable[Given, Returned], *arguments: Given.args, **options: Given.kwargs) -> Returned:
         """The function's result, frozen, for it is given out again.
 
