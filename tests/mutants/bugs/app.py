@@ -6,6 +6,12 @@ from tests.mutants.mutation import Mutant
 
 COMMANDS = [
     Mutant(
+        "app/terminal.py",
+        "        error = error.__cause__\n",
+        "        error = None\n",
+        "tests/app/test_signals.py -k wraps",
+    ),
+    Mutant(
         "app/analysis.py",
         "result = estimate_with_measured_up(session, method, on_progress)",
         "result = estimate_with_measured_up(session, on_progress=on_progress)",

@@ -6,6 +6,12 @@ from tests.mutants.mutation import Mutant
 
 CHAIN = [
     Mutant(
+        "pipeline/child_process.py",
+        "signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS_OF_PARENT)",
+        "signal.pthread_sigmask(signal.SIG_BLOCK, set())",
+        "tests/pipeline/test_child_process.py -k signals",
+    ),
+    Mutant(
         "pipeline/chain.py",
         "self._key(stage.name, parameters.group(stage.group), read, inputs)",
         "self._key(stage.name, parameters.group(stage.group), inputs)",
