@@ -136,12 +136,22 @@ def test_an_end_says_what_it_waits_for_and_comes_at_once_when_asked_for_again(na
     assert open_recording(raw).read().t_us.size > 0
 
 
+@contextmanager
+def handled_signals() -> Iterator[None]:
+    """Signals as a program finds them, also where the tests were started with some ignored; put back afterwards."""
+    before = {one: signal.signal(one, signal.SIG_DFL) for one in SIGNALS}
+    try:
+        yield
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+
+
 def test_signals_of_one_request_are_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """As when a shell hands on what the terminal has sent already."""
     now_s, asked = [100.0], list[float]()
     monkeypatch.setattr("spinscope.app.terminal.time.monotonic", lambda: now_s[0])
-    before = {one: signal.getsignal(one) for one in SIGNALS}
-    try:
+    with handled_signals():
         with ends_on_signals(lambda: asked.append(now_s[0])):
             for now_s[0], requests in ((100.0, 1), (100.01, 1), (100.4, 1), (101.0, 2), (101.01, 2)):
                 for one in SIGNALS:
@@ -149,9 +159,6 @@ def test_signals_of_one_request_are_one(monkeypatch: pytest.MonkeyPatch) -> None
                 while len(asked) < requests:  # by another thread
                     time.sleep(0.001)
         signal.raise_signal(signal.SIGINT)  # nothing comes of it any more
-    finally:
-        for one, handler in before.items():
-            signal.signal(one, handler)
     assert asked == [100.0, 101.0]
 
 
@@ -163,13 +170,8 @@ def test_an_end_may_need_what_the_main_thread_holds_when_the_signal_comes(monkey
         with lock:
             ends.append(threading.current_thread().name)
 
-    before = {one: signal.getsignal(one) for one in SIGNALS}
-    try:
-        with ends_on_signals(end), lock:
-            signal.raise_signal(signal.SIGINT)
-    finally:
-        for one, handler in before.items():
-            signal.signal(one, handler)
+    with handled_signals(), ends_on_signals(end), lock:
+        signal.raise_signal(signal.SIGINT)
     assert ends == ["requests for the end"]
 
 
