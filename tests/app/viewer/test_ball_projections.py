@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from spinscope.app.viewer.ball_projections import disc_directions, disc_mask, texture_directions
+from spinscope.app.viewer.ball_projections import disc_directions, disc_mask, map_frame, texture_directions
 
 
 def test_the_textures_middle_faces_the_camera_with_the_images_right_and_down() -> None:
@@ -29,3 +29,11 @@ def test_the_left_disc_looks_at_the_middle_and_the_right_one_at_the_back() -> No
     np.testing.assert_allclose(directions[size // 2, back], [0, 0, 1], atol=0.02)
     assert directions[size // 2, back + 40][0] < -0.4
     np.testing.assert_allclose(np.linalg.norm(directions[mask], axis=1), 1, atol=1e-9)
+
+
+def test_the_maps_longitude_grows_in_the_sense_of_the_spin_from_the_middle_on() -> None:
+    spin_rps, middle = np.array([3.0, -20.0, 8.0]), np.array([0.3, 0.2, -0.9])
+    zero, quarter, pole = map_frame(spin_rps, middle)
+    np.testing.assert_allclose(pole, spin_rps / np.linalg.norm(spin_rps), atol=1e-12)
+    assert zero @ middle > 0 and abs(quarter @ middle) < 1e-12
+    assert quarter @ (middle + 0.01 * np.cross(spin_rps, middle)) > 0  # where the spin takes it next
