@@ -66,6 +66,8 @@ export class Viewer extends EventTarget {
   #play = "paused";
   /** @type {string | null} name of the tab in front */
   front = null;
+  /** @type {string | null} name of the tab that was asked for last */
+  #asked = null;
   #isLaidOut = false; // before our first layout there is one of the viewer's own
   #isAlone = false;
   #working = 0; // how much has been asked of it and is not done
@@ -278,9 +280,10 @@ export class Viewer extends EventTarget {
   }
 
   bringToFront(/** @type {string} */ title) {
+    this.#asked = title;
     if (!this.#isLaidOut) this.#turned(title); // the first layout opens there
     return this.#next(async () => {
-      if (this.#isLaidOut) await this.#bring(title);
+      if (this.#isLaidOut && this.#asked === title) await this.#bring(title); // else another one was asked for since
     });
   }
 
