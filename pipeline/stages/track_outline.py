@@ -18,6 +18,7 @@ from ..camera import Camera
 from ..events import EventBatch
 from ..kernels import outline as kernels
 from ..kernels.moving_circle import HALF_AHEAD, OF_BRIGHT, OF_DARK
+from ..kernels.velocity_vote import SIGNED, UNSIGNED, find_moving_circle
 from ..results import Circle
 
 Floats = NDArray[np.float64]
@@ -243,7 +244,7 @@ def moving_circles(recent: EventBatch, end_us: int, circle: Circle, fastest_radi
         The events of the last VOTE_US.
     """
     radius = circle.radius_px
-    return kernels.find_moving_circle(
+    return find_moving_circle(
         circle.x_px, circle.y_px, radius, recent.columns, end_us, VOTE_US * 1e-6, fastest_radii_s * radius
     )
 
@@ -253,10 +254,10 @@ def sight(
 ) -> Sighting | None:
     """The outline of a moving circle: fitted to the events of the last VOTE_US, then to all; None when there is none.
 
-    The circle is that of the signed or of the unsigned vote, see `kernels.outline.vote_velocity`.
+    The circle is that of the signed or of the unsigned vote, see `kernels.velocity_vote.vote_velocity`.
     """
     circles, gate_px = moving
-    expected = circles[kernels.SIGNED if signed else kernels.UNSIGNED]
+    expected = circles[SIGNED if signed else UNSIGNED]
     if math.isnan(expected[0]):
         return None
     first = measure(recent, end_us, camera, expected, 1.5 * gate_px, FREE)
@@ -274,7 +275,7 @@ def sight_arcs(
     takes the arcs' whole span to fix the circle, and a logo beside them gives events of the other polarity as well.
     """
     circles, gate = moving
-    ring = circles[kernels.SIGNED]
+    ring = circles[SIGNED]
     if math.isnan(ring[0]):
         return None
     columns, size = events.columns, (camera.width_px, camera.height_px)

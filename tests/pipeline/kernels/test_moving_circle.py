@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from spinscope.pipeline.kernels import moving_circle, outline
+from spinscope.pipeline.kernels import moving_circle, outline, velocity_vote
 from spinscope.pipeline.kernels.moving_circle import HALF_AHEAD, OF_BRIGHT, OF_DARK, WHOLE
 from spinscope.pipeline.kernels.take_events import take_others
 from tests.columns import read_only
@@ -74,10 +74,10 @@ def test_measures_equal_the_twins(seed: int, oval: tuple[float, float]) -> None:
             equal_nan=True,
         )
     votes = np.zeros((2, 9, 9))
-    outline.vote_velocity(votes, ring, tau, x, y, on, 700.0, 2.5)
+    velocity_vote.vote_velocity(votes, ring, tau, x, y, on, 700.0, 2.5)
     for signed in (True, False):
         off = np.abs(
-            votes[outline.SIGNED if signed else outline.UNSIGNED]
+            votes[velocity_vote.SIGNED if signed else velocity_vote.UNSIGNED]
             - reference.vote_velocity(4, ring, tau, x, y, on, 700.0, 2.5, signed)
         )
         # In single precision an event that the motion passes at right angles may change sides.
@@ -163,8 +163,8 @@ def test_velocity_votes_peak_at_the_velocity(bright: bool, seed: int) -> None:
     tau, x, y, on = on_ring(ring, 200, rng)
     both = np.zeros((2, 2 * m + 1, 2 * m + 1))
     at_rest = ring * np.array([1, 1, 0, 0, 1])
-    outline.vote_velocity(both, at_rest, tau, x, y, on if bright else ~on, step, 2.0)
-    votes = both[outline.SIGNED]
+    velocity_vote.vote_velocity(both, at_rest, tau, x, y, on if bright else ~on, step, 2.0)
+    votes = both[velocity_vote.SIGNED]
     best = np.unravel_index(int(np.argmax(np.abs(votes))), votes.shape)
     assert best == (m + j, m + i)
     assert (votes[best] > 0) == bright
@@ -221,8 +221,8 @@ def test_a_moving_ring_is_measured_from_a_place_alone(bright: bool) -> None:
     columns = np.round(tau * 1e6).astype(np.int64), np.round(x).astype(np.uint16), np.round(y).astype(np.uint16)
     recent = tau > -1.5e-3
     events = read_only(*(column[recent] for column in columns), (on if bright else ~on)[recent])
-    circles, gate = outline.find_moving_circle(60.8, 49.0, 15.5, events, 0, 1.5e-3, 12_000.0)
-    start = circles[outline.SIGNED]
+    circles, gate = velocity_vote.find_moving_circle(60.8, 49.0, 15.5, events, 0, 1.5e-3, 12_000.0)
+    start = circles[velocity_vote.SIGNED]
     assert np.hypot(*(start - ring)[2:4]) < 1500
     fitted, covariance, scatter = outline.fit_outline(start, FREE, ROUND, events, 0, 1.5 * gate, HALF_AHEAD)
     found, behind_px = outline.evidence(fitted, ROUND, events, 0, 1280, 720)
@@ -231,7 +231,7 @@ def test_a_moving_ring_is_measured_from_a_place_alone(bright: bool) -> None:
     assert min(found[3], found[4]) > 0.8 and np.allclose(found[1:3], [bright, not bright], atol=0.03)
     assert abs(behind_px) < 0.2, "the outline is as thin as it is round"
     nothing = tuple(column[:5] for column in events)
-    assert np.isnan(outline.find_moving_circle(60.8, 49.0, 15.5, nothing, 0, 1.5e-3, 12_000.0)[0]).all()
+    assert np.isnan(velocity_vote.find_moving_circle(60.8, 49.0, 15.5, nothing, 0, 1.5e-3, 12_000.0)[0]).all()
     assert np.isnan(outline.fit_outline(start, FREE, ROUND, nothing, 0, 3.0, HALF_AHEAD)[0][0])
 
 
@@ -243,6 +243,6 @@ def test_polarity_does_not_matter_to_an_unsigned_vote() -> None:
     left = x - (ring[0] + ring[2] * tau) < 0.6 * (y - (ring[1] + ring[3] * tau))
     columns = np.round(tau * 1e6).astype(np.int64), np.round(x).astype(np.uint16), np.round(y).astype(np.uint16)
     events = read_only(*(column[recent] for column in columns), (on ^ left)[recent])
-    circles, _ = outline.find_moving_circle(60.8, 49.0, 15.5, events, 0, 1.5e-3, 12_000.0)
-    start = circles[outline.UNSIGNED]
+    circles, _ = velocity_vote.find_moving_circle(60.8, 49.0, 15.5, events, 0, 1.5e-3, 12_000.0)
+    start = circles[velocity_vote.UNSIGNED]
     assert np.hypot(*(start - ring)[2:4]) < 1500
