@@ -16,6 +16,7 @@ from spinscope.pipeline.cameras import ArrivedTick, SimulatedCamera
 from spinscope.pipeline.cameras.event_camera import check_biases
 from spinscope.pipeline.errors import RecordingError
 from spinscope.pipeline.live_outputs import LiveNotice, LiveOutput, LiveShot, LiveSpin, LiveStatus
+from spinscope.pipeline.live_spins import load_stages
 from spinscope.pipeline.recordings import write_recording
 from spinscope.pipeline.registry import Parameters
 from spinscope.pipeline.result_rows import ResultRow
@@ -25,6 +26,7 @@ from spinscope.pipeline.tick import Tick
 from ..tuning.bias_sweep import BiasRange, BiasState, BiasSweep
 from ..viewer import entities
 from ..web.live_schemas import LiveRecording, LiveSecond, LiveShotRow, LiveView, NumberedNotice
+from ..web.open_recording import note_loaded_kernels
 from .camera_sweep import CameraSweep, proposal_words, swept_biases
 from .camera_thread import CameraObserver
 from .event_rates import EventRateMeter
@@ -78,6 +80,8 @@ class CameraView(CameraObserver):
     def begin(self, live: OpenLive) -> None:
         """Take the run before it starts."""
         self._biases = dict(live.camera.biases)
+        load_stages()  # those of the page: beside the tracker their loading would hold it up
+        note_loaded_kernels()
         super().begin(live)
 
     def add_tick(self, arrived: ArrivedTick, tick: Tick) -> None:

@@ -36,6 +36,11 @@ _kernels = threading.Lock()
 _are_loaded = threading.Event()
 
 
+def note_loaded_kernels() -> None:
+    """Take note that the compiled kernels are in memory: somebody else has loaded them."""
+    _are_loaded.set()
+
+
 class OpenRecording:
     """An opened recording with the clips that are worked on.
 

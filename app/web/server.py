@@ -95,8 +95,9 @@ def serve(
     with closing(AppState(path, choices, folders=folders, **shown)) as state:
         with ProgressBar() as bar:
             recording = state.recording(on_progress=bar)
-        # While the browser loads the page and the viewer, which takes longer.
-        threading.Thread(target=_load_kernels, args=(recording,), name="kernels", daemon=True).start()
+        if not recording.are_kernels_loaded:
+            # While the browser loads the page and the viewer, which takes longer.
+            threading.Thread(target=_load_kernels, args=(recording,), name="kernels", daemon=True).start()
         token = _new_token()
 
         def announce(own_port: int) -> None:

@@ -26,6 +26,7 @@ from spinscope.app.live.headless import OpenLive
 from spinscope.app.live.json_lines import JsonLines, JsonServer
 from spinscope.app.live.recording import CameraRecording, RecordChoice
 from spinscope.app.live.shot_table import ShotTable
+from spinscope.app.web import open_recording as web_recording
 from spinscope.pipeline.biases import BiasParameters
 from spinscope.pipeline.cameras import CameraOptions, RecentEvents
 from spinscope.pipeline.errors import CameraError, RecordingError
@@ -40,7 +41,8 @@ QUICK = ("--speed", "inf", "--method", "triplet")
 
 @pytest.fixture(autouse=True)
 def _warm(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(headless, "warm_up", lambda: None)  # three recordings with all methods
+    for module, loading in ((headless, "warm_up"), (camera_view, "load_stages")):
+        monkeypatch.setattr(module, loading, lambda: None)  # two recordings with all methods each
 
 
 def run(*arguments: object) -> Any:
@@ -160,12 +162,16 @@ def test_watch_writes_a_table(bounce: Session, tmp_path: Path) -> None:
 
 def test_the_page_opens_on_the_running_camera(bounce: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(camera_view, "FIRST_WINDOW_US", 50_000)
+    monkeypatch.setattr(web_recording, "_are_loaded", is_known := threading.Event())
+    loads: list[set[str]] = []  # with the threads that run meanwhile
+    monkeypatch.setattr(camera_view, "load_stages", lambda: loads.append({one.name for one in threading.enumerate()}))
     served: list[Path] = []
 
     def serve(
         path: Path, choices: object, port: int | None, *, open_browser: bool, hosts: tuple[str, ...], live: CameraView
     ) -> None:
         assert not open_browser and port == 0 and hosts == ("lab.example",)
+        assert is_known.is_set()
         served.append(path)
         while live.view().is_running:
             time.sleep(0.01)
@@ -177,6 +183,8 @@ def test_the_page_opens_on_the_running_camera(bounce: Session, monkeypatch: pyte
     assert result.exit_code == 0, result.output
     (path,) = served
     assert path.suffix == ".raw" and not path.exists()  # goes with the program
+    (threads,) = loads
+    assert "live" in threads and not threads & {"camera", "tracker"}  # the kernels hold up no tracker
 
 
 def _check_view(live: CameraView, bounce: Session) -> None:
