@@ -16,7 +16,7 @@ from .events import ColumnBatch, EventBatch
 
 Vector = NDArray[np.float64]
 # An error of more than this tells nothing of whether a spin is one of those looked for.
-BEYOND = 0.02
+SHARE_BEYOND = 0.02
 PLAIN = frozenset({bool, int, float, str, type(None)})  # types of values that hold no array
 
 
@@ -88,10 +88,10 @@ class SpinEstimate(ReadOnlyArrays):
     def up_to(self, max_spin_rps: float, against: str | None = None) -> SpinEstimate:
         """The estimate, refused where its magnitude is above the highest spin that is looked for.
 
-        Not so where it is by 1 sigma at most, and by no more than the share BEYOND. `against` names a less accurate
+        Not so where it is by 1 sigma at most, and by no more than SHARE_BEYOND of it. `against` names a less accurate
         method that is not to be trusted then either.
         """
-        beyond_rps = min(self.magnitude_std_rps or 0.0, BEYOND * max_spin_rps)
+        beyond_rps = min(self.magnitude_std_rps or 0.0, SHARE_BEYOND * max_spin_rps)
         if self.magnitude_rps is None or self.magnitude_rps <= max_spin_rps + beyond_rps:
             return self
         reason = f"the spin is above spin.max_spin_rps = {max_spin_rps:g} rps: {self.magnitude_rps:.4g} rps"
