@@ -22,7 +22,6 @@ from .events import (
 )
 from .score import TURN, Objective, burst_mask, scores, scores_near
 from .search import (
-    LEAST_LINKED,
     NEAR,
     NO_OFFSETS,
     RIM_COSINE,
@@ -65,11 +64,10 @@ IN_PLACE = 1.5
 NEGLIGIBLE = 0.01
 # Longer stretches may hold steady shading for the search to be rid of, and bursts to tell it by.
 BURSTS_FROM_S = 0.015
-# Events of one edge at one moment come in disorder, a slow pixel's up to a millisecond late, and lie together the
-# better the slower the spin; where the logo shows in short visits, spins by which these do not meet can win by that
-# alone. So where they do not meet, spins are compared by events farther apart than that to either side. A spin by which
-# they meet then is believed from so many turns on: two visits in less may be of two parts of the logo.
-APART_S, LINKED_TURNS = 2e-3, 2.0
+# Events of one edge at one moment come in disorder, by the pixels' latencies, and lie together the better the slower
+# the spin, which is no reason to prefer it: spins are compared by events farther apart in time than that alone. See
+# "Short visits" in docs/contrast.md.
+APART_S = 0.5e-3
 NO_RHYTHMS = np.empty(0)
 # Below this part of a turn there are no other visits of the logo to be confused with; the grid search saw all of it.
 SCAN_FROM_TURNS = 0.7
@@ -119,34 +117,10 @@ def estimate_spin(
     if searching:
         spins = _searched(events, moving, spins, settings)
     seen_again = stretch.span_s * float(np.linalg.norm(spins[0])) > SCAN_FROM_TURNS * TURN
-    scanned = moving if scanning and (not searching or seen_again) else None
-    answer = _chosen(events, scanned, spins, rhythms_rps, ball, settings, stretch, 0.0)
-    if answer.linked_share >= LEAST_LINKED:
-        return answer
-    linked = _chosen(events, moving, spins, rhythms_rps, ball, settings, stretch, APART_S)
-    return linked if linked.linked_share >= LEAST_LINKED and linked.turns >= LINKED_TURNS else answer
-
-
-def _chosen(
-    events: SphereEvents,
-    scanned: SphereEvents | None,
-    spins_rad_s: Floats,
-    rhythms_rps: Floats,
-    ball: BallUncertainty,
-    settings: ContrastSettings,
-    stretch: Stretch,
-    apart_s: float,
-) -> ContrastEstimate:
-    """The best of spins (k, 3) and of their aliases by the events `scanned`, refined, with the others as rivals.
-
-    They are compared by events farther apart in time than `apart_s`.
-    """
-    spins = spins_rad_s
-    if scanned is not None:
+    if scanning and (not searching or seen_again):
         # The scan's few events may rank what is known already below its aliases.
-        scan = alias_scan(scanned, spins, settings, rhythms_rps, apart_s)
-        spins = np.concatenate([scan, spins[:STARTS_KEPT]])
-    spins, margins = _ranked(events, spins, settings, ball, apart_s)
+        spins = np.concatenate([alias_scan(moving, spins, settings, rhythms_rps), spins[:STARTS_KEPT]])
+    spins, margins = _ranked(events, spins, settings, ball)
     some = _off_rim(events, settings).thinned(settings.refine_events)
     spins[0], _, _, _ = maximise(_objective(some, settings, settings.sigma_rad), spins[0], NO_OFFSETS, 1)
     answer = _refined(some, spins[0], ball, settings, stretch, np.zeros(3), 4)
@@ -277,7 +251,6 @@ def alias_scan(
     spins_rad_s: Floats,
     settings: ContrastSettings,
     rhythms_rps: Floats = NO_RHYTHMS,
-    apart_s: float = 0.0,
 ) -> Floats:
     """At most 6 spins (k, 3), best first: maxima of the score over everything, also far from the given ones.
 
@@ -286,7 +259,7 @@ def alias_scan(
     rhythm's: a search may miss the axis that belongs to these.
     """
     sigma_rad, some = 2.0 * settings.sigma_rad, events.thinned(settings.scan_events)
-    window, spread_s = _objective(some, settings, sigma_rad, apart_s).window, float(np.std(some.t_s))
+    window, spread_s = _objective(some, settings, sigma_rad, APART_S).window, float(np.std(some.t_s))
     magnitudes: list[float] = []
     for spin in spins_rad_s[:2]:
         width = math.log(SCAN_HIGH / SCAN_LOW)
@@ -306,7 +279,7 @@ def alias_scan(
     candidates = candidates[order][distinct(candidates[order], 0.1, 6, 2)]
     candidates = np.concatenate([spins_rad_s, candidates])
     candidates = candidates[distinct(candidates, SAME, len(candidates), 0)]
-    objective = _objective(some, settings, 1.5 * settings.sigma_rad, apart_s)
+    objective = _objective(some, settings, 1.5 * settings.sigma_rad, APART_S)
     maxima, values, _ = maximise_each(objective, candidates, 3)
     order = np.argsort(-values, kind="stable")
     highest = float(values.max())  # negative where nothing turns with any of them: then the best alone stays
@@ -323,14 +296,14 @@ def local_maxima(values: Floats) -> Integers:
 
 
 def _ranked(
-    events: SphereEvents, spins_rad_s: Floats, settings: ContrastSettings, ball: BallUncertainty, apart_s: float
+    events: SphereEvents, spins_rad_s: Floats, settings: ContrastSettings, ball: BallUncertainty
 ) -> tuple[Floats, Floats]:
     """Distinct spins (k, 3) maximised with the final kernel, best first, and by how much the best beats each (k,).
 
     The margin is in standard deviations of the difference of the two scores, over the events that tell them apart; for
     a ball in place these count more (IN_PLACE).
     """
-    objective = _objective(events.thinned(settings.follow_events), settings, settings.sigma_rad, apart_s)
+    objective = _objective(events.thinned(settings.follow_events), settings, settings.sigma_rad, APART_S)
     maxima, values, shares = maximise_each(objective, spins_rad_s, 3)
     order = np.argsort(-values, kind="stable")
     order = order[distinct(maxima[order], SAME, 6, 2)]

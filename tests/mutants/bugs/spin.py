@@ -112,8 +112,8 @@ CONTRAST = [
     ),
     Mutant(
         "pipeline/spin/contrast/estimate.py",
-        "stretch, APART_S)",
-        "stretch, 0.0)",
+        "settings.sigma_rad, APART_S)\n    maxima, values, shares",
+        "settings.sigma_rad)\n    maxima, values, shares",
         "tests/pipeline/spin/test_contrast_uncertainty.py -k visits_meet",
     ),
     Mutant(

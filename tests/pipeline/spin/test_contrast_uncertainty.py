@@ -102,12 +102,12 @@ def short_visits(spin_rps: np.ndarray) -> SphereEvents:
     return SphereEvents(late_s[order], normals, pick[rows] % 2, toward, np.full(rows.size, 16.5))
 
 
-@pytest.mark.parametrize(("turns", "meet"), [(2.0, True), (3.0, False)])
-def test_a_spin_by_which_visits_meet_outweighs_slower_ones_from_so_many_turns_on(
-    turns: float, meet: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("apart_s", "meet"), [(contrast.APART_S, True), (0.0, False)])
+def test_a_spin_by_which_visits_meet_outweighs_slower_ones(
+    apart_s: float, meet: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Pixels that report in disorder make slower spins sharper at each moment; the logo shows for 2.2 turns."""
-    monkeypatch.setattr(contrast, "LINKED_TURNS", turns)
+    monkeypatch.setattr(contrast, "APART_S", apart_s)
     spin_rps = np.array([70.0, 30.0, -20.0])
     answer = estimate_spin(short_visits(spin_rps), BALL, ContrastSettings())
     assert answer.spin_rps is not None
