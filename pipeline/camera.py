@@ -114,13 +114,16 @@ class Camera:
         return centre
 
     def silhouette(self, centre_m: ArrayLike, ball_radius_m: float) -> tuple[Floats, Floats, Floats]:
-        """(n,) x_px, y_px and radius_px of the outlines of balls at centre_m (n, 3); see `ball_centre_m`."""
+        """(n,) x_px, y_px and radius_px of the outlines of balls at centre_m (n, 3); see `ball_centre_m`.
+
+        A ball beside the camera, where q is not positive, has no ellipse for an outline: its radius is NaN.
+        """
         centre = np.atleast_2d(np.asarray(centre_m, np.float64))
         across2, distance2 = centre[:, 0] ** 2 + centre[:, 1] ** 2, np.sum(centre**2, axis=1)
         sin2_alpha = ball_radius_m**2 / distance2
         cos2_theta = 1 - across2 / distance2
         q = cos2_theta - sin2_alpha
-        size = np.sqrt(sin2_alpha * np.sqrt(1 - sin2_alpha) / q**1.5)
+        size = np.sqrt(sin2_alpha * np.sqrt(1 - sin2_alpha) / np.where(q > 0, q, np.nan) ** 1.5)
         stretch = cos2_theta / q  # how much farther out the ellipse's centre is than the centre's own image
         x_px, y_px = self.project(centre * np.stack([stretch, stretch, np.ones_like(q)], axis=1)).T
         return x_px, y_px, size * self.focal_px

@@ -50,6 +50,13 @@ def test_ball_centre_is_the_inverse_of_silhouette(place: tuple[float, float, flo
     assert np.allclose(CAMERA.ball_centre_m(*CAMERA.silhouette(place, RADIUS_M), RADIUS_M), place, atol=1e-9)
 
 
+def test_a_ball_beside_the_camera_has_no_radius_and_warns_of_nothing() -> None:
+    """It reaches to both sides of the camera's plane; the next one is as wide, and before it."""
+    radius = CAMERA.silhouette([[1.0, 0.0, 0.5 * RADIUS_M], [1.0, 0.0, 2.0 * RADIUS_M]], RADIUS_M)[2]
+    assert np.isnan(radius[0])
+    assert radius[1] > 0
+
+
 def test_silhouettes_equal_the_independent_simulators(samples) -> None:
     with h5py.File(samples / "flight_mixed.h5") as file:
         truth = {name: file[f"truth/{name}"][:] for name in ("position_m", "x_px", "y_px", "radius_px")}

@@ -23,7 +23,6 @@ from ...kernels.arrays import Floats, Integers
 from ...kernels.order_statistics import median
 from ...kernels.small_matrices import cholesky_solve
 from ...kernels.sphere import spread_directions
-from ...stages.rate import BEYOND
 from .events import BallUncertainty, ContrastSettings, EventColumns, SphereEvents, segmented_window
 from .score import (
     CELLS_PER_SIGMA,
@@ -43,6 +42,8 @@ SLOWEST_RPS = 3.0
 SEARCH_TURNS = 0.2
 SEARCH_SIGMA_RAD = 0.12
 MAGNITUDE_RATIO = 1.4
+# A spin a little above the highest asked for must not lose to an alias below.
+BEYOND = 1.1
 DIRECTIONS = 64
 DIRECTION_SPACING_RAD = math.sqrt(4.0 * math.pi / DIRECTIONS)
 # Halvings of the best cells, how many are kept, and how the kernel shrinks: four bring 0.2 to 3.2 turns.
