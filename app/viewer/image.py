@@ -154,7 +154,9 @@ def _are_among(events: EventBatch, others: EventBatch, start_us: int) -> NDArray
     """Flags (n,) of the events of a tick that are among others of it."""
     if not len(others):
         return np.zeros(len(events), np.bool_)
-    return np.isin(_keys(events, start_us), _keys(others, start_us))
+    keys, wanted = np.sort(_keys(others, start_us)), _keys(events, start_us)
+    found: NDArray[np.bool_] = keys[np.minimum(keys.searchsorted(wanted), keys.size - 1)] == wanted
+    return found
 
 
 def _keys(events: EventBatch, start_us: int) -> NDArray[np.int64]:
