@@ -11,7 +11,9 @@ const PATIENCE_MS = 5000; // as long as a picture takes to draw where there is n
 const SIZE_STEP_PX = 50; // the layout is made anew for a viewer that is larger or smaller by more
 const REST_MS = 500; // a slider that is held still for so long rests, one that is let go of at once
 const POLL_MS = 50;
-const LAYOUT_MS = 5000; // the longest until the first layout is shown: each takes the viewer long without a graphics card
+// Until the first layout is sent once more, each time twice as long: without a graphics card each takes the viewer long.
+const LAYOUT_MS = 5000;
+const MOST_LAYOUT_MS = 40_000;
 const RESIZED_MS = 500; // a window that keeps its size for so long has it
 const NUMBERS_MS = 1000; // as long as numbers wait for their picture
 
@@ -345,8 +347,7 @@ export class RunRequests extends EventTarget {
       if (this.#latest !== picture.id) return false;
       if (isWhole) await this.#fit();
       if (!(await this.viewer.show(content, picture.id, picture.opening_us))) return false;
-      if (!this.#hasLayout) await this.#laidOut();
-      this.#hasLayout = true;
+      this.#hasLayout ||= await this.#laidOut();
       return true;
     } catch (error) {
       if (this.isBlind || (error instanceof Refused && error.status === 404)) return false;
@@ -383,12 +384,15 @@ export class RunRequests extends EventTarget {
   }
 
   // Waits for the first layout: before it there is one of the viewer's own. One that comes while the viewer is starting
-  // can get lost, and is not taken a second time: then it gets another one of the same panes.
+  // can get lost, and is not taken a second time: then it gets another one of the same panes. False where none comes:
+  // then it is waited for with the next picture.
   async #laidOut() {
-    if (await this.viewer.laidOut(LAYOUT_MS)) return;
-    this.#layoutOf = null;
-    await this.#fit();
-    await this.viewer.laidOut();
+    for (let wait_ms = LAYOUT_MS; wait_ms <= MOST_LAYOUT_MS; wait_ms *= 2) {
+      if (await this.viewer.laidOut(wait_ms)) return true;
+      this.#layoutOf = null;
+      await this.#fit();
+    }
+    return false;
   }
 
   // The panes of a viewer of another size; a picture that is on its way brings them along.

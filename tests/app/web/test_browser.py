@@ -314,22 +314,22 @@ def test_without_tools_the_viewer_fills_the_page_on_the_chosen_tab(browser: Any,
 
 
 @pytest.mark.slow  # a viewer of its own
-def test_a_layout_that_is_lost_while_the_viewer_starts_is_made_again(browser: Any, tuner: Served) -> None:
+def test_layouts_that_are_lost_while_the_viewer_starts_are_made_again(browser: Any, tuner: Served) -> None:
     context = browser.new_context(viewport=SIZE)
     tab, lost = Tab(context.new_page()), list[str]()
 
-    def lose_first(route: Any) -> None:
-        if lost:
+    def lose_two(route: Any) -> None:
+        if len(lost) == 2:
             return route.continue_()
         lost.append(route.request.url)
         return route.fulfill(body=b"", content_type="application/octet-stream")
 
-    tab.page.route(re.compile(r"/layout\?"), lose_first)
+    tab.page.route(re.compile(r"/layout\?"), lose_two)
     tab.open(f"{tuner.address}#tab=Tracker")
     tab.until("window.spinscope.viewer.playhead_us !== null")  # the picture has come, the layout has not
     tab.page.evaluate("window.spinscope.viewer.bringToFront('Coach')")
     tab.settled("shown")
-    assert lost and tab.page.evaluate("window.spinscope.viewer.tab()") == "Coach"
+    assert len(lost) == 2 and tab.page.evaluate("window.spinscope.viewer.tab()") == "Coach"
     context.close()
 
 
