@@ -112,8 +112,8 @@ CONTRAST = [
     ),
     Mutant(
         "pipeline/spin/contrast/estimate.py",
-        "settings.sigma_rad, APART_S)\n    maxima, values, shares",
-        "settings.sigma_rad)\n    maxima, values, shares",
+        "APART_S = 0.5e-3",
+        "APART_S = 0.0",
         "tests/pipeline/spin/test_contrast_uncertainty.py -k visits_meet",
     ),
     Mutant(
