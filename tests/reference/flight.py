@@ -55,11 +55,15 @@ def naive_log_likelihood(
     air: tuple[float, float, float],
     lift_std: float,
 ) -> float:
-    """The average over the scale of the lift, by summation."""
+    """The average over the scale of the lift, by summation.
+
+    Circles that exclude the lift prefer a scale near zero, which is 1 / lift_std standard deviations off.
+    """
     lift = naive_lift(spin_rps, velocity_m_s, air)
-    scales = np.linspace(-30.0, 30.0, 20001)
+    most = 30.0 + 1.0 / lift_std
+    scales = np.linspace(-most, most, 100_001)
     factors = 1 + lift_std * scales
     values = factors * (pull @ lift) - 0.5 * factors**2 * (lift @ information @ lift)
-    density = np.exp(-0.5 * scales**2) / np.sqrt(2 * np.pi)
-    top = values.max()
-    return float(top + np.log(np.sum(np.exp(values - top) * density) * (scales[1] - scales[0])))
+    logs = values - 0.5 * scales**2 - 0.5 * np.log(2 * np.pi)
+    top = logs.max()
+    return float(top + np.log(np.sum(np.exp(logs - top)) * (scales[1] - scales[0])))

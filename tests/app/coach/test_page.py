@@ -174,6 +174,26 @@ class TestPage:
         tab.go("tests")
         tab.until("document.querySelectorAll('.protocols tbody tr').length >= 150")
 
+    def test_a_late_answer_does_not_replace_a_newer_one(self, tab: CoachTab, session: ShotSession) -> None:
+        """The first statistics come after everything that is asked for later."""
+        tab.page.evaluate(
+            """() => {
+                const own = window.fetch;
+                let asked = 0;
+                window.fetch = async (path, ...rest) => {
+                    if (path === "/api/coach/statistics" && ++asked === 1) await new Promise((go) => setTimeout(go, 1500));
+                    return own(path, ...rest);
+                };
+            }"""
+        )
+        tab.page.evaluate("() => { location.hash = 'tests'; }")
+        days = [shot(1, recorded_s=1.7e9 + 86_400 * day) for day in range(30)]
+        ids = [session.add(f"{day}.raw", KNOWN, analysis(one))[0] for day, one in enumerate(days)]
+        session.name_shots(ids, {"player": "C", "drill": "serves"})
+        tab.until(f"window.coach.shots.get({ids[-1]})?.drill === 'serves'")
+        tab.page.wait_for_timeout(2500)
+        tab.until("document.querySelectorAll('.protocols tbody tr').length >= 30")
+
     def test_a_shot_that_comes_in_leaves_what_is_being_filled_in(self, tab: CoachTab, session: ShotSession) -> None:
         tab.go("tests")
         tab.page.get_by_role("button", name="serves").click()

@@ -70,7 +70,7 @@ export class Comparison {
   #list = [];
   filter = new ShotFilter();
 
-  /** @param {{shots: Shots, sessions: string[], openShot: (shot: CoachShot) => void}} page */
+  /** @param {{shots: Shots, sessions: string[], openShot: (shot: CoachShot) => void, show: () => Promise<void>}} page */
   constructor(page) {
     this.page = page;
     this.root = element("section.comparison");
@@ -92,7 +92,7 @@ export class Comparison {
       type: "checkbox",
       name: "all-sessions",
       checked: this.#isOfAll,
-      onchange: () => (this.#isOfAll = all.checked, this.show()),
+      onchange: () => (this.#isOfAll = all.checked, this.page.show()),
     });
     const bar = this.filter.bar(this.#list);
     bar.prepend(element("label.name", {}, text("by"), by));

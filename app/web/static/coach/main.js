@@ -31,6 +31,8 @@ class Page {
   /** @type {{close: () => void} | null} */
   #pair = null;
   #shown = 0;
+  /** @type {Promise<void>} */
+  #showing = Promise.resolve();
 
   constructor() {
     this.list = new ShotList(this);
@@ -75,8 +77,15 @@ class Page {
   /** Ids in the order of the list. */
   order = () => (this.filter.of(this.shots.list).map((shot) => shot.id));
 
-  async show(isRefreshed = false) {
+  /** One place after the other, so that what is drawn last is what was asked for last. */
+  show(isRefreshed = false) {
     const shown = ++this.#shown;
+    return this.#showing = this.#showing.then(() => shown === this.#shown ? this.#draw(isRefreshed) : undefined);
+  }
+
+  /** @param {boolean} isRefreshed */
+  async #draw(isRefreshed) {
+    const shown = this.#shown;
     const [name, ...rest] = this.place.split("/");
     this.view.close();
     this.#pair?.close();
