@@ -150,7 +150,8 @@ class LiveRun:
         self.stream = stream(parameters.track.tick_us, lambda kind, text: self._outputs.put(LiveNotice(kind, text)))
         self.parameters = parameters
         self._with_balls, self._on_tick = with_balls, on_tick
-        spin_run = SpinRun(method_targets(method), with_balls, self.stream.width_px, self.stream.height_px)
+        size, tick_us = (self.stream.width_px, self.stream.height_px), parameters.track.tick_us
+        spin_run = SpinRun(method_targets(method), with_balls, *size, tick_us)
         self._spins = SpinProcess(spin_run, self._put)
         self._untaken: deque[LiveShot] = deque()  # which the consumer of the outputs has not done with yet
         self._latencies_ms: deque[float] = deque()

@@ -35,11 +35,11 @@ from .tick import Tick
 # After a shot's last events the spin so far is told, which may be from somewhat older ones: 50 ms are promised, of
 # which telling it takes up to 20 on a busy machine.
 ANNOUNCED_S = 0.03
-# The final spins rest for so long after a tick with a ball, while fewer such ticks wait for them: half as many as have
-# the tracker wait.
-REST_S, MOST_RESTING = 0.1, 300
+# The final spins rest for so long after a tick with a ball, while less flight waits for them: half as much as has the
+# tracker wait.
+REST_S, MOST_RESTING_US = 0.1, 1_500_000
 LOOK_S = 0.005  # after which they look again whether they still rest
-ARRIVALS_KEPT = 4000  # ticks whose arrival is remembered: 20 s at 200 Hz, longer than any shot's end takes to be known
+ARRIVALS_KEPT_US = 20_000_000  # whose ticks' arrival is remembered: longer than any shot's end takes to be known
 # Python lets a thread run for 5 ms while another waits; with a tick's work in several threads that is many ticks.
 SWITCH_S = 0.0005
 # A half and a third of the tracker's share where they want one core; contrast so far has a third of the other methods'
@@ -49,12 +49,13 @@ PARENT_GONE_EXIT = 3
 
 
 class SpinRun(NamedTuple):
-    """Request of a run: stages to answer, whether the spin of every tick is told, and the sensor's size."""
+    """Request of a run: stages to answer, whether the spin of every tick is told, sensor's size, tick's length."""
 
     targets: tuple[str, ...]
     with_balls: bool
     width_px: int
     height_px: int
+    tick_us: int
 
 
 class SegmentStart(NamedTuple):
@@ -135,7 +136,7 @@ class _Ticks:
         self.begin = self.end = begin
         self._get = get
         # The end of each tick, and when it was complete.
-        self._arrivals: deque[tuple[int, float]] = deque(maxlen=ARRIVALS_KEPT)
+        self._arrivals: deque[tuple[int, float]] = deque(maxlen=ARRIVALS_KEPT_US // self.parameters.track.tick_us)
 
     @property
     def parameters(self) -> Parameters:
@@ -300,8 +301,8 @@ class LiveSpins:
 
         They rest for REST_S after the last tick with a ball at the longest: nothing need come for them to go on.
         """
-        one = self._for_final.get()
-        while now_s() < self._resting_until_s and self._handed_on - self._taken < MOST_RESTING:
+        one, most = self._for_final.get(), MOST_RESTING_US // self._run.tick_us
+        while now_s() < self._resting_until_s and self._handed_on - self._taken < most:
             time.sleep(LOOK_S)
         self._taken += isinstance(one.message, TrackedTick) and bool(one.message.tick.balls)
         return one

@@ -18,12 +18,12 @@ from .errors import SpinscopeError
 from .live_outputs import LiveNotice, LiveOutput, LiveShot, LiveSpin
 from .live_spins import Answers, Numbered, SegmentStart, SpinRun, TrackedTick, serve
 
-# Ticks with a ball that wait for their spins, at the most; then the tracker waits, too: 3 s of flight at 200 Hz, which
-# at 5 Mev/s is some 600 MB. Ticks without a ball take 5 kB each: 30 s of them.
-MOST_FLYING = 600
-MOST_WAITING = 6000
-# Ticks of shots in flight that another process could go on from: a second at 200 Hz, longer than most shots.
-MOST_REPEATED = 200
+# Flight that waits for its spins, at the most; then the tracker waits, too: at 5 Mev/s it takes some 600 MB. Ticks
+# without a ball take 5 kB each.
+MOST_FLYING_US = 3_000_000
+MOST_WAITING_US = 30_000_000
+# Of shots in flight that another process could go on from: longer than most shots.
+MOST_REPEATED_US = 1_000_000
 MOST_ENDS = 3  # of processes without an answer between
 
 _Key = tuple[int, str, int, bool]
@@ -99,9 +99,13 @@ class SpinProcess:
 
     def put(self, message: SegmentStart | TrackedTick | None) -> None:
         """Hand over a message, as soon as there is room for it; None ends the run."""
+        tick_us = self._run.tick_us
         with self._changed:
             self._changed.wait_for(
-                lambda: (self._flying < MOST_FLYING and self.waiting < MOST_WAITING) or self._is_over
+                lambda: (
+                    (self._flying < MOST_FLYING_US // tick_us and self.waiting < MOST_WAITING_US // tick_us)
+                    or self._is_over
+                )
             )
             number = self._kept[-1].number + 1 if self._kept else self._done
             self._kept.append(Numbered(number, message))
@@ -232,7 +236,7 @@ class SpinProcess:
                 self._done += 1
             if self._done > self._furthest:
                 self._furthest, self._ends = self._done, 0
-            self._forget(self._done - (0 if answers.is_idle else MOST_REPEATED))
+            self._forget(self._done - (0 if answers.is_idle else MOST_REPEATED_US // self._run.tick_us))
             self._changed.notify_all()
 
     def _forget(self, number: int) -> None:

@@ -17,7 +17,7 @@ from spinscope.pipeline.errors import SpinscopeError
 from spinscope.pipeline.live import LiveRun
 from spinscope.pipeline.live_outputs import LiveNotice, LiveOutput, LiveShot, LiveSpin
 from spinscope.pipeline.live_spins import (
-    MOST_RESTING,
+    MOST_RESTING_US,
     REST_S,
     Answers,
     LiveSpins,
@@ -30,7 +30,7 @@ from spinscope.pipeline.live_spins import (
 )
 from spinscope.pipeline.results import SpinEstimate
 from spinscope.pipeline.session import Session
-from spinscope.pipeline.spin_process import MOST_FLYING
+from spinscope.pipeline.spin_process import MOST_FLYING_US
 from spinscope.pipeline.spin_so_far import SpinsInFlight, SpinSoFar
 from spinscope.pipeline.tick import Tick
 
@@ -107,9 +107,10 @@ def test_events_that_end_two_processes_are_left_out_and_the_third_end_is_an_erro
         live(session)
 
 
-def test_final_spins_rest_in_a_flight_and_never_for_long(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("tick_us", [1000, 5000])
+def test_final_spins_rest_in_a_flight_and_never_for_long(monkeypatch: pytest.MonkeyPatch, tick_us: int) -> None:
     """Until no ball is in view, or many ticks wait; where nothing comes any more, for a time that ends by itself."""
-    spins, clock_s, looks = LiveSpins(SpinRun((QUICK,), False, 4, 4), lambda answers: None), 0.0, 0
+    spins, clock_s, looks = LiveSpins(SpinRun((QUICK,), False, 4, 4, tick_us), lambda answers: None), 0.0, 0
 
     def look(seconds: float) -> None:
         nonlocal clock_s, looks
@@ -134,14 +135,18 @@ def test_final_spins_rest_in_a_flight_and_never_for_long(monkeypatch: pytest.Mon
     assert seconds_rested(waiting=1) == pytest.approx(REST_S, abs=live_spins.LOOK_S)
     assert seconds_rested(waiting=1) == 0.0  # no more until another tick has a ball
     spins._resting_until_s = clock_s + REST_S
-    assert seconds_rested(waiting=MOST_RESTING) == 0.0 and MOST_RESTING < MOST_FLYING  # for which the tracker waits
+    most = MOST_RESTING_US // tick_us
+    assert seconds_rested(waiting=most) == 0.0 and MOST_RESTING_US < MOST_FLYING_US  # for which the tracker waits
     calm_after = 3
-    assert seconds_rested(waiting=MOST_RESTING - 1) == pytest.approx(3 * live_spins.LOOK_S)
+    assert seconds_rested(waiting=most - 1) == pytest.approx(3 * live_spins.LOOK_S)
 
 
 def test_final_spins_are_to_rest_from_a_shots_first_tick_to_its_last(samples: Path) -> None:
     session = Session.open(samples / "own/rally.h5").clip(3_200_000, 3_400_000)
-    spins, ticks = LiveSpins(SpinRun((QUICK,), False, 1280, 720), lambda answers: None), list(session.ticks(("track",)))
+    spins, ticks = (
+        LiveSpins(SpinRun((QUICK,), False, 1280, 720, 5000), lambda answers: None),
+        list(session.ticks(("track",))),
+    )
     rests = list[tuple[bool, bool]]()
 
     class Final:
@@ -178,7 +183,7 @@ def test_an_error_in_the_process_comes_out(session: Session, monkeypatch: pytest
 
 def test_a_shot_is_announced_once_and_as_soon_as_there_is_a_spin(session: Session) -> None:
     shots, spins, sent = session.estimate(QUICK).shots, SpinsInFlight(), list[Answers | Exception]()
-    live_spins = LiveSpins(SpinRun((QUICK,), False, 4, 4), sent.append)
+    live_spins = LiveSpins(SpinRun((QUICK,), False, 4, 4, 5000), sent.append)
     live_spins._ended = [_EndedShot(shot, None, 7 + number, 1.5, spins) for number, shot in enumerate(shots)]
     first, second = shots
     spins._answers = {first.number: {}, second.number: {}}

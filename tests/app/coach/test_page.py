@@ -181,7 +181,8 @@ class TestPage:
                 const own = window.fetch;
                 let asked = 0;
                 window.fetch = async (path, ...rest) => {
-                    if (path === "/api/coach/statistics" && ++asked === 1) await new Promise((go) => setTimeout(go, 1500));
+                    const isFirst = path === "/api/coach/statistics" && ++asked === 1;
+                    if (isFirst) await new Promise((go) => setTimeout(go, 1500));
                     return own(path, ...rest);
                 };
             }"""
