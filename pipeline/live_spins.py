@@ -45,6 +45,8 @@ SWITCH_S = 0.0005
 # A half and a third of the tracker's share where they want one core; contrast so far has a third of the other methods'
 # share, of which its thread comes.
 SO_FAR_NICENESS, FINAL_NICENESS, CONTRAST_NICENESS = 3, 5, 5
+# Of ticks without a ball that are shorter than this, several go together to the process and back.
+TOGETHER_US = 5000
 PARENT_GONE_EXIT = 3
 
 
@@ -309,12 +311,14 @@ class LiveSpins:
 
     def _answer_all(self) -> None:
         """Answer the shots as of a recording."""
+        together = max(TOGETHER_US // self._run.tick_us, 1)
         for ticks in _stretches(self._take_rested):
             log, last = ShotLog(), None
             for number, one in self._answered(self._new_chain(), ticks, self._run.targets):
                 log.add(one.tick)
-                last = one
-                self._send(Answers(number, True, _ended(log, ticks, one), not one.tick.balls))
+                last, outputs = one, _ended(log, ticks, one)
+                if outputs or one.tick.balls or number % together == 0:
+                    self._send(Answers(number, True, outputs, not one.tick.balls))
             log.close()
             outputs = () if last is None else _ended(log, ticks, last)
             self._send(Answers(ticks.end.number, True, outputs, is_idle=True))
@@ -335,6 +339,18 @@ class LiveSpins:
         for tick in chain.answer(ticks.parameters, tracked(), targets, forget=STAGES.names):
             number, one = at_work.popleft()
             yield number, one._replace(tick=tick)
+
+
+def _one_by_one(get: Callable[[], list[Numbered]]) -> Callable[[], Numbered]:
+    """Function that waits for the next of the messages, of which `get` waits for several."""
+    come = deque[Numbered]()
+
+    def one() -> Numbered:
+        while not come:
+            come.extend(get())
+        return come.popleft()
+
+    return one
 
 
 def _stretches(get: Callable[[], Numbered]) -> Iterator[_Ticks]:
@@ -379,7 +395,7 @@ def serve() -> None:
                 load_stages()
                 gc.freeze()  # as in `LiveRun.outputs`
             else:
-                LiveSpins(run, send).work(lambda: receive_value(requests))
+                LiveSpins(run, send).work(_one_by_one(lambda: receive_value(requests)))
             send(None)
     except (EOFError, BrokenPipeError):
         os._exit(PARENT_GONE_EXIT)

@@ -11,12 +11,13 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import islice
 
 from .cameras.clock import now_s
 from .child_process import ChildProcess, IdleProcesses
 from .errors import SpinscopeError
 from .live_outputs import LiveNotice, LiveOutput, LiveShot, LiveSpin
-from .live_spins import Answers, Numbered, SegmentStart, SpinRun, TrackedTick, serve
+from .live_spins import TOGETHER_US, Answers, Numbered, SegmentStart, SpinRun, TrackedTick, serve
 
 # Flight that waits for its spins, at the most; then the tracker waits, too: at 5 Mev/s it takes some 600 MB. Ticks
 # without a ball take 5 kB each.
@@ -80,6 +81,7 @@ class SpinProcess:
         self._kept = deque[Numbered]()  # from the first message on that another process would need
         self._segment: Numbered | None = None  # to which the first of them belongs
         self._next = 0  # number of the next one to be sent
+        self._is_urgent = False  # whether one that waits to be sent is not to wait for others
         self._done = 0  # number of the first one without its final answers
         self._flying = 0  # ticks with a ball from there on
         self._furthest = 0  # the same of all processes so far
@@ -110,7 +112,14 @@ class SpinProcess:
             number = self._kept[-1].number + 1 if self._kept else self._done
             self._kept.append(Numbered(number, message))
             self._flying += _has_ball(message)
-            self._changed.notify_all()
+            self._is_urgent |= not isinstance(message, TrackedTick) or _has_ball(message) or _has_end(message)
+            if self._is_due():
+                self._changed.notify_all()
+
+    def _is_due(self) -> bool:
+        """Whether messages are to be sent: ticks without a ball go several at a time where they are short."""
+        unsent = self._kept[-1].number + 1 - self._next if self._kept else 0
+        return unsent > 0 and (self._is_urgent or unsent * self._run.tick_us >= TOGETHER_US)
 
     @property
     def waiting(self) -> int:
@@ -155,19 +164,22 @@ class SpinProcess:
         process = _process()
         process.send(self._run)
         if self._segment is not None:
-            process.send(self._segment)
+            process.send([self._segment])
         return process
 
     def _send(self) -> None:
         """Body of a thread: send the messages until the run is over."""
+        most = max(TOGETHER_US // self._run.tick_us, 1)
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: self._is_over or (self._kept and self._kept[-1].number >= self._next))
+                self._changed.wait_for(lambda: self._is_over or self._is_due())
                 if self._is_over:
                     return
-                one, process = self._kept[self._next - self._kept[0].number], self._process
-                self._next += 1
-            process.send(one)
+                first = self._next - self._kept[0].number
+                messages, process = list(islice(self._kept, first, first + most)), self._process
+                self._next += len(messages)
+                self._is_urgent &= self._next <= self._kept[-1].number
+            process.send(messages)
 
     def _receive(self) -> None:
         """Body of a thread: hand on the outputs until the run is over."""
@@ -219,6 +231,7 @@ class SpinProcess:
             )
         self._next = self._done = self._kept[0].number if self._kept else self._next
         self._flying = sum(_has_ball(one.message) for one in self._kept)
+        self._is_urgent = True
         self._process = self._begun()
         self._changed.notify_all()
 
@@ -257,3 +270,7 @@ def _key(number: int, output: LiveSpin | LiveShot) -> _Key:
 
 def _has_ball(message: SegmentStart | TrackedTick | None) -> bool:
     return isinstance(message, TrackedTick) and message.tick.track.has_ball
+
+
+def _has_end(message: TrackedTick) -> bool:
+    return len(message.tick.track.ended) > 0

@@ -112,12 +112,13 @@ def _step_flying(
     for ball in _doubles(state.balls):
         state.let_go(ball)
         ended.append(ShotEnd(ball.shot, packet.start_us, "lost"))
-    waiting = None
     earlier: Earlier = {}
-    if is_search_due(state, packet):
-        anywhere, waiting = begin_tracks(parameters, state, packet, surface, earlier, ended)
+    if is_search_due(parameters, state, packet):
+        anywhere = begin_tracks(parameters, state, packet, surface, earlier, ended)
         hough = hough or anywhere
-    if _is_shaking(parameters, state, packet.end_us):
+        if parameters.shake_px > 0.0 and state.balls and _background_moves(state):
+            state.shaken_us = packet.end_us
+    if state.shaken_us is not None and packet.end_us - state.shaken_us < SHAKING_US:
         for ball in state.balls:
             ball.add_shake(parameters.shake_px, ball.start_us if ball.shot in earlier else packet.start_us)
     contacts = _announce_contacts(parameters, state, earlier)
@@ -135,13 +136,13 @@ def _step_flying(
         status = "coasting" if balls[0].measured is None else "tracking"
     elif ended:
         status, reason = "lost", lost
-    elif waiting is not None:
+    elif state.pending:
         status, reason = "starting", "no ball yet: a circle moves like a ball, but it must be seen once more"
     else:
         status = "searching"
-        circle = "no circle in the surface" if hough is None else "no circle moves like a ball"
+        circle = "no circle moves like a ball" if state.has_circle else "no circle in the surface"
         reason = f"no ball: {state.excluded or circle}"
-    candidate = state.measuring.circle(waiting) if status == "starting" and waiting else None
+    candidate = state.measuring.circle(state.pending[0][1]) if status == "starting" else None
     t_us = packet.end_us - parameters.latency_us
     return TrackResult(status, reason, t_us, balls, hough, candidate, (*ended, *contacts))
 
@@ -210,15 +211,8 @@ def _announce_contacts(parameters: TrackParameters, state: TrackState, earlier: 
     return ended
 
 
-def _is_shaking(parameters: TrackParameters, state: TrackState, end_us: int) -> bool:
-    """Whether the camera shakes, or did a moment ago."""
-    if (
-        state.balls
-        and parameters.shake_px > 0.0
-        and background_moves(state.contour, state.memory.last_us, state.context.camera)
-    ):
-        state.shaken_us = end_us
-    return state.shaken_us is not None and end_us - state.shaken_us < SHAKING_US
+def _background_moves(state: TrackState) -> bool:
+    return background_moves(state.contour, state.memory.last_us, state.context.camera)
 
 
 def _hough_near(state: TrackState, ball: TrackedBall, surface: SurfaceResult) -> Circle | None:

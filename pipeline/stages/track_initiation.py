@@ -28,8 +28,8 @@ from .track_search import (
 )
 from .track_state import Earlier, TrackState, follow_path, is_beyond
 
-# Beside a track that is seen, other balls are looked for this often, in the surface and in the contour events by turns,
-# or in both where few events outside the balls make it cheap: soon enough to find one within 15 ms.
+# Balls are looked for this often: soon enough to find one within 15 ms. Beside a track that is seen, in the surface and
+# in the contour events by turns, or in both where few events outside the balls make it cheap.
 LOOK_US, FEW_EVENTS = 5000, 300
 # Shots come in across the border, within so many radii of it when first seen. A slow ball that turns up in the
 # middle rather rolls about: it is watched for a while, in which a real shot may come.
@@ -40,10 +40,12 @@ HELD_US = 15_000
 BEFORE_US = 30_000
 
 
-def is_search_due(state: TrackState, packet: Packet) -> bool:
-    """Whether to look for balls anywhere: always while one is missed, else every LOOK_US."""
-    missed = not state.balls or any(ball.measured is None for ball in state.balls)
-    return missed or packet.end_us - state.looked_us >= LOOK_US
+def is_search_due(parameters: TrackParameters, state: TrackState, packet: Packet) -> bool:
+    """Whether to look for balls anywhere: every LOOK_US, without a ball a tick sooner; always while one is missed."""
+    since_us = packet.end_us - state.looked_us
+    if not state.balls:
+        return since_us > LOOK_US - parameters.tick_us
+    return since_us >= LOOK_US or any(ball.measured is None for ball in state.balls)
 
 
 def begin_tracks(
@@ -53,8 +55,8 @@ def begin_tracks(
     surface: SurfaceResult,
     earlier: Earlier,
     ended: list[ShotEnd],
-) -> tuple[Circle | None, Sighting | None]:
-    """Begin tracks of sightings that are trusted, or promising for long enough; the best circle and what must wait.
+) -> Circle | None:
+    """Begin tracks of sightings that are trusted, or promising for long enough; the best circle.
 
     Adds what comes before this tick of the shots that begin to `earlier`, and the shots that end with them to `ended`.
     """
@@ -86,7 +88,8 @@ def begin_tracks(
             _begin(parameters, state, packet, sighting, earlier, ended)
             hough = circle
     state.pending += [one for one in pending if packet.end_us - one[0] < HELD_US]
-    return hough, state.pending[0][1] if state.pending else None
+    state.has_circle = hough is not None
+    return hough
 
 
 def _note_excluded(parameters: TrackParameters, state: TrackState, packet: Packet, excluded: Excluded) -> None:

@@ -37,7 +37,8 @@ class TrackState:
     pending: list[tuple[int, Sighting]] = field(default_factory=list)
     shut_out: list[tuple[int, Sighting]] = field(default_factory=list)  # outlines that a setting excludes, since when
     first_us: int | None = None
-    looked_us: int = 0
+    looked_us: int = 0  # when balls were last looked for anywhere
+    has_circle: bool = False  # whether a circle was found then
     shaken_us: int | None = None  # when most of the background was last seen to move
     shots: int = 0
     excluded: str | None = None  # the setting that excluded a circle since the last ball, in words

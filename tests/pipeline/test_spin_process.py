@@ -69,11 +69,19 @@ def live(session: Session, killed_at_us: int | None = None) -> list[LiveOutput]:
     return list(run.outputs())
 
 
+def with_ticks(session: Session, tick_us: int) -> Session:
+    """The session in ticks of this length."""
+    parameters = session.parameters.with_assignments([f"track.tick_us={tick_us}"])
+    return Session(session.recording, session.source, parameters, session.chain)
+
+
 def notices(outputs: list[LiveOutput]) -> list[str]:
     return [one.text for one in outputs if isinstance(one, LiveNotice)]
 
 
-def test_a_killed_process_loses_no_shot_and_repeats_none(session: Session) -> None:
+@pytest.mark.parametrize("tick_us", [5000, 1000])
+def test_a_killed_process_loses_no_shot_and_repeats_none(session: Session, tick_us: int) -> None:
+    session = with_ticks(session, tick_us)
     outputs = live(session, killed_at_us=90_000)  # 15 ms after the bounce is known
     shots, found = session.estimate(QUICK).shots, [one.shot for one in outputs if isinstance(one, LiveShot)]
     assert [shot.to_dict(session.camera, 0.02) for shot in found] == [
@@ -87,6 +95,28 @@ def test_a_killed_process_loses_no_shot_and_repeats_none(session: Session) -> No
     }
     (notice,) = notices(outputs)
     assert ": another one works on the last" in notice
+
+
+def test_short_ticks_without_a_ball_go_together(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    """None waits that has a ball or tells an end."""
+    sent, send = list[list[Numbered]](), ChildProcess.send
+
+    def noted(process: ChildProcess, value: object) -> None:
+        if isinstance(value, list):
+            sent.append(value)
+        send(process, value)
+
+    monkeypatch.setattr(ChildProcess, "send", noted)
+    session = with_ticks(session, 1000)
+    live(session)
+    most = live_spins.TOGETHER_US // 1000
+    assert {len(part) for part in sent} >= {1, most} and max(map(len, sent)) == most
+    for part in sent:
+        ticks = [one.message.tick.track for one in part if isinstance(one.message, TrackedTick)]
+        is_quiet = len(ticks) == len(part) and not any(track.balls or track.ended for track in ticks)
+        assert len(part) == most or not is_quiet
+    messages = [one.message for part in sent for one in part]
+    assert sum(isinstance(one, TrackedTick) for one in messages) == len(list(session.ticks(("track",))))
 
 
 def test_events_that_end_two_processes_are_left_out_and_the_third_end_is_an_error(

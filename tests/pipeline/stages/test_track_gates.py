@@ -138,13 +138,18 @@ def test_two_sightings_are_of_one_ball_if_it_moved_as_it_said(near: list[float],
 def test_other_balls_are_looked_for_every_5_ms_and_at_once_when_one_is_missed() -> None:
     state = track.start(TrackParameters(), PAPER_CONTEXT)
     state.looked_us = 50_000
-    assert track_initiation.is_search_due(state, packet_to(51_000)), "no ball yet"
+
+    def is_due(end_us: int, tick_us: int = 5000) -> bool:
+        return track_initiation.is_search_due(TrackParameters(tick_us=tick_us), state, packet_to(end_us))
+
+    assert is_due(51_000), "no ball yet"
+    assert not is_due(54_000, 1000) and is_due(55_000, 1000), "not sooner in short ticks"
+    assert not is_due(52_000, 2000) and is_due(54_000, 2000), "nor later"
     state.balls = [tracked_ball()]
-    assert not track_initiation.is_search_due(state, packet_to(54_999))
-    assert track_initiation.is_search_due(state, packet_to(55_000))
-    assert not track_initiation.is_search_due(state, packet_to(51_000))
+    assert not is_due(54_999) and is_due(55_000)
+    assert not is_due(51_000)
     state.balls[0].coast(51_000)
-    assert track_initiation.is_search_due(state, packet_to(51_000))
+    assert is_due(51_000) and is_due(51_000, 1000)
 
 
 @pytest.mark.parametrize(
