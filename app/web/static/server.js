@@ -192,6 +192,8 @@ export class RunRequests extends EventTarget {
   #hasLayout = false;
   /** @type {string | null} what the ranges and panes of the layout were made for */
   #layoutOf = null;
+  /** @type {HTMLElement | null} says that the viewer has not taken it, until it has */
+  #notLaidOut = null;
   #dirty = false;
   #settled = false;
   /** @type {string | null} what was requested last */
@@ -385,13 +387,21 @@ export class RunRequests extends EventTarget {
 
   // Waits for the first layout: before it there is one of the viewer's own. One that comes while the viewer is starting
   // can get lost, and is not taken a second time: then it gets another one of the same panes. False where none comes:
-  // then it is waited for with the next picture.
+  // then it is waited for with the next picture, and a notice says so.
   async #laidOut() {
     for (let wait_ms = LAYOUT_MS; wait_ms <= MOST_LAYOUT_MS; wait_ms *= 2) {
-      if (await this.viewer.laidOut(wait_ms)) return true;
+      if (await this.viewer.laidOut(wait_ms)) {
+        this.#notLaidOut?.remove();
+        return true;
+      }
       this.#layoutOf = null;
       await this.#fit();
     }
+    this.#notLaidOut = notice(
+      "The viewer has not taken its layout: its tabs are missing. It is sent again with the next change; if that does " +
+        "not help, reload the page.",
+      "warning",
+    );
     return false;
   }
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from .browser_tab import Tab, bare_tab, needs_browser
+from .browser_tab import SIZE, Tab, bare_tab, needs_browser
 from .conftest import Served
 
 pytestmark = needs_browser
@@ -115,3 +115,31 @@ def test_notices_stay_until_read_and_can_be_looked_up(bare: Tab) -> None:
     assert "-1" in rows[0] and "900" in rows[1]
     page.keyboard.press("Escape")
     assert page.inner_text("#all-notices") == "Notices"
+
+
+def test_a_layout_that_the_viewer_does_not_take_is_said_until_it_is_taken(browser: Any, tuner: Served) -> None:
+    """By a viewer that takes everything else at once, and its layout with the second picture."""
+    context = browser.new_context(viewport=SIZE)
+    tab = Tab(context.new_page())
+    tab.page.add_init_script(
+        """let app;
+        window.takesLayout = false;
+        Object.defineProperty(window, "spinscope", {
+            get: () => app,
+            set: (made) => {
+                app = made;
+                for (const name of ["start", "layout"]) made.viewer[name] = async () => {};
+                made.viewer.show = async () => true;
+                made.viewer.laidOut = async () => window.takesLayout;
+            },
+        });"""
+    )
+    tab.open(tuner.address)
+    tab.settled("shown")
+    said = tab.page.locator(".notice.warning", has_text="layout")
+    assert said.count() == 1
+    assert "reload the page" in said.inner_text()
+    tab.page.evaluate("window.takesLayout = true")
+    tab.slide("logo.pad_px", what="shown")
+    assert said.count() == 0
+    context.close()
