@@ -9,7 +9,6 @@ import { post } from "./server.js";
 const VIEW_MS = 1000;
 const PICTURE_MS = 120; // between two pictures; one that is late is left out
 const WIDTH = 300, HEIGHT = 46;
-const FOLLOW = "follow-shots"; // in the tab's storage: the shot that was opened last because it was new
 
 /** @typedef {{name: keyof LiveSecond, label: string, colour: string}} Line */
 
@@ -58,6 +57,8 @@ export class Live {
   #told = 0; // number of the last notice that was shown
   /** @type {string | null} the newest final shot's recording */
   #newest = null;
+  /** @type {string | null} the shot that was opened last because it was new */
+  #followed = null;
 
   /**
    * @param {any} parent
@@ -81,9 +82,7 @@ export class Live {
       onclick: () => attempt(() => this.#apply()),
       title: "The camera's stages go on with the sliders as they are; a shot in flight ends there",
     };
-    // Opening a recording loads the page anew.
-    const isFollowing = sessionStorage.getItem(FOLLOW) !== null;
-    this.follow = element("input", { type: "checkbox", checked: isFollowing, onchange: () => this.#setFollow() });
+    this.follow = element("input", { type: "checkbox", onchange: () => this.#follow() });
     const follow = { title: "Each shot opens as a recording as soon as its final spin is known" };
     this.record = element("button", { onclick: () => this.toggleRecording() });
     this.marker = element("input", {
@@ -141,18 +140,9 @@ export class Live {
     location.hash = words.toString();
   }
 
-  #setFollow() {
-    if (this.follow.checked) sessionStorage.setItem(FOLLOW, "");
-    else sessionStorage.removeItem(FOLLOW);
-    this.#follow();
-  }
-
-  // Opens the newest shot, unless it has been; not before what was opened last is seen.
   #follow() {
-    const newest = this.#newest;
-    const isSeen = document.body.dataset.shown !== undefined || this.app.runner.isBlind;
-    if (!this.follow.checked || !isSeen || newest === null || newest === sessionStorage.getItem(FOLLOW)) return;
-    sessionStorage.setItem(FOLLOW, newest);
+    if (!this.follow.checked || this.#newest === null || this.#newest === this.#followed) return;
+    const newest = this.#followed = this.#newest;
     attempt(() => this.#open(newest));
   }
 
