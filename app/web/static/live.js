@@ -55,10 +55,6 @@ export class Live {
   recording = null;
   marked_ms = 0;
   #told = 0; // number of the last notice that was shown
-  /** @type {string | null} the newest final shot's recording */
-  #newest = null;
-  /** @type {string | null} the shot that was opened last because it was new */
-  #followed = null;
 
   /**
    * @param {any} parent
@@ -82,8 +78,6 @@ export class Live {
       onclick: () => attempt(() => this.#apply()),
       title: "The camera's stages go on with the sliders as they are; a shot in flight ends there",
     };
-    this.follow = element("input", { type: "checkbox", onchange: () => this.#follow() });
-    const follow = { title: "Each shot opens as a recording as soon as its final spin is known" };
     this.record = element("button", { onclick: () => this.toggleRecording() });
     this.marker = element("input", {
       type: "text",
@@ -107,7 +101,6 @@ export class Live {
     parent.append(
       this.image,
       element("div.row", {}, this.hold, this.seconds, element("button.primary", look, "Look at them")),
-      element("label.row", follow, this.follow, "Open each new shot"),
       element("div.row", {}, element("button", apply, "Use the sliders from now on")),
       element("div.row", {}, this.record),
       this.markers,
@@ -138,12 +131,6 @@ export class Live {
     words.set("recording", recording);
     for (const name of ["clip", "shot", "t", "bias"]) words.delete(name);
     location.hash = words.toString();
-  }
-
-  #follow() {
-    if (!this.follow.checked || this.#newest === null || this.#newest === this.#followed) return;
-    const newest = this.#followed = this.#newest;
-    attempt(() => this.#open(newest));
   }
 
   async #look() {
@@ -232,8 +219,6 @@ export class Live {
     for (const { number, text } of notices) if (number > this.#told) notice(text, "warning", 12);
     this.#told = notices.at(-1)?.number ?? 0;
     this.#showRecording(recording);
-    this.#newest = shots.find((shot) => shot.is_final && shot.recording !== null)?.recording ?? null;
-    this.#follow();
     if (this.isPaused) return;
     this.shots.replaceChildren(...shots.map((shot) => this.#row(shot)));
     this.plots.replaceChildren(...PLOTS.map((plot) => drawn(plot, seconds)));

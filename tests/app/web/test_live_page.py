@@ -30,10 +30,10 @@ class StandIn:
         self.fault: str | None = None
         self.window, self.asked = window, list[object]()
         self.recording: LiveRecording | None = None
-        self.shots = [LiveShotRow(text="12.0 rps", is_final=True, recording=window.name)]
 
     def view(self) -> LiveView:
         second = dict.fromkeys(LiveSecond.model_fields, 1.0) | {"dropped": 2, "skipped": 0, "final_ms": None}
+        shots = [LiveShotRow(text="12.0 rps", is_final=True, recording=self.window.name)]
         seconds = [LiveSecond.model_validate(second | {"t_s": float(t_s)}) for t_s in range(3)]
         return LiveView(
             camera="stand-in 1",
@@ -41,7 +41,7 @@ class StandIn:
             fault=self.fault,
             kept_s=3.0,
             seconds=seconds,
-            shots=self.shots,
+            shots=shots,
             notices=self.notices,
             recording=self.recording,
         )
@@ -162,34 +162,6 @@ def test_the_buttons_of_the_panel(browser: Any, running: tuple[Served, StandIn])
     tab.until(f"location.hash.includes('recording={live.window.name}')")
     tab.page.close()
     assert live.asked == [Parameters().logo.pad_px, {"gain": 4}, ("serve", True), 10.0] and not tab.errors
-
-
-@needs_browser[0]
-@needs_browser[1]
-def test_each_new_shot_opens_where_that_is_asked_for(browser: Any, running: tuple[Served, StandIn]) -> None:
-    made, live = running
-    live.shots = []
-    tab = Tab(browser.new_page())
-    tab.page.route(re.compile(r"re_viewer_bg\.wasm"), lambda route: route.abort())
-    tab.open(made.address)
-    panel = tab.panel("Live camera")
-    panel.get_by_label("Open each new shot").check()
-
-    def opened(*shots: LiveShotRow) -> str:
-        live.shots = list(shots)
-        panel.get_by_text(shots[0].text).wait_for()
-        return str(tab.page.evaluate("location.hash"))
-
-    bounce = LiveShotRow(text="first", is_final=True, recording="flight_two_balls.h5")
-    assert "two_balls" not in opened(LiveShotRow(text="so far", is_final=False, recording=None))
-    opened(bounce)
-    tab.until("location.hash.includes('recording=flight_two_balls.h5')")
-    tab.page.evaluate("location.hash = 'recording=flight_fast_top.h5'")  # somebody looks at something else
-    assert "two_balls" not in opened(LiveShotRow(text="second", is_final=False, recording=None), bounce)
-    panel.get_by_label("Open each new shot").uncheck()
-    assert "second.h5" not in opened(LiveShotRow(text="third", is_final=True, recording="second.h5"), bounce)
-    tab.page.close()
-    assert not tab.errors
 
 
 @needs_browser[0]
