@@ -29,6 +29,7 @@ GRID_DEG, GRID_POINTS = 30, 49  # of the sphere on which the axes stand
 # Length and thickness of the axes on the unit sphere: where they agree, each still looks out of the next.
 AXES = {"A": (1.2, 0.06), "B": (1.35, 0.04), "truth": (1.5, 0.02)}
 HOW_TO_PIN = "Pin as A first (key a)"
+EQUAL = "no difference"
 ARC_POINTS = 17  # of the arc between two axes
 
 
@@ -112,21 +113,29 @@ def _plot(quantity: str, name: str) -> rrb.View:
 def _surface_difference(a: ViewedRun, b: ViewedRun) -> list[Chunk]:
     """Surface of B less that of A at every tick of B, around B's ball: red where B is brighter, blue where A is.
 
-    The root of the difference is the brightness: small ones are seen, too.
+    The root of the difference is the brightness: small ones are seen, too. Where there is none, a label says so.
     """
     half_px = int(np.ceil(panes.CLOSE_UP_RADII * b.largest_radius_px))
     before = np.searchsorted(a.ends_us, b.ends_us, side="right") - 1
-    pictures = [png(np.zeros((2 * half_px + 1, 2 * half_px + 1, 3), np.uint8))]
+    pictures, is_equal = [png(np.zeros((2 * half_px + 1, 2 * half_px + 1, 3), np.uint8))], [False]
     for tick, row, (x, y) in zip(b.ticks, before, ball_places(b)[1:], strict=True):
         own = _around(tick.surface.values, x, y, half_px)
         other = _around(a.ticks[row].surface.values, x, y, half_px) if row >= 0 else np.zeros_like(own)
         more, less = (np.sqrt(np.clip(sign * (own - other) / 255, 0, 1))[..., None] for sign in (1, -1))
         pictures.append(png((more * np.array(at.ON) + less * np.array(at.OFF)).astype(np.uint8)))
+        is_equal.append(bool(np.array_equal(own, other)))
     corner = rr.Transform3D(translation=[-half_px - 0.5, -half_px - 0.5, 0.0])
     return [
         once(at.SURFACE_DIFFERENCE, corner, rr.EncodedImage.from_fields(media_type="image/png")),
         columns_at(at.SURFACE_DIFFERENCE, b.times_us, rr.EncodedImage.columns(blob=pictures)),
+        styled(at.NO_DIFFERENCE, rr.Points2D, colors=at.OTHERS_COLOUR, radii=-0.1, show_labels=True),
+        columns_at(at.NO_DIFFERENCE, b.times_us, _labels(EQUAL, sum(is_equal)), np.array(is_equal, np.int64)),
     ]
+
+
+def _labels(text: str, count: int) -> Any:
+    """So many points at the origin of a close-up with this label."""
+    return rr.Points2D.columns(positions=np.zeros((count, 2), np.float32), labels=[text] * count)
 
 
 def _around(values: NDArray[np.uint8], x: float, y: float, half_px: int) -> Floats:

@@ -79,6 +79,7 @@ COMPARISON = "/compare"
 # Of two runs A and B: their surfaces' difference around the ball, and their axes on a unit sphere.
 DIFFERENCE = "/difference"
 SURFACE_DIFFERENCE = "/difference/surface"
+NO_DIFFERENCE = "/difference/none"
 COMPARED_AXES = "/axes"
 
 # Colours of series, of ON and OFF, and of the spin methods are told apart by red-green-blind eyes, too: a test.

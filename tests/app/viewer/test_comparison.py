@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from spinscope.app.viewer import entities
 from spinscope.app.viewer.comparison import compared, comparison, difference_chunks, note_with_a, note_without_a
 from spinscope.app.viewer.drawers import run_chunks
-from spinscope.app.viewer.entities import COMPARED_AXES, OFF, ON, SURFACE_DIFFERENCE
+from spinscope.app.viewer.entities import COMPARED_AXES, NO_DIFFERENCE, OFF, ON, SURFACE_DIFFERENCE
 from spinscope.app.viewer.rrd import layout_bytes, rrd_bytes
 from spinscope.app.viewer.run import ViewedRun, shown_estimate, vector_of
 from spinscope.app.viewer.views import views
@@ -87,6 +87,8 @@ def test_equal_runs_differ_nowhere(flight: ViewedRun, tmp_path: Path) -> None:
     found = logged(flight, flight, tmp_path)
     pictures = [decoded(blobs) for blobs in found[SURFACE_DIFFERENCE].values["blob"]]
     assert len(pictures) == len(flight.times_us) and not any(picture.any() for picture in pictures)
+    notes = [list(row) if row is not None else [] for row in found[NO_DIFFERENCE].values["labels"]]
+    assert notes == [[]] + [["no difference"]] * len(flight.ticks)
     angles = {label for row in found[f"{COMPARED_AXES}/angle"].values["labels"] for label in row or ()}
     assert angles == {"0.0°"}
     arrows = [found[f"{COMPARED_AXES}/{name}"].values["vectors"] for name in "AB"]
@@ -101,7 +103,9 @@ def test_what_one_surface_lacks_has_the_others_colour(flight: ViewedRun, tmp_pat
 
     darkened = dataclasses.replace(flight, ticks=[dark(tick) for tick in flight.ticks])
     for a, b, colour in ((flight, darkened, OFF), (darkened, flight, ON)):
-        picture = decoded(logged(a, b, tmp_path)[SURFACE_DIFFERENCE].at("blob", int(flight.opening_us)))
+        found = logged(a, b, tmp_path)
+        picture = decoded(found[SURFACE_DIFFERENCE].at("blob", int(flight.opening_us)))
+        assert not len(found[NO_DIFFERENCE].at("labels", int(flight.opening_us)))
         brightest = picture.reshape(-1, 3)[picture.sum(axis=2).argmax()]
         assert brightest.max() > 100 and np.allclose(
             brightest / brightest.max(), np.divide(colour, max(colour)), atol=0.02

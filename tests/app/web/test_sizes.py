@@ -29,6 +29,17 @@ def test_all_of_the_page_is_inside_the_window(bare: Tab, size: tuple[int, int]) 
     assert bare.page.locator("#controls").evaluate(overflow) <= 0 and bare.page.locator("#side").evaluate(overflow) <= 0
 
 
+@pytest.mark.parametrize("width", [1280, 1366, 1920])
+def test_the_header_keeps_to_one_line_with_a_pinned(bare: Tab, width: int) -> None:
+    bare.page.set_viewport_size({"width": width, "height": 800})
+    bare.page.evaluate("import('/static/elements.js').then(({ notice }) => notice('one that is to be read'))")
+    bare.page.get_by_text("Notices: ").wait_for()
+    if bare.page.locator("#swap").is_hidden():
+        bare.after(lambda: bare.page.click("#pin"))
+    heights = {one.bounding_box()["y"] // 20 for one in bare.page.locator("header button:visible").all()}
+    assert bare.page.locator("#swap").is_visible() and len(heights) == 1
+
+
 def test_folded_panels_make_room_and_stay_folded(bare: Tab) -> None:
     page = bare.page
     page.set_viewport_size({"width": 1280, "height": 800})
