@@ -16,23 +16,28 @@ from ...results import spin_errors
 from ...session import DEFAULT_SAMPLE, Session
 from .. import paper
 from ..plots import Figures, label_axes, panels
-from ..tables import Cell, ResultTable, Row, distinct, where
+from ..tables import Cell, ResultTable, Row, where
 from ..tasks import Task, TaskContext
 
 LABEL = "Live"
 HELP = "Latency from an event's arrival to the track and to the shot's spin, replayed in real time."
 TIMED = True  # its tasks measure run times
 
-RATES_MEV_S = (1.0, 5.0)
+# Event rates, and lengths of a tick: the default, and the shortest that is asked for.
+RATES_MEV_S, TICKS_US = (1.0, 5.0), (5000, 1000)
 SECONDS, QUICK_SECONDS = 60.0, 5.0
 ROUND_US = 1_000_000  # one shot, and noise around it
 BATCH_EVENTS = 50_000
 
 
 def tasks(quick: bool) -> list[Task]:
-    """One event rate a task; quick: the first one, for a shorter time."""
-    rates, seconds = (RATES_MEV_S[:1], QUICK_SECONDS) if quick else (RATES_MEV_S, SECONDS)
-    return [Task(measure, {"rate_mev_s": rate, "seconds": seconds}, keep=False) for rate in rates]
+    """One event rate and length of a tick a task; quick: the first ones, for a shorter time."""
+    cases = [(tick_us, rate_mev_s) for tick_us in TICKS_US for rate_mev_s in RATES_MEV_S]
+    cases, seconds = (cases[:1], QUICK_SECONDS) if quick else (cases, SECONDS)
+    return [
+        Task(measure, {"rate_mev_s": rate_mev_s, "tick_us": tick_us, "seconds": seconds}, keep=False)
+        for tick_us, rate_mev_s in cases
+    ]
 
 
 def busy_round(sample: Session, rate_mev_s: float) -> EventBatch:
@@ -49,8 +54,9 @@ def busy_round(sample: Session, rate_mev_s: float) -> EventBatch:
     return EventBatch(t_us[order], x_px, y_px, np.concatenate([shot.on, random.random(count) < 0.5])[order])
 
 
-def measure(context: TaskContext, rate_mev_s: float, seconds: float) -> list[Row]:
+def measure(context: TaskContext, rate_mev_s: float, tick_us: int, seconds: float) -> list[Row]:
     """Latency of every tick and shot, and whether the first round's shots are those of the events read at once."""
+    parameters = context.parameters.with_values({"track": {"tick_us": tick_us}})
     load_kernels()
     sample = Session.open(DEFAULT_SAMPLE)
     events, rounds = busy_round(sample, rate_mev_s), round(seconds * 1e6 / ROUND_US)
@@ -65,7 +71,7 @@ def measure(context: TaskContext, rate_mev_s: float, seconds: float) -> list[Row
     camera, rows = ReplayCamera(batches, width_px, height_px), list[Row]()
     run = LiveRun(
         lambda tick_us, on_notice: EventStream(camera, tick_us, on_notice=on_notice),
-        context.parameters,
+        parameters,
         with_balls=True,
         on_tick=lambda arrived, tick, latency_ms: rows.append({"what": "track", "latency_ms": latency_ms}),
     )
@@ -81,15 +87,15 @@ def measure(context: TaskContext, rate_mev_s: float, seconds: float) -> list[Row
             skipped = one.skipped
     start_us, end_us = int(events.t_us[0]), int(events.t_us[-1]) + 1
     source = EventsInMemory(("round", rate_mev_s), events, width_px, height_px, start_us, end_us)
-    once = Session(sample.recording, source, context.parameters, sample.chain).clip(start_us, end_us).estimate()
-    whole = [shot for shot in once.shots if shot.end_us < ROUND_US - context.parameters.track.tick_us]
-    first = [one.shot for one in shots if one.shot.end_us < ROUND_US - context.parameters.track.tick_us]
+    once = Session(sample.recording, source, parameters, sample.chain).clip(start_us, end_us).estimate()
+    whole = [shot for shot in once.shots if shot.end_us < ROUND_US - tick_us]
+    first = [one.shot for one in shots if one.shot.end_us < ROUND_US - tick_us]
     identical = [a.to_dict(once.session.camera, 0.02) for a in whole] == [
         b.to_dict(once.session.camera, 0.02) for b in sorted(first, key=lambda shot: shot.start_us)
     ]
     rows += [{"what": "shot", "latency_ms": one.latency_ms} for one in shots]
     rows += [{"what": "announced", "latency_ms": one.latency_ms, **_apart(one, shots)} for one in announced]
-    about: Row = {"rate_mev_s": rate_mev_s, "skipped": skipped, "identical": identical}
+    about: Row = {"rate_mev_s": rate_mev_s, "tick_us": tick_us, "skipped": skipped, "identical": identical}
     return [{**about, **row} for row in rows]
 
 
@@ -107,19 +113,20 @@ def _apart(announced: LiveSpin, shots: Sequence[LiveShot]) -> Row:
 
 
 def tables(rows: Sequence[Row]) -> list[ResultTable]:
-    """Percentiles of both latencies by event rate, beside the paper's."""
-    lines: list[tuple[Cell, ...]] = [("paper, tracking alone", None, paper.LATENCY_MS, *[None] * 11)]
-    for rate in distinct(rows, "rate_mev_s"):
-        part = where(rows, rate_mev_s=rate)
+    """Percentiles of the latencies by event rate and length of a tick, beside the paper's."""
+    lines: list[tuple[Cell, ...]] = [("paper, tracking alone", None, None, paper.LATENCY_MS, *[None] * 11)]
+    for rate, tick_us, part in _cases(rows):
         columns = [_column(where(part, what=what)) for what in ("track", "so far", "announced", "shot")]
         shares = [_percentile(column, q) for column in columns for q in (50, 99)]
         apart = [_percentile(_column(where(part, what="announced"), name), 50) for name in ("apart_rps", "apart_deg")]
-        lines.append((f"{rate:g} Mev/s", columns[0].size, *shares, *apart, part[0]["skipped"], part[0]["identical"]))
+        about = f"{rate:g} Mev/s", tick_us / 1000
+        lines.append((*about, columns[0].size, *shares, *apart, part[0]["skipped"], part[0]["identical"]))
     return [
         ResultTable(
             "Live, replayed in real time",
             (
                 "events",
+                "tick [ms]",
                 "ticks",
                 "track p50 [ms]",
                 "p99 [ms]",
@@ -135,7 +142,7 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
                 "identical",
             ),
             lines,
-            "Track: from the arrival of a tick's first events to its track, the tick of 5 ms included; spin so far: to "
+            "Track: from the arrival of a tick's first events to its track, the tick included; spin so far: to "
             "that of each tick of a flying ball. Announced: from the arrival of a shot's last events to the newest "
             f"spin so far, told when its end is known and {1000 * ANNOUNCED_S:.0f} ms have passed, sooner where all "
             "its ticks are answered; final: to that of the whole shot. Apart: the median difference of the two. "
@@ -146,14 +153,23 @@ def tables(rows: Sequence[Row]) -> list[ResultTable]:
 
 
 def figures(rows: Sequence[Row]) -> Figures:
-    """Distribution of the track's latency by event rate."""
+    """Distribution of the track's latency by event rate and length of a tick."""
     figure, axes = panels(1, 1)
-    for rate in distinct(rows, "rate_mev_s"):
-        latencies = np.sort(_column(where(rows, rate_mev_s=rate, what="track")))
-        axes[0, 0].plot(latencies, np.linspace(0.0, 1.0, latencies.size), label=f"{rate:g} Mev/s")
+    for rate, tick_us, part in _cases(rows):
+        latencies = np.sort(_column(where(part, what="track")))
+        label = f"{rate:g} Mev/s, ticks of {tick_us / 1000:g} ms"
+        axes[0, 0].plot(latencies, np.linspace(0.0, 1.0, latencies.size), label=label)
     axes[0, 0].set_xscale("log")
     label_axes(axes[0, 0], "arrival to track", "latency [ms]", "share of ticks below")
     return {"latency": figure}
+
+
+def _cases(rows: Sequence[Row]) -> list[tuple[float, int, list[Row]]]:
+    """(event rate in Mev/s, length of a tick in us, their rows)."""
+    cases: dict[tuple[float, int], list[Row]] = {}
+    for row in rows:
+        cases.setdefault((float(row["rate_mev_s"] or 0), int(row["tick_us"] or 0)), []).append(row)
+    return [(*case, part) for case, part in cases.items()]
 
 
 def _column(rows: Sequence[Row], name: str = "latency_ms") -> np.ndarray[tuple[int], np.dtype[np.float64]]:
