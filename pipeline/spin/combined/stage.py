@@ -17,6 +17,7 @@ from ...stages.logo import LogoResult
 from ...stages.rate import RateResult
 from ...stages.track_result import BallTrack
 from ..contrast import ContrastResult
+from ..contrast.search import NEAR
 from ..trajectory.stage import TRUSTED_AXIS_DEG, TRUSTED_SHARE, TrajectoryResult
 from .candidates import Candidate, flight_candidates, pattern_candidates, rhythm_candidates
 from .likelihoods import BLUNDER, by_flight, by_flow, by_rate, by_sightings, fallible, log_mean, rhythms_of
@@ -27,8 +28,9 @@ METHOD = "combined"
 
 # A spin less likely than this is excluded by the flight (3 sigma).
 EXCLUDED = -4.5
-# Candidates this near to each other, as a part of the spin, are one spin.
-NEAR = 0.1
+# Candidates whose magnitudes differ by more than this share are other spins, also of one axis: a turn more or less
+# between the logo's visits.
+SAME_MAGNITUDE = 0.1
 LABELS = {
     "logo": "the times at which the logo was seen",
     "rate": "the rhythm",
@@ -171,13 +173,17 @@ def _estimate(
     basis: Basis,
     events: int,
 ) -> tuple[SpinEstimate, list[int]]:
-    """The most likely spin with its covariance, or a refusal; and the candidates that are other spins."""
+    """The most likely spin with its covariance, or a refusal; and the candidates that are other spins.
+
+    As in `contrast`, candidates nearer than NEAR are part of its error, and only the others must be beaten.
+    """
     shares = np.exp(weights - np.max(weights, axis=1)[:, None])
     shares /= shares.sum(axis=1)[:, None]
     means = np.einsum("ks,ksi->ki", shares, spins_rps)
-    apart = np.linalg.norm(means - means[best], axis=1)
-    others = np.flatnonzero(apart > NEAR * np.linalg.norm(means[best]))
-    near = np.flatnonzero(apart <= NEAR * np.linalg.norm(means[best]))
+    sizes = np.einsum("ks,ks->k", shares, np.linalg.norm(spins_rps, axis=2))
+    is_near = np.linalg.norm(means - means[best], axis=1) <= NEAR * np.linalg.norm(means[best])
+    is_near &= np.abs(sizes - sizes[best]) <= SAME_MAGNITUDE * sizes[best]
+    near, others = np.flatnonzero(is_near), np.flatnonzero(~is_near)
     probabilities = np.exp(evidence - np.logaddexp.reduce(evidence))
     share = probabilities[near, None] * shares[near] / probabilities[near].sum()
     mean = np.einsum("ks,ksi->i", share, spins_rps[near])

@@ -132,6 +132,28 @@ def test_two_spins_that_explain_the_logo_are_left_open_by_the_pattern_alone() ->
     assert "two spins open" in (result.estimate.reason or "")
 
 
+def turned(spin: np.ndarray, angle: float) -> np.ndarray:
+    """The spin with its axis turned by an angle in degrees."""
+    across = np.cross(spin, (0.0, 0.0, 1.0))
+    across *= np.linalg.norm(spin) / np.linalg.norm(across)
+    turn: np.ndarray = math.cos(math.radians(angle)) * spin + math.sin(math.radians(angle)) * across
+    return turn
+
+
+def test_a_near_rival_is_part_of_the_error_and_a_far_one_must_be_beaten() -> None:
+    estimate = answered(pattern(TOP, [turned(TOP, 15.0)], [0.0])).estimate
+    assert estimate.vector_rps is not None and estimate.axis_std_deg is not None
+    assert angle_deg(estimate.vector_rps, TOP) == pytest.approx(7.5, abs=0.5), "both are as likely"
+    assert estimate.axis_std_deg == pytest.approx(math.hypot(7.5, 2.0 * math.sqrt(2.0)), abs=0.5)
+    assert estimate.magnitude_rps == pytest.approx(float(np.linalg.norm(TOP)), abs=0.3)
+    clear = answered(pattern(TOP, [turned(TOP, 15.0)], [2.5])).estimate
+    assert clear.axis_std_deg is not None and clear.axis_std_deg < 5.0
+    for rival in (turned(TOP, 20.0), 1.15 * TOP):
+        assert "two spins open" in (answered(pattern(TOP, [rival], [0.5])).estimate.reason or "")
+    wide = answered(pattern(TOP, [turned(TOP, 16.0)], [0.0], axis_std_deg=7.0)).estimate
+    assert "the axis is too uncertain" in (wide.reason or "")
+
+
 def test_the_flight_does_not_answer_alone_where_the_logo_is_seen() -> None:
     """Of a hidden logo it does; one that is seen and leaves the spin open tells more than the flight."""
     of_flight = {"trajectory": SpinEstimate("trajectory", TOP, covariance(TOP, 5.0, 15.0), None)}
