@@ -30,7 +30,7 @@ HELP = "Errors of the ball's place, size and velocity against its speed (section
 TAKES_SCENE_CHOICES = True
 REAL_KINDS = (FLIGHT,)
 
-QUICK_SEED, SEED = 882_541, 504_619  # of this suite alone: of `--quick`, and drawn for the published results
+QUICK_SEED, SEED = 882_541, 625_874  # of this suite alone: of `--quick`, and drawn for the published results
 SPEEDS_M_S = tuple(float(speed) for speed in range(4, 21, 2))
 SCENES = ("one ball", "two balls", "arm")
 REAL = "real recordings"

@@ -27,7 +27,7 @@ TAKES_SCENE_CHOICES = True
 TAKES_RIVALS = True
 REAL_KINDS = (SPINNER,)
 
-QUICK_SEED, SEED = 284_876, 374_838  # of this suite alone: of `--quick`, and drawn for the published results
+QUICK_SEED, SEED = 284_876, 510_723  # of this suite alone: of `--quick`, and drawn for the published results
 CENTRE_STD_PX = 0.3  # how well the place of a mounted ball is known, for centre and radius
 DURATION_MS = 100
 # Logo events from which an answer is asked for.

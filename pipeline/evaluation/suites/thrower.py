@@ -30,8 +30,8 @@ TAKES_SCENE_CHOICES = True
 TAKES_RIVALS = True
 REAL_KINDS = (FLIGHT,)
 
-QUICK_SEED, SEED = 360_550, 776_280  # of this suite alone: of `--quick`, and drawn for the published results
-QUICK_HUMAN_SEED, HUMAN_SEED = 880_697, 990_327
+QUICK_SEED, SEED = 360_550, 605_499  # of this suite alone: of `--quick`, and drawn for the published results
+QUICK_HUMAN_SEED, HUMAN_SEED = 880_697, 778_849
 HUMAN_SHOTS = 40
 VISIBLE = 500  # logo events in a flight from which an answer is asked for
 
