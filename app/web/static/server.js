@@ -397,6 +397,7 @@ export class RunRequests extends EventTarget {
       this.#layoutOf = null;
       await this.#fit();
     }
+    this.#notLaidOut?.remove();
     this.#notLaidOut = notice(
       "The viewer has not taken its layout: its tabs are missing. It is sent again with the next change; if that does " +
         "not help, reload the page.",
