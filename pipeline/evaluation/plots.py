@@ -23,6 +23,7 @@ Figures: TypeAlias = "dict[str, Figure]"  # by name
 
 WIDTH_IN, HEIGHT_IN, DPI = 5.0, 3.4, 120  # of one panel
 BIN_RPS = 20.0  # errors against the spin are averaged over so much of it
+MOST_COLUMNS = 6  # of a legend
 LEAST = 1e-3  # errors below are drawn there, for the logarithm
 LABELS = ("magnitude error [rps]", "axis error [deg]")  # of ERRORS
 
@@ -94,13 +95,20 @@ def label_axes(axes: Any, title: str, x: str, y: str, log: bool = False) -> None
 
 
 def _legend(figure: Figure) -> Figure:
-    """One legend for all panels, below them."""
+    """One legend for all panels, below them, in as many columns as there is room for."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
     known: dict[str, Any] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             known.setdefault(label, handle)
-    if known:
-        figure.legend(known.values(), known.keys(), loc="outside lower center", ncols=min(len(known), 6), fontsize=8)
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    for columns in range(min(len(known), MOST_COLUMNS), 0, -1):
+        legend = figure.legend(known.values(), known.keys(), loc="outside lower center", ncols=columns, fontsize=8)
+        if legend.get_window_extent(renderer).width <= figure.bbox.width:
+            break
+        if columns > 1:
+            legend.remove()
     return figure
 
 
