@@ -51,7 +51,7 @@ def assert_same(spin: np.ndarray | None, expected: np.ndarray, part: float = 0.0
 @settings(max_examples=25)
 @given(
     seed=st.integers(0, 10_000),
-    count=st.integers(1, 30),
+    count=st.integers(1, 30).filter(lambda count: count != 2),
     speed=st.floats(0.0, 900.0),
     spread=st.floats(0.02, 2.0),
     segment_s=st.sampled_from([1.0, 0.004]),
@@ -61,6 +61,8 @@ def assert_same(spin: np.ndarray | None, expected: np.ndarray, part: float = 0.0
     apart_s=st.sampled_from([0.0, 0.002]),
 )
 def test_the_score_is_its_twins(seed, count, speed, spread, segment_s, times_each, cell, floor, apart_s) -> None:
+    # Of two points the mean is an eigenvector of their scatter, by which the map's pole is found: where it is that of
+    # the smaller eigenvalue, rounding decides where the pole lies.
     random = np.random.default_rng(seed)
     normals = np.array([[0.0], [0.2], [-1.0]]) + spread * random.standard_normal((3, count))
     normals /= np.linalg.norm(normals, axis=0)
