@@ -173,10 +173,8 @@ def test_final_spins_rest_in_a_flight_and_never_for_long(monkeypatch: pytest.Mon
 
 def test_final_spins_are_to_rest_from_a_shots_first_tick_to_its_last(samples: Path) -> None:
     session = Session.open(samples / "own/rally.h5").clip(3_200_000, 3_400_000)
-    spins, ticks = (
-        LiveSpins(SpinRun((QUICK,), False, 1280, 720, 5000), lambda answers: None),
-        list(session.ticks(("track",))),
-    )
+    run = SpinRun((QUICK,), False, 1280, 720, session.parameters.track.tick_us)
+    spins, ticks = LiveSpins(run, lambda answers: None), list(session.ticks(("track",)))
     rests = list[tuple[bool, bool]]()
 
     class Final:

@@ -80,7 +80,8 @@ class Page {
   /** One place after the other, so that what is drawn last is what was asked for last. */
   show(isRefreshed = false) {
     const shown = ++this.#shown;
-    return this.#showing = this.#showing.then(() => shown === this.#shown ? this.#draw(isRefreshed) : undefined);
+    const draw = () => shown === this.#shown ? this.#draw(isRefreshed) : undefined;
+    return this.#showing = this.#showing.catch(() => {}).then(draw);
   }
 
   /** @param {boolean} isRefreshed */
